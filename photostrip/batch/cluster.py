@@ -25,14 +25,12 @@ from photostrip.batch.local_pool import TICK_SECONDS, do_nothing
 from photostrip.batch.outcomes import BROKEN, failure
 from photostrip.batch.parcel import pack
 from photostrip.batch.result_folder import program
-from photostrip.batch.tasks import Answer
+from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.batch.worker_process import WORK
 from photostrip.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-
-    from photostrip.batch.tasks import Limits, Task
 
 LOCAL = "local"
 CONNECT_SECONDS = 5.0  # seconds for a scheduler to answer

@@ -8,16 +8,12 @@ from __future__ import annotations
 
 import os
 import threading
-from typing import TYPE_CHECKING
 
 from photostrip.batch.local_pool import LocalPool
 from photostrip.batch.result_folder import program
-from photostrip.batch.tasks import Limits
+from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.batch.worker_process import WORK, share_of_memory
 from photostrip.errors import PhotostripError
-
-if TYPE_CHECKING:
-    from photostrip.batch.tasks import Answer, Task
 
 _idle: dict[tuple[Limits, str], list[LocalPool]] = {}
 _lock = threading.Lock()

@@ -5,22 +5,16 @@ from __future__ import annotations
 import tempfile
 import traceback
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from photostrip.batch.outcomes import BROKEN, FAULTY, WEAK, failure, out_of_memory, outcome_of
-from photostrip.batch.parcel import unpack_grids
-from photostrip.batch.tasks import Answer
+from photostrip.batch.parcel import Parcel, unpack_grids
+from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.text.source import Source, digest, reading_from
-from photostrip.project.loading import adjust_project, load_project
+from photostrip.project.loading import Project, adjust_project, load_project
 from photostrip.report.page.messages import result_findings
 from photostrip.result.document import document_of
-
-if TYPE_CHECKING:
-    from photostrip.batch.parcel import Parcel
-    from photostrip.batch.tasks import Task
-    from photostrip.project.loading import Project
 
 
 def evaluate(task: Task) -> Answer:

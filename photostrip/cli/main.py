@@ -11,7 +11,7 @@ import gc
 import os
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, TextIO, cast
 
 from photostrip import __version__
 from photostrip.cli.command_table import COMMANDS, COMPLETION, usage
@@ -19,7 +19,6 @@ from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from typing import TextIO
 
 EXIT_USAGE = 2
 NEW_OBJECTS = 1_000_000  # between two looks of the garbage collector

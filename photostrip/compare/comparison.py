@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.result.numbers import Document
 
-
 SCHEMA = 1
 # A number of ours, and what the other numbers are made of.
 LEFT_OUT = ("version", "residuals", "parallaxes", "link_residuals")

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats
 
-
 _ROWS_NAMED = 8
 
 

@@ -13,7 +13,6 @@ from photostrip.geodesy.domain import named_rows
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
 
-
 _POLE = 1e-9  # radians: nearer to a pole, east and north are not defined
 
 

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError, PhotostripError
-from photostrip.geodesy.curvature import curvature_correction, meridian_radius, prime_vertical_radius
+from photostrip.geodesy.curvature import Ellipsoid, curvature_correction, meridian_radius, prime_vertical_radius
 from photostrip.geodesy.domain import finite_rows, named_rows, require_reached, require_rows
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind
 from photostrip.geodesy.ground_axes import axes_along_north, axes_between, true_axes
 from photostrip.geodesy.local_frame import geocentric_from_geodetic, geodetic_from_geocentric
-from photostrip.geodesy.proj_operation import DatumShift, wrapped_longitude
+from photostrip.geodesy.proj_operation import DatumShift, ProjOperation, wrapped_longitude
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from photostrip.arrays import Floats
-    from photostrip.geodesy.curvature import Ellipsoid
-    from photostrip.geodesy.proj_operation import ProjOperation
-
 
 WGS84: Ellipsoid = (6378137.0, 6356752.314245179)
 """Semi-axes of WGS 84, metres: by definition a = 6378137 m, 1/f = 298.257223563 (NIMA TR8350.2)."""

@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.geodesy.curvature import eccentricity_squared, prime_vertical_radius
+from photostrip.geodesy.curvature import Ellipsoid, eccentricity_squared, prime_vertical_radius
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from photostrip.arrays import Floats
-    from photostrip.geodesy.curvature import Ellipsoid
 
 _ITERATIONS = 10  # the Earth stops after 2 or 3, a body as flat as Saturn after a few more
 _CONVERGED = 1e-15  # radians, 6 nanometres on the Earth

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 SINGULAR = 1e-9  # smallest over largest singular value: below, rounding decides
 ITERATIONS = 50
 CONVERGED = 1e-12  # in units of the spread of the points

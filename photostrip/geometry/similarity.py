@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 SIMILARITY_PARAMETERS = 7  # shift, rotation, logarithm of the scale
 
 

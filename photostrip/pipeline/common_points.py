@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from photostrip.pipeline.precision import photo_precision, strip_precision
-from photostrip.pipeline.results import Adjusted, AdjustedStrips, Ties
+from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Settings
-    from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
     from photostrip.points import ControlPoints, PhotoPoints
 

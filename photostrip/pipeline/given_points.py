@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.points import locate
+from photostrip.points import ControlPoints, PhotoPoints, locate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.results import Adjusted
-    from photostrip.points import ControlPoints, PhotoPoints
 
 
 def measured_control(control: ControlPoints, observations: PhotoPoints) -> ControlPoints:

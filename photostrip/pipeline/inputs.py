@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.points import locate
+from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, locate
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
-
 
 ADJUSTMENTS = ("similarity", "polynomial", "covariance", "bundle")
 

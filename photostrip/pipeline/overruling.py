@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
     from photostrip.triangulation.independent_models.settings import LinkSettings
 
-
 CENTER = "center of photo "  # before the name of a perspective centre in model coordinates
 
 

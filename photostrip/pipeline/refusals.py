@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.pipeline.inputs import ADJUSTMENTS
+from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, Settings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.inputs import Inputs, Settings
 
 OF_MODELS = ("polynomial", "similarity")  # adjustments that need no image coordinates
 

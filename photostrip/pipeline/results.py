@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.resection import resection as exterior
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-
 NEW, CONTROL, CHECK = "new", "control", "check"
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.pipeline.common_points import join_strips
-from photostrip.pipeline.frames import curvature_notes, tie_ground_frames
+from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
-from photostrip.pipeline.image_coordinates import correct, orient_interior
+from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
 from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
@@ -23,8 +23,6 @@ from photostrip.pipeline.strips.forming import form_strips
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from photostrip.pipeline.frames import GroundFrames, TiedFrames
-    from photostrip.pipeline.image_coordinates import PhotoCoordinates
     from photostrip.pipeline.inputs import Inputs, Settings
 
 

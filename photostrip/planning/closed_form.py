@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 ORDER = ("dbz", "dkappa", "dalpha", "domega")
 
 

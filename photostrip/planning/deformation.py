@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 TERMS = ("E0", "A", "B", "C", "D")
 LEAST_POINTS = 5
 LEAST_REDUNDANCY = 3  # below it a standard deviation from the residuals is mostly luck

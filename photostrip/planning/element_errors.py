@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 ELEMENTS = ("dby", "dbz", "dkappa", "dalpha", "domega")
 FREE = ("dkappa", "dbz", "dalpha2", "domega")  # dalpha2: the turn against the base, dalpha - dbz / b
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 Place = tuple[float, float]
 LAYOUTS = ("corners", "corners+centre", "six")
 METRE = 1e3  # mm

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
 
-
 PARAMETERS = ("dX0", "dY0", "dZ0", "dlambda", "dtheta", "deta", "dxi")
 FLATTEST = 1e-6  # of control in height: A against c1 c2; below that it lies on a line
 CLOSEST = 1e-12  # of control in plan: B against the square of the size of its coordinates; below that it is one point

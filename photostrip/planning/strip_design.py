@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import GeometryError, InputError
+from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.planning.control_layout import ControlLayout, Spot, spots_of
 from photostrip.planning.ideal_strip import IdealStrip, StripGeometry, ideal_strip
 from photostrip.planning.placement import BestPlaces, Placement, Required, best_places, worst
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from photostrip.arrays import Floats
-    from photostrip.errors import Fault
-
 
 ANYTHING = Required()
 

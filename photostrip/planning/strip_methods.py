@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.planning.ideal_strip import IdealStrip
 
-
 SIMILARITY, COVARIANCE, BUNDLE = "similarity", "covariance", "bundle"
 DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}
 METHODS = (SIMILARITY, *DEGREES, COVARIANCE, BUNDLE)

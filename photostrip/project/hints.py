@@ -12,9 +12,9 @@ from photostrip.formats.text.findings import counted, listed
 from photostrip.notes import Note
 from photostrip.points import locate
 from photostrip.project.conversion import certificate_of
-from photostrip.project.tables import alike, rays
-from photostrip.project.yaml.document import key_path
-from photostrip.triangulation.image_coordinates.certificate import POOR_FIT
+from photostrip.project.tables import Tables, alike, rays
+from photostrip.project.yaml.document import Node, key_path
+from photostrip.triangulation.image_coordinates.certificate import POOR_FIT, Certificate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from photostrip.project.models import ModelTables
     from photostrip.project.schema.cameras import Camera
     from photostrip.project.schema.project_file import ProjectFile
-    from photostrip.project.tables import Tables
-    from photostrip.project.yaml.document import Node
-    from photostrip.triangulation.image_coordinates.certificate import Certificate
 
 NEAR_NAMED = 3
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from photostrip.errors import GeometryError, InputError
+from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.source import current, seen_from
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import Inputs, ModelStrip, Settings, triangulate
+from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Result, Settings, triangulate
 from photostrip.pipeline.frames import TiedFrames
 from photostrip.points import PhotoPoints
 from photostrip.project import conversion
@@ -34,10 +34,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from photostrip.camera import Camera
-    from photostrip.errors import Fault
     from photostrip.formats.text.findings import Findings
     from photostrip.notes import Finding, Note
-    from photostrip.pipeline import MeasuredModels, Result
 
 __all__ = ["Project", "adjust_project", "json_schema", "load_project"]
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.formats.measured.models import read_models
-from photostrip.formats.text.findings import listed, suggestion
+from photostrip.formats.measured.models import ModelTable, read_models
+from photostrip.formats.text.findings import Findings, listed, suggestion
 from photostrip.pipeline import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
-from photostrip.project.yaml.document import fault_at
+from photostrip.project.yaml.document import Node, fault_at
 from photostrip.project.yaml.references import listed_photos
 
 if TYPE_CHECKING:
@@ -20,11 +20,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.errors import Fault
-    from photostrip.formats.measured.models import ModelTable
-    from photostrip.formats.text.findings import Findings
     from photostrip.project.schema.measurements import Models
-    from photostrip.project.yaml.document import Node
-
 
 MILLIMETRES = {"mm": 1.0, "um": 1e-3, "m": 1e3}  # in a unit
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.project.yaml.document import steps
+from photostrip.project.yaml.document import Node, steps
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding
     from photostrip.pipeline import ModelStrip, Strip
     from photostrip.project.tables import Tables
-    from photostrip.project.yaml.document import Node
 
 
 def places_of(

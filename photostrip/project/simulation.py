@@ -35,13 +35,11 @@ from photostrip.project.schema.values import (
     schema_number,
     wrong,
 )
-from photostrip.project.yaml.reading import read_file
+from photostrip.project.yaml.reading import Reading, read_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
-
-    from photostrip.project.yaml.reading import Reading
 
 SCHEMA_NUMBER = 1
 USUAL = simulate.Spec()

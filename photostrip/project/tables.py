@@ -13,23 +13,20 @@ import numpy as np
 from photostrip.formats.measured.control import ControlTable, read_control, refuse_repeated
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable, read_orientations, read_positions
 from photostrip.formats.measured.observations import Manner, read_measurements
-from photostrip.formats.text.findings import listed, suggestion
+from photostrip.formats.text.findings import Findings, listed, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.project.models import ModelTables, model_tables, read_model_points
-from photostrip.project.yaml.document import fault_at
-from photostrip.project.yaml.references import listed_photos, marks_of
+from photostrip.project.yaml.document import Node, fault_at
+from photostrip.project.yaml.references import ListedPhoto, listed_photos, marks_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from photostrip.errors import Fault
     from photostrip.formats.measured.measurements import Measurements
-    from photostrip.formats.text.findings import Findings
-    from photostrip.project.yaml.document import Node
     from photostrip.project.yaml.reading import Reading
-    from photostrip.project.yaml.references import ListedPhoto
 
 LOOK_ALIKES = str.maketrans("авеѕіјкмнорстухoil", "abes1jkmh0pctyx011")  # after folding the case
 _ENDINGS = re.compile(r"(?im)\.(?:tiff?|jpe?g|png|jp2|img)$")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
 from photostrip.report.commands.methods import methods_sections
-from photostrip.report.page.parts import Document, Facts, Table, Words
+from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
 from photostrip.report.pictures.strip import strip_pictures
 from photostrip.report.sections.document import sections_of, title_of
 from photostrip.visible import visible
@@ -20,7 +20,6 @@ from photostrip.visible import visible
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from photostrip.report.page.parts import Part, Section
     from photostrip.report.pictures.svg import Picture
 
 INSTALL = "pip install 'photostrip[report]'"

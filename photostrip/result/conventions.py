@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.result.numbers import rms
+from photostrip.result.numbers import Document, rms
 from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result
-    from photostrip.result.numbers import Document
-
 
 ROTATION = {
     "projected": "grid east, grid north and the ellipsoid's normal at the perspective center",

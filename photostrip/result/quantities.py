@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.result.description import Quantity, table_at
-from photostrip.result.numbers import DEGREES, GEOGRAPHIC, GROUND, IMAGE, RADIANS, Plain, rounded, significant
+from photostrip.result.description import Quantity, Table, table_at
+from photostrip.result.numbers import DEGREES, GEOGRAPHIC, GROUND, IMAGE, RADIANS, Document, Plain, rounded, significant
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import ArrayLike
-
-    from photostrip.result.description import Table
-    from photostrip.result.numbers import Document
 
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
 DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES}

@@ -9,12 +9,10 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault
-from photostrip.result.description import Quantity, described
+from photostrip.result.description import Quantity, Table, described
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from photostrip.result.description import Table
 
 LARGEST_NUMBER = 1e100  # its square is a number yet
 LARGEST_COUNT = 10**15

@@ -10,8 +10,8 @@ from photostrip.result.adjustment import links
 from photostrip.result.adjustment.bundle import image_fit
 from photostrip.result.adjustment.pairs import Parallaxes, sigma0
 from photostrip.result.adjustment.rejected import rejected_by_strip
-from photostrip.result.numbers import rms
-from photostrip.result.points.given import of_used
+from photostrip.result.numbers import Document, Plain, rms
+from photostrip.result.points.given import Differences, of_used
 from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats
     from photostrip.pipeline import Result
-    from photostrip.result.numbers import Document, Plain
-    from photostrip.result.points.given import Differences
-
 
 # Name of a tolerance in the project file: where its value stands in the summary, and its unit.
 TOLERANCES: dict[str, tuple[tuple[str, ...], str]] = {

@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.points import ControlPoints
+from photostrip.points import ControlPoints, PointTable
 from photostrip.simulate.draws import Draws, Purpose
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.points import PointTable
     from photostrip.simulate.placement import Placed
     from photostrip.simulate.spec import Spec
-
 
 CHECK_POINTS = 10  # when the specification does not say how many
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.simulate.spec import Spec
 
-
 LENGTHS = (1.0, 0.7, 0.5)  # wavelengths of the irregular deformation, parts of the larger side of the photo
 
 

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from photostrip.simulate.ground import World
     from photostrip.simulate.spec import Spec
 
-
 CUT_SIGMAS = 3.0  # standard deviations beyond which no photo is displaced or tilted: a pilot would fly again
 BASE_SCATTER = (0.02, 0.02, 0.01)  # of the base: along, across, height
 

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.simulate.spec import Spec
 
-
 WAVES = 5  # sine waves that make up the relief
 
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from photostrip.simulate.flight import Photos
     from photostrip.simulate.spec import Spec
 
-
 USABLE = 0.97  # part of the width and height of the photo that is measured in
 BENDING_STEPS = 6  # each gains four digits
 

@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.simulate.draws import Draws, Purpose
-from photostrip.simulate.flight import CUT_SIGMAS, position_sigma
+from photostrip.simulate.flight import CUT_SIGMAS, Photos, position_sigma
 from photostrip.simulate.imaging import sees
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.simulate.flight import Photos
     from photostrip.simulate.ground import Surface, World
     from photostrip.simulate.spec import Spec
-
 
 # Where a point is tried when its photos do not all show it at first: shift along, in half widths of the zone on three
 # photos, and part of the distance from the flight line.

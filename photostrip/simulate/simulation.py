@@ -11,15 +11,15 @@ import numpy as np
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
-from photostrip.points import Frame, PhotoPoints, PointTable
-from photostrip.simulate.control import given_coordinates, roles
+from photostrip.points import ControlPoints, Frame, ModelPoints, PhotoPoints, PointTable
+from photostrip.simulate.control import Roles, given_coordinates, roles
 from photostrip.simulate.draws import Draws, Purpose
-from photostrip.simulate.film import sheets
-from photostrip.simulate.flight import fly
-from photostrip.simulate.gross import spoil_control, spoil_images
-from photostrip.simulate.ground import surface, world
+from photostrip.simulate.film import Sheets, sheets
+from photostrip.simulate.flight import Photos, fly
+from photostrip.simulate.gross import InjectedError, spoil_control, spoil_images
+from photostrip.simulate.ground import World, surface, world
 from photostrip.simulate.imaging import bent, project
-from photostrip.simulate.placement import place, shown
+from photostrip.simulate.placement import Placed, place, shown
 from photostrip.simulate.plotter import TruePlaces, plotted
 from photostrip.simulate.validation import LARGEST_ARC, faults_of
 from photostrip.triangulation.image_coordinates.corrections import distort
@@ -28,15 +28,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.points import ControlPoints, ModelPoints
-    from photostrip.simulate.control import Roles
-    from photostrip.simulate.film import Sheets
-    from photostrip.simulate.flight import Photos
-    from photostrip.simulate.gross import InjectedError
-    from photostrip.simulate.ground import World
-    from photostrip.simulate.placement import Placed
     from photostrip.simulate.spec import Spec
-
 
 STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors
 MOST_ROUND_TRIP = 1e-4  # metres

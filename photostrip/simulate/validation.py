@@ -7,13 +7,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault
-from photostrip.simulate.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES
+from photostrip.simulate.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES, Spec
 from photostrip.triangulation.image_coordinates import lens_distortion
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from photostrip.simulate.spec import Spec
 
 LEAST_LAP, LARGEST_LAP = 50.0, 95.0  # percent; up to 50 % no point lies on three photos
 LARGEST_SIDE_LAP = 90.0

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 LEVEL = 1e-12  # difference of a rotation from that of a level camera
 
 

@@ -20,7 +20,6 @@ from photostrip.terrestrial.frame import rays, small_turn
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats
 
-
 ANGLES = 3  # a turn to the right, up, and about the optical axis
 MOST_ITERATIONS = 20
 CONVERGED_RAD = 1e-12

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 SPACE = 3  # components of a displacement
 SINGULAR = 1e-12  # reciprocal condition of a covariance matrix below which there is no test
 

@@ -35,7 +35,6 @@ from photostrip.terrestrial.remarks import remarks
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
-
 COLUMNS = (slice(0, 2), slice(2, 4))  # of the left and of the right photo
 TURNS = (slice(0, 3), slice(3, 6))
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photostrip.terrestrial.camera_motion import Motion, Turn
     from photostrip.terrestrial.normal_case import StereoPair
 
-
 MOVED_CAMERA = ("always", "auto", "never")
 MEASURED, ABSENT, NO_REFERENCE, SMALL_PARALLAX, OUTSIDE = range(5)
 REASONS = {

@@ -18,7 +18,6 @@ from photostrip.terrestrial.frame import GROUND_FROM_HOUSE, TURN_AXES, rays
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
 
-
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
 PARALLAX = 1e-3  # of the principal distance: a smaller x parallax is refused

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
 
-
 ANGLES = ("alpha", "omega", "kappa")
 FREE = {"principal-distance": ("f",), "principal-point": ("x0", "z0")}  # what may be determined besides
 SCREENINGS = ("deletion", "stated", "none")

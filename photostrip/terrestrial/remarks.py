@@ -9,14 +9,12 @@ import numpy as np
 from photostrip.notes import Note, named
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.frame import ARCSECONDS
-from photostrip.terrestrial.monitoring import MEASURED, REASONS
+from photostrip.terrestrial.monitoring import MEASURED, REASONS, Monitoring
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from photostrip.terrestrial.camera_motion import Turn
-    from photostrip.terrestrial.monitoring import Monitoring
-
 
 SURE = 0.99  # probability below which a misfit may be chance
 MICROMETRES = 1000.0  # in a millimetre

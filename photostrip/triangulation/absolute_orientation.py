@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.points import ControlPoints
 
-
 LARGEST_SCALE_STEP = 5.0  # of the logarithm of the scale, in one iteration
 ITERATIONS = 50
 CONVERGED = 1e-10  # of the strip's half length; the next step would be its square

@@ -17,7 +17,6 @@ from photostrip.statistics import SIGMA_FROM_MEDIAN
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
 
-
 TUNING = 3.0  # standard deviations up to which an observation keeps its weight [Krarup 1980]
 # standard deviation of a scale from the median of n normal residuals, over the scale, times sqrt(n) [Hampel 1974]
 MEDIAN_SPREAD = 1.1664

@@ -8,9 +8,9 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from photostrip.batch.local_pool import LocalPool
-from photostrip.batch.result_folder import opened
-from photostrip.batch.run import Run, Stop, on_signals
+from photostrip.batch.local_pool import Executor, LocalPool
+from photostrip.batch.result_folder import ResultFolder, opened
+from photostrip.batch.run import Batch, Run, Stop, on_signals
 from photostrip.batch.selection import choose
 from photostrip.cli.failures import as_fault, failures_as
 from photostrip.cli.stdout import BatchFormat, Format, ascii_only, print_sections
@@ -21,18 +21,14 @@ from photostrip.report.commands.batch import batch_junit, batch_sections, outcom
 from photostrip.report.page import messages, text
 from photostrip.report.page.numbers import counted
 from photostrip.report.page.parts import Document
-from photostrip.report.page.progress import batch_table
+from photostrip.report.page.progress import BatchTable, batch_table
 from photostrip.visible import visible, visible_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from photostrip.batch.local_pool import Executor
-    from photostrip.batch.result_folder import ResultFolder
-    from photostrip.batch.run import Batch
     from photostrip.batch.tasks import Answer, Limits, Task
-    from photostrip.report.page.progress import BatchTable
 
 EXIT_SIGNAL = 128  # plus its number, as a shell reports it
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.cli.failures import failures_as
 from photostrip.cli.stdout import Format, print_json, print_sections
-from photostrip.errors import EXIT_DONE, GeometryError, InputError
+from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.text.writing import write_files, write_text
 from photostrip.pipeline import ADJUSTMENTS
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from photostrip.cli.stderr import Messages
-    from photostrip.errors import PhotostripError
     from photostrip.result.numbers import Document
 
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats
     from photostrip.formats.text.findings import Findings
 
-
 USES = ("xyz", "xy", "z", "off")
 ROLES = ("control", "check")
 USE = Column("use", required=False, words=USES)

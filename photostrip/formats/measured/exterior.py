@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
 
-
 FIX = "set `{}` in the project file, or fill the columns"
 
 POSITIONS = (

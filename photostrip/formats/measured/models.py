@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
 
-
 MODEL = Column("model", aliases=("model_id", "pair", "stereopair"))
 COORDINATES = (*numbers(*AXES), *sigmas(*AXES))
 END = "-99"  # of a model, in a file of blocks

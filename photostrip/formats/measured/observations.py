@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from photostrip.formats.text.findings import Findings
 
-
 MARK = Column("mark", aliases=("mark_id", "fiducial", "fiducial_mark"))
 COORDINATES = (*numbers("x", "y"), *sigmas("x", "y"))
 OBSERVATIONS = (PHOTO, POINT, *COORDINATES)

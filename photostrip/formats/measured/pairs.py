@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
 
-
 PAIR = (Column("pair", aliases=("pair_id", "model", "stereopair")),)
 BOTH = (
     Column("left", aliases=("left_photo", "photo_left")),

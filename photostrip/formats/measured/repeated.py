@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.text.findings import counted
+from photostrip.formats.text.findings import Findings, counted
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.formats.measured.measurements import Measurements
-    from photostrip.formats.text.findings import Findings
-
 
 POLICIES = ("refuse", "average")
 FARTHEST = 10.0  # standard deviations from the mean; beyond, two measurements are not of one point

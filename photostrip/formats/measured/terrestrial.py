@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
 
-
 SIDES = ("left", "right")
 EPOCH = Column("epoch", aliases=("epoch_id",))
 IMAGE = (Column("x", number=True), Column("z", number=True, aliases=("y",)))

@@ -6,18 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.planning.control_layout import numbers_of
-from photostrip.planning.placement import worst
-from photostrip.planning.strip_design import along_the_strip
+from photostrip.planning.control_layout import ControlLayout, Spot, numbers_of
+from photostrip.planning.placement import BestPlaces, worst
+from photostrip.planning.strip_design import DesignReport, Needed, Outcome, along_the_strip
 from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
-    from photostrip.planning.control_layout import ControlLayout, Spot
     from photostrip.planning.ideal_strip import IdealStrip
-    from photostrip.planning.placement import BestPlaces
-    from photostrip.planning.strip_design import DesignReport, Needed, Outcome
-
 
 PLACED = 6  # decimals of metres that decide which point is the worst: strips are symmetric
 

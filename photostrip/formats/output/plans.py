@@ -8,18 +8,15 @@ import numpy as np
 
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.plan_strip import along_rows
-from photostrip.planning.camera_efficiency import PRINTED_TABLE, by_efficiency, compare, source_cameras
+from photostrip.planning.camera_efficiency import PRINTED_TABLE, ComparedCamera, by_efficiency, compare, source_cameras
 from photostrip.planning.element_errors import FREE
-from photostrip.planning.model_plan import simple_accuracy
+from photostrip.planning.model_plan import Forecast, simple_accuracy
 from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats
-    from photostrip.planning.camera_efficiency import ComparedCamera
-    from photostrip.planning.model_plan import Forecast
-
 
 ARCSECONDS = 206264.806
 IN_PHOTO = 2  # decimals of mm: places of points

@@ -15,7 +15,7 @@ from photostrip.formats.output.simulation_truth import truth_text
 from photostrip.formats.text.findings import counted
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, Strip
-from photostrip.points import PhotoPoints
+from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.points import ModelPoints
     from photostrip.simulate import Simulation
 
 

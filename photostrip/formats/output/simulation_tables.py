@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from photostrip.points import ModelPoints, PhotoPoints
     from photostrip.simulate import Simulation
 
-
 IMAGE_STEP, IMAGE_STEP_FREE = 1e-4, 1e-9  # mm to which image coordinates are rounded, with noise and without
 GROUND_STEP, GROUND_STEP_FREE = 1e-4, 1e-7  # metres, likewise
 MM_PER = {"mm": 1.0, "um": 1e-3, "0.1um": 1e-4}

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.formats.output.csv_text import to_csv
-from photostrip.result.numbers import rounded, significant
+from photostrip.result.numbers import Document, rounded, significant
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite, directions_from_photo, photo_from_directions
-from photostrip.terrestrial.orientation import ANGLES
+from photostrip.terrestrial.orientation import ANGLES, OrientationSettings, PhotoOrientation, Sightings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats
-    from photostrip.result.numbers import Document
-    from photostrip.terrestrial.orientation import OrientationSettings, PhotoOrientation, Sightings
 
     Grid = tuple[Floats, Floats]  # x and z of a table over the photo in mm, from the principal point
 

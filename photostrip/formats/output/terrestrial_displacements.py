@@ -8,11 +8,11 @@ import numpy as np
 
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, UM, head
-from photostrip.result.numbers import natural_rank, rounded, significant
+from photostrip.result.numbers import Document, natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.displacement import ellipses
-from photostrip.terrestrial.frame import ARCSECONDS
-from photostrip.terrestrial.monitoring import REASONS
+from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite
+from photostrip.terrestrial.monitoring import REASONS, CameraState, Monitoring, Step
 from photostrip.terrestrial.normal_case import SIDES
 
 if TYPE_CHECKING:
@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.notes import Note
-    from photostrip.result.numbers import Document
-    from photostrip.terrestrial.frame import Phototheodolite
-    from photostrip.terrestrial.monitoring import CameraState, Monitoring, Step
-
 
 METRE = 6  # decimals: a micrometre on the ground
 COVARIANCES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))

@@ -10,7 +10,7 @@ import errno
 import os
 import stat
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import suggestion
@@ -19,7 +19,6 @@ from photostrip.formats.text.source import current, digest
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from io import FileIO
-    from typing import NoReturn
 
 MEGABYTE = 1_000_000
 BOM = b"\xef\xbb\xbf"

@@ -17,18 +17,16 @@ import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import BYTE_ORDER_MARK
-from photostrip.formats.text.findings import counted, listed, suggestion
+from photostrip.formats.text.findings import Findings, counted, listed, suggestion
 from photostrip.formats.text.numbers import LARGEST, SMALLEST, NotANumber, number, shown
 from photostrip.formats.text.table_text import TableText, content
-from photostrip.formats.text.tables import CONTROL_CHARACTER, Table
+from photostrip.formats.text.tables import CONTROL_CHARACTER, Column, Table
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.formats.text.findings import Findings
-    from photostrip.formats.text.tables import Column
 
     Cells = tuple[str, ...]
 

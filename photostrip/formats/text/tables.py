@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from photostrip.errors import Fault
     from photostrip.formats.text.table_text import TableText
 
-
 CONTROL_CHARACTER = re.compile(r"[\x00-\x1f\x7f]")
 
 

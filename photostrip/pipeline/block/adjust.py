@@ -12,11 +12,11 @@ from photostrip.pipeline.block import block_result
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
 from photostrip.pipeline.block.datum import known_of
-from photostrip.pipeline.results import Bundle, SinglePhoto
+from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart, Bundle, SinglePhoto
 from photostrip.pipeline.strips.forming import form_photos
 from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
-from photostrip.triangulation.bundle.quality.correlations import correlations
+from photostrip.triangulation.bundle.quality.correlations import Correlation, correlations
 from photostrip.triangulation.bundle.selection import restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.rays import snooping
@@ -28,12 +28,9 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart
     from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.bundle.quality.correlations import Correlation
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
     from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
-
 
 REFILLED = 1e-9  # metres by which targets of plan or height points may still move
 REFILLS = 3

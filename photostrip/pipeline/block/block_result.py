@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.pipeline.block import block_notes
-from photostrip.pipeline.results import Adjusted, AdjustedStrips, Precision, Ties
+from photostrip.pipeline.results import Adjusted, AdjustedStrips, Bundle, Precision, StripResult, Ties
 from photostrip.triangulation.bundle.quality import self_calibration
 from photostrip.triangulation.resection.resection import with_residuals
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Inputs
-    from photostrip.pipeline.results import Bundle, StripResult
     from photostrip.points import PhotoPoints
 
 

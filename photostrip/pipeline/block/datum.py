@@ -12,7 +12,7 @@ from photostrip.geometry.rotation import from_angles
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.pipeline.given_points import cartesian_of
 from photostrip.pipeline.strips.absolute import middle_frame
-from photostrip.points import locate
+from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation import absolute_orientation
 
 if TYPE_CHECKING:
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.strips.photos import FormedPhotos
-    from photostrip.points import ControlPoints, PhotoPoints
-
 
 LEAST_TIES = 3
 ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line

@@ -10,8 +10,8 @@ import numpy as np
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import angle_rates, from_angles
 from photostrip.pipeline import overruling
-from photostrip.pipeline.results import BlockProblem
-from photostrip.points import locate
+from photostrip.pipeline.results import BlockProblem, BlockStart
+from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation.bundle.observations.problem import (
     AttitudeObservations,
     BundleCameras,
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
-    from photostrip.pipeline.results import BlockStart
-    from photostrip.points import ControlPoints, PhotoPoints
-
 
 FAR = 10.0  # times the median: a ray of no pair that misses its point by more waits outside at first
 LEAST_FAR = 50.0  # in standard deviations

@@ -25,9 +25,9 @@ from photostrip.pipeline.block.datum import (
 )
 from photostrip.pipeline.common_points import mean_points
 from photostrip.pipeline.given_points import cartesian_of
-from photostrip.pipeline.results import BlockStart
+from photostrip.pipeline.results import BlockStart, StripResult
 from photostrip.pipeline.strips.adjusting import adjust_formed
-from photostrip.points import ControlPoints, locate
+from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation.resection.closed_form import approximate
 from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.resection.ray_intersection import intersect_points
@@ -38,10 +38,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.photos import FormedPhotos
-    from photostrip.points import PhotoPoints
-
 
 MOST_TIES = 60  # points that hand the frame of a block to one of its strips
 

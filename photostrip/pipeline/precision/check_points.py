@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-
 LARGEST = 100  # check points of a strip that are tested together, spread over it
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
-from photostrip.pipeline.precision.check_points import check_points
+from photostrip.pipeline.precision.check_points import CheckPoints, check_points
 from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute_orientation
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats
-    from photostrip.pipeline.precision.check_points import CheckPoints
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import OrientedStrip
     from photostrip.points import ControlPoints, PhotoPoints

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.pipeline.precision import check_points
-from photostrip.pipeline.precision.check_points import Propagation
+from photostrip.pipeline.precision.check_points import CheckPoints, Propagation
 from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.triangulation.error_propagation import control_errors, covariances, photo_errors
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.precision.check_points import CheckPoints
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import OrientedStrip
     from photostrip.points import ControlPoints, PhotoPoints

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.pipeline.results import Precision
+from photostrip.pipeline.results import Adjusted, Precision, StripResult
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.pipeline.results import Adjusted, StripResult
     from photostrip.triangulation.error_propagation import covariances
-
 
 AT_A_TIME = 100  # control coordinates that two strips share, looked at together
 

@@ -13,24 +13,22 @@ import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
-from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.geometry.similarity import Similarity, similarity_derivatives
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
+from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay, StripAtControl
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
     from photostrip.pipeline.results import StripResult, StripShape
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
-    from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
     from photostrip.triangulation.polynomial.correction import Polynomial
 
 

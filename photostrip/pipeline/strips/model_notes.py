@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from photostrip.points import ModelPoints
     from photostrip.triangulation.independent_models.formation import FormedModels
 
-
 ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others
 ANOTHER_UNIT, NOTHING = 100.0, 1e-5  # ratio of residuals to what is stated; below the second there are no errors at all
 WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model

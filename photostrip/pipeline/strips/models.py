@@ -12,7 +12,7 @@ from photostrip.pipeline.overruling import CENTER
 from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.model_notes import link_notes
-from photostrip.points import locate, take_rows
+from photostrip.points import ModelPoints, locate, take_rows
 from photostrip.triangulation.independent_models import (
     link_screening,
     linking,
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-    from photostrip.points import ModelPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
     from photostrip.triangulation.independent_models.linking import StripModels

@@ -8,8 +8,8 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note
-from photostrip.triangulation.absolute_orientation import WEAK_LIMIT
-from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING
+from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
+from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING, Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.strip_formation.scale_transfer import FEWEST
 
@@ -19,15 +19,12 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.pipeline.inputs import ModelStrip, Strip
     from photostrip.points import ControlPoints
-    from photostrip.triangulation.absolute_orientation import AbsoluteOrientation
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
     from photostrip.triangulation.polynomial.correction import Polynomial
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.resection.resection import Resection
     from photostrip.triangulation.strip_formation.strip import FormedStrip
-
 
 LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adjustment
 POLYNOMIAL_MODELS = 15  # models from which on, and

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import GeometryError
+from photostrip.errors import GeometryError, InputError
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
@@ -23,7 +23,6 @@ from photostrip.triangulation.strip_formation.strip import FormedStrip, form_fro
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
-    from photostrip.errors import InputError
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip

@@ -20,7 +20,7 @@ from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_whole
-from photostrip.points import locate
+from photostrip.points import PhotoPoints, locate
 from photostrip.project.checks.models import (
     counts_of_models,
     links_of_models,
@@ -30,7 +30,7 @@ from photostrip.project.checks.models import (
     source_of,
 )
 from photostrip.project.checks.table_rows import gaps_of, observations_used, table_rows
-from photostrip.project.loading import load_project
+from photostrip.project.loading import Project, load_project
 from photostrip.project.yaml.document import fault_at
 from photostrip.triangulation.image_coordinates import corrections
 
@@ -42,8 +42,6 @@ if TYPE_CHECKING:
     from photostrip.formats.measured.control import ControlTable
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding, Note
-    from photostrip.points import PhotoPoints
-    from photostrip.project.loading import Project
 
     Document = dict[str, Any]
 

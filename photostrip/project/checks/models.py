@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.errors import GeometryError, InputError
+from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.project.yaml.document import fault_at, key_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.errors import Fault
     from photostrip.formats.measured.measurements import Measurements
     from photostrip.formats.measured.models import ModelTable
     from photostrip.pipeline import MeasuredModels

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable
-from photostrip.project.tables import rays
+from photostrip.project.tables import Tables, rays
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photostrip.formats.text.tables import Table
     from photostrip.pipeline import Inputs, MeasuredModels
     from photostrip.project.loading import Project
-    from photostrip.project.tables import Tables
 
     Document = dict[str, Any]
 

@@ -12,7 +12,6 @@ from photostrip.project.schema.for_editors import described
 if TYPE_CHECKING:
     from photostrip.project.schema.values import Section
 
-
 KINDS: dict[str, type[Section]] = {"model": ModelPlanFile, "strip": StripPlanFile, "camera": CameraPlanFile}
 
 

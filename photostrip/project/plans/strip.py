@@ -11,7 +11,7 @@ from photostrip.formats.text.findings import suggestion
 from photostrip.planning.control_layout import LAYOUTS, USES, ControlLayout, Spot
 from photostrip.planning.ideal_strip import LEAST_PHOTOS, StripGeometry
 from photostrip.planning.placement import Placement, Required
-from photostrip.planning.strip_design import Design, plan_strip
+from photostrip.planning.strip_design import Design, DesignReport, plan_strip
 from photostrip.planning.strip_methods import BUNDLE, METHODS
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema.values import (
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from photostrip.planning.strip_design import DesignReport
     from photostrip.project.yaml.reading import Reading
 
 MODELS = Range(LEAST_PHOTOS - 1, 400, "models")

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from photostrip.notes import Note
     from photostrip.project.schema.values import Range
 
-
 STEEPEST = np.radians(89.9999)
 GIMBAL = 1e-6  # cosine of the elevation of the camera below which azimuth and roll are one
 

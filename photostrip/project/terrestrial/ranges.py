@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from photostrip.formats.text.findings import Findings
     from photostrip.formats.text.tables import Table
 
-
 MILLIMETRES = {"mm": 1.0, "um": 1e-3}  # in a unit of image coordinates
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200}  # in a unit of angles
 

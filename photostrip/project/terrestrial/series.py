@@ -10,7 +10,7 @@ import numpy as np
 
 from photostrip.errors import Fault
 from photostrip.formats.measured import terrestrial
-from photostrip.formats.text.findings import counted, listed, suggestion
+from photostrip.formats.text.findings import Findings, counted, listed, suggestion
 from photostrip.notes import Note
 from photostrip.points import locate
 from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLIMETRES, refuse_outside
@@ -18,8 +18,6 @@ from photostrip.terrestrial.monitoring import Series
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats
-    from photostrip.formats.text.findings import Findings
-
 
 LAYOUTS = {"coordinates": terrestrial.COORDINATES, "pseudo_parallaxes": terrestrial.PSEUDO_PARALLAXES}
 REFERENCE, SECOND = "first", "second"  # names of epochs that have none

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from photostrip.notes import Note
 
-
 NORMAL_AXES = ("right", "ahead", "up")
 
 

@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING
 from photostrip.errors import Fault
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import shown
-from photostrip.project.yaml.document import COMMAND_LINE, Node, Place, at_key, fault_at, steps
+from photostrip.project.yaml.document import COMMAND_LINE, Node, Path, Place, at_key, fault_at, steps
 from photostrip.project.yaml.parsing import parse, read_document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from photostrip.project.yaml.document import Path
 
 LONGEST_CHAIN = 8
 

@@ -21,7 +21,6 @@ from photostrip.project.yaml.document import Node, Place, type_names
 if TYPE_CHECKING:
     from photostrip.formats.text.findings import Findings
 
-
 LARGEST_PROJECT = 10 * MEGABYTE
 MOST_VALUES = 100_000  # a strip of a thousand photos has two thousand
 DEEPEST = 20

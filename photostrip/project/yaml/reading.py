@@ -6,18 +6,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeVar
 
-from photostrip.errors import InputError
+from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.project.schema.values import Section
-from photostrip.project.yaml.document import at_own_key, fault_at
+from photostrip.project.yaml.document import Node, Path, at_own_key, fault_at
 from photostrip.project.yaml.merging import override, path_of, read_tree, where_named
 from photostrip.project.yaml.validation import checked
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-
-    from photostrip.errors import Fault
-    from photostrip.project.yaml.document import Node, Path
 
 S = TypeVar("S", bound=Section)
 T = TypeVar("T")

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.project.yaml.document import COMMAND_LINE, fault_at
+from photostrip.project.yaml.document import COMMAND_LINE, Node, Path, fault_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from photostrip.errors import Fault
-    from photostrip.project.yaml.document import Node, Path
 
 LEAST_MARKS = 2
 

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from photostrip.formats.text.findings import counted, suggestion
+from photostrip.formats.text.findings import Findings, counted, suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.project.schema.values import Section
-from photostrip.project.yaml.document import Node, fault_at, key_path, type_names
+from photostrip.project.yaml.document import Node, Path, fault_at, key_path, type_names
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
 
     from photostrip.errors import Fault
-    from photostrip.formats.text.findings import Findings
-    from photostrip.project.yaml.document import Path
 
     Model = type[Section]
 

@@ -12,7 +12,6 @@ from photostrip.report.page.tables import number, tabulated, words
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-
 COLUMNS = (
     words("project", "project"),
     words("status", "status"),

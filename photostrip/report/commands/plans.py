@@ -12,7 +12,6 @@ from photostrip.report.page.tables import number, over_plane, tabulated, words
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-
 USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}
 
 

@@ -11,7 +11,6 @@ from photostrip.report.page.tables import number, over_plane, tabulated, words
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-
 ANGLE_DECIMALS = 5  # in deg and gon: 0.04 and 0.03 seconds of arc
 
 

@@ -11,7 +11,6 @@ from photostrip.report.page.tables import number, tabulated, words
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-
 VERDICTS = {True: "moved", False: "", None: "not tested"}
 
 

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import os
 import shutil
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
-from photostrip.report.page.layout import USUAL, clamp, lay_out
+from photostrip.report.page.layout import USUAL, Line, clamp, lay_out
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
-    from typing import TextIO
 
-    from photostrip.report.page.layout import Line
     from photostrip.report.page.parts import Section
 
 STYLES = {

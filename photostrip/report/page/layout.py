@@ -6,13 +6,11 @@ import unicodedata
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from photostrip.report.page.parts import Facts, Table, Words
+from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
-
-    from photostrip.report.page.parts import Column, Part, Section
 
     Plain = Callable[[str], str]
 

@@ -8,13 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.notes import Finding
+from photostrip.notes import Finding, Note
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from photostrip.notes import Note
     from photostrip.report.page.parts import Document
 
 LEVELS = {"error": "error", "warning": "warning", "note": "notice"}  # ours, and those of GitHub

@@ -10,14 +10,13 @@ import os
 import threading
 import time
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from photostrip.report.page.layout import cells, cut
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-    from typing import TextIO
 
     from rich.live import Live
     from rich.table import Table

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.report.page.numbers import counted, short
 from photostrip.report.pictures import svg
-from photostrip.report.pictures.plan_view import plan_of
+from photostrip.report.pictures.plan_view import Plan, Spot, plan_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.plan_view import Plan, Spot
     from photostrip.report.pictures.svg import Axis, Picture
 
 WIDTH, LOWEST, HIGHEST = 960.0, 220.0, 560.0  # of a picture

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.result.numbers import MICROMETRES, rms
+from photostrip.result.numbers import MICROMETRES, Document, rms
 from photostrip.result.quantities import record
 from photostrip.triangulation.bundle.quality import reliability
 
@@ -18,10 +18,8 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.pipeline import Result
     from photostrip.pipeline.results import Bundle
-    from photostrip.result.numbers import Document
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.settings import BundleSettings
-
 
 SHOWN = 10  # observations named as the weakest and as the worst
 RELIABILITY = ("redundancy_x", "redundancy_y", "test_x", "test_y", "detectable_x_um", "detectable_y_um")

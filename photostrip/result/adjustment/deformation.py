@@ -16,10 +16,8 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline import Result
-    from photostrip.pipeline.results import StripResult
+    from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
-
 
 MILLIMETRES = 1000.0  # per metre
 LEVEL = 0.05  # of all tests together

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
 
-
 DIRECTIONS = ("along", "across", "up")
 PPM = 1e6
 

@@ -8,14 +8,12 @@ import numpy as np
 
 from photostrip.pipeline.strips.model_notes import far_ends
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
-from photostrip.result.numbers import rms
+from photostrip.result.numbers import Document, rms
 from photostrip.result.quantities import grouped, record, records
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
     from photostrip.pipeline import Result, StripResult
-    from photostrip.result.numbers import Document
-
 
 AXES = ("x", "y", "z")
 

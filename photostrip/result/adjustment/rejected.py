@@ -10,7 +10,7 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.result.adjustment.bundle import KINDS, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import AXES, names_of
-from photostrip.result.numbers import MICROMETRES, natural, rounded
+from photostrip.result.numbers import MICROMETRES, Document, natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation.scale_transfer import depths
@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import Bundle
     from photostrip.points import PhotoPoints
     from photostrip.rejection import Rejection
-    from photostrip.result.numbers import Document
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
-
 
 ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity
 REASONS = {

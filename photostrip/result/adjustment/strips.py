@@ -12,7 +12,7 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.result.adjustment import links, pairs
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
-from photostrip.result.numbers import rms
+from photostrip.result.numbers import Document, rms
 from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.pipeline import Result, StripResult
-    from photostrip.result.numbers import Document
     from photostrip.triangulation.polynomial.correction import Polynomial
-
 
 AXES = ("x", "y", "z")
 

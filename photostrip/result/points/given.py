@@ -9,15 +9,13 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.points import locate
-from photostrip.result.numbers import natural_rank
+from photostrip.result.numbers import Document, natural_rank
 from photostrip.result.quantities import records
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline import Result
-    from photostrip.result.numbers import Document
-
 
 CONTROL = "control"  # kind of observations of a bundle adjustment
 LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of itself at least

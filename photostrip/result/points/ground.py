@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.result.numbers import natural_rank, rounded
+from photostrip.result.numbers import Document, natural_rank, rounded
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns
 from photostrip.result.quantities import coordinate_decimals, records
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline import Result
-    from photostrip.result.numbers import Document
 
 
 def coordinates(frame: GroundFrame, enu: Floats) -> Document:

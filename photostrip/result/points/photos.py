@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angles
-from photostrip.result.numbers import PER_RADIAN, Plain, rounded
+from photostrip.result.numbers import PER_RADIAN, Document, Plain, rounded
 from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns
 from photostrip.result.quantities import angle_decimals, grouped, records
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.pipeline import Result, Strip, StripResult
-    from photostrip.result.numbers import Document
 
 
 @dataclass(frozen=True, eq=False)

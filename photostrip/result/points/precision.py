@@ -8,15 +8,13 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
-from photostrip.result.numbers import PER_RADIAN, rms
+from photostrip.result.numbers import PER_RADIAN, Document, rms
 from photostrip.result.quantities import record, records
 from photostrip.statistics import chi2_quantile, normal_quantile
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline import Result, StripResult
-    from photostrip.result.numbers import Document
-
 
 UPPER = np.triu_indices(6)
 INSIDE = {"plan": float(np.sqrt(chi2_quantile(0.95, 2))), "height": normal_quantile(0.975)}

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.result.numbers import EXACT, PER_RADIAN, rounded, significant
+from photostrip.result.numbers import EXACT, PER_RADIAN, Document, rounded, significant
 from photostrip.result.quantities import as_records
-from photostrip.result.trace.replay import pair_rounds, similarity_steps
+from photostrip.result.trace.replay import PairRound, SimilarityStep, pair_rounds, similarity_steps
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS, base_rays
 from photostrip.triangulation.strip_formation.intersection import intersect
@@ -19,11 +19,7 @@ from photostrip.triangulation.strip_formation.intersection import intersect
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.geometry.similarity import Similarity
-    from photostrip.pipeline import Result
-    from photostrip.pipeline.results import StripResult
-    from photostrip.result.numbers import Document
-    from photostrip.result.trace.replay import PairRound, SimilarityStep
-
+    from photostrip.pipeline import Result, StripResult
 
 SCHEMA = 1
 ANGLE, STEP, SQUARES, MILLIMETRES, MODEL, COSINE, METRES = 9, 6, 6, 5, 9, 10, 4  # decimals, digits of steps and squares

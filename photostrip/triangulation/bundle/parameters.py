@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.bundle.observations import calibration
-from photostrip.triangulation.bundle.observations.collinearity import view
-from photostrip.triangulation.bundle.structure import band_structure
+from photostrip.triangulation.bundle.observations.collinearity import Rays, view
+from photostrip.triangulation.bundle.structure import BandStructure, band_structure
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.observations.calibration import Calibrated
-    from photostrip.triangulation.bundle.observations.collinearity import Rays
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
-    from photostrip.triangulation.bundle.structure import BandStructure
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.solution import BundleSolution
 
-
 REWEIGHTINGS = 6
 NORMAL_MEDIAN = 1.1774  # median of the length of two standard normal residuals
 NO_WEIGHT = 1e-3  # weight below which a ray is out

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags
     from photostrip.triangulation.bundle.solution import BundleSolution
 
-
 LEAST_RAYS = 2
 FIELDS = {"image": "images", "control": "control", "position": "positions", "attitude": "attitudes"}
 

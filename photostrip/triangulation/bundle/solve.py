@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
     from photostrip.triangulation.bundle.parameters import PreparedProblem
 
-
 FIRST_DAMPING = 1e-4
 MORE, LESS = 10.0, 0.1  # factors of the damping after a refused and after a taken step
 LARGEST_DAMPING = 1e8

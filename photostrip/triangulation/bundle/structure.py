@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleProblem, ControlObservations
 
-
 NARROW = 12  # photos: a band as narrow as this is not worth another order
 TABLE = 3_000  # photos: up to here pairs are marked in a square table, which is faster than sorting them
 

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-
 MOST_FORMATIONS = 10
 FRESH = 0.05  # radians that a strip may turn before its derivatives are made afresh
 ENOUGH = 0.1  # of the angle that an image coordinate's standard deviation spans: what squares of turns may leave

@@ -14,20 +14,17 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
-from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
-from photostrip.triangulation.error_propagation.strip_errors import scale_shares
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors, scale_shares
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
-
 
 JUNCTION, CONTROL, DISTANCE = 0, 1, 2
 

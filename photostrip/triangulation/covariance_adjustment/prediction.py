@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-
 LEVEL = 0.03  # probability that any control coordinate of a sound strip is called doubtful
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
 

@@ -18,10 +18,10 @@ import numpy as np
 
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.error_propagation.covariances import by_images
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, y_parallaxes
 from photostrip.triangulation.strip_formation import non_neighbours
-from photostrip.triangulation.strip_formation.strip import model_points, place_models
+from photostrip.triangulation.strip_formation.strip import FormedStrip, model_points, place_models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,11 +29,9 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.covariance_adjustment.system import System
-    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import Junctions
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 
 def image_errors(found: System) -> Floats:

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
-
 A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
 LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
 ENTRIES = 2000  # coefficients of image points worked on at a time: what fits into the processor's cache

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-
 COMPONENTS = 6  # of the error of a model: five elements of its pair, logarithm of the scale that it hands on
 ELEMENTS, SCALE = slice(0, 5), 5
 REACH = 2  # models between which error components share image coordinates: pairs share a photo, a scale transfer three

@@ -11,11 +11,10 @@ import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import similarity_derivatives
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, PlacedStrip
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.error_propagation.derivatives import PlacedStrip
 
 
 def with_bridges(points: ErrorRows, strip: PlacedStrip) -> ErrorRows:

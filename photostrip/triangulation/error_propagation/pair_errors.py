@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
-
 SYSTEM = "alpha-omega-kappa"
 LEFT, RIGHT = slice(0, 2), slice(2, 5)  # elements that turn the left and the right photo
 

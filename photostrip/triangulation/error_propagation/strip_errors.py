@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
-from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.triangulation.error_propagation import pair_errors
 from photostrip.triangulation.error_propagation.derivatives import (
     COMPONENTS,
@@ -37,7 +37,6 @@ from photostrip.triangulation.error_propagation.non_neighbour_errors import with
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
-    from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.error_propagation.pair_errors import PairErrors
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip

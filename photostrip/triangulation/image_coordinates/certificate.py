@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
 
-
 PLACES = {
     f"{vertical}-{horizontal}".strip("-"): (x, y)
     for vertical, y in (("bottom", -1.0), ("", 0.0), ("top", 1.0))

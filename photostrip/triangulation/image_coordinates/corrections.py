@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 
-
 MICROMETRE = 1e-3  # mm
 SHOWN = 20  # points beyond the distortion table that are named one by one
 

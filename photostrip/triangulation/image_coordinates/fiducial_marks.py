@@ -15,13 +15,11 @@ import numpy as np
 
 from photostrip.errors import Fault
 from photostrip.geometry import plane
-from photostrip.points import take_rows
+from photostrip.points import PhotoPoints, take_rows
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.camera import Camera
-    from photostrip.points import PhotoPoints
-
 
 WRONG_PATTERN = 0.05  # largest misfit over radius of the marks: film and paper stay far below, wrong numbers far above
 QUARTER = np.pi / 2

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
 
-
 LEAST_MARKS = 4  # three carry the plane that every transformation has already
 FLAT = 0.01  # ratio of the extents of the marks below which they stand on one line
 CONVERGED = 1e-12  # mm

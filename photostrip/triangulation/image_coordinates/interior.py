@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import InputError
+from photostrip.errors import Fault, InputError
 from photostrip.notes import Note, named
 from photostrip.triangulation.image_coordinates.fiducial_marks import enough, fault, gather, right_pattern
 from photostrip.triangulation.image_coordinates.film_deformation import Deformation
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from photostrip.camera import Camera
-    from photostrip.errors import Fault
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.image_coordinates.settings import InteriorSettings
 

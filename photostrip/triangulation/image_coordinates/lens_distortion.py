@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.camera import Camera, Distortion
 
-
 CONVERGED = 1e-12  # mm
 ITERATIONS = 30
 FORWARD = "image_to_ideal"

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from photostrip.notes import Note
     from photostrip.triangulation.image_coordinates.film_deformation import Deformation
 
-
 SHAPE = ("scale_x", "scale_y", "rotation", "shear")
 BY_PHOTO = ("photo_ids", "transforms", "marks", "residuals", "sigma0", "redundancy", *SHAPE, "mirrored")
 WEAK = 0.01  # strength of a transformation below which marks count as lying on one line

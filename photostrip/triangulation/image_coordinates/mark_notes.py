@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
 
-
 MICROMETRE = 1e-3  # mm
 POOR_FIT = 0.05  # mm; film that was stored well fits to a third of this
 ODD_SCALE = 0.02  # departure of the scale from 1: pixel size or unit is not what was stated

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
     from photostrip.triangulation.independent_models.linking import CommonPoints, Similarities, StripModels
 
-
 AGREE = 4.0  # times the critical value of a link, for positions that several links lie between
 NAMED = 4
 

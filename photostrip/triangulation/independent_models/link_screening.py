@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.independent_models.linking import CommonPoints, PointTests, SolvedLinks, StripModels
     from photostrip.triangulation.independent_models.settings import LinkSettings
 
-
 MEDIAN = 2.366  # of chi-square with three degrees of freedom
 MEDIAN_SPREAD = 1.124  # standard deviation of the ratio of a sample's median to it, times the root of the sample's size
 SURE = 2.6  # standard deviations beyond which the stated precision is contradicted

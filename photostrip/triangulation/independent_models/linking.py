@@ -21,7 +21,6 @@ from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_der
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
-
 LEAST_COMMON = 3
 ITERATIONS, CONVERGED = 20, 1e-12
 THIN = 1e-3  # second over first extent of common points below which they stand on one line

@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
-from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
-    from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.independent_models.formation import FormedModels
 
 

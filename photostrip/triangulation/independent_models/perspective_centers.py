@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 NEAREST = 3  # points at least that say where the ground below a centre is
 
 

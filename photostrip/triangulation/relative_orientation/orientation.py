@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
 
-
 CONDITION_WARNING = 100.0  # of the column-normalised Jacobian: a band much narrower than the base
 CONDITION_LIMIT = 1e6
 SMALLEST_PARALLAX = 1e-3  # of the principal distance, mean over a pair: below it there is no base to speak of

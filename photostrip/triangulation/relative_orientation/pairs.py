@@ -12,14 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.points import take_rows
+from photostrip.points import PhotoPoints, take_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.points import PhotoPoints
-
 
 MINIMUM_POINTS = 5  # as many as elements
 BY_ROW = ("pair", "left", "right", "weight", "point", "rows")

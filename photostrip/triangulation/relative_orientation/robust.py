@@ -12,13 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.triangulation.relative_orientation import solution
-from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.triangulation.robust import TUNING, falling_weights, medians, scales
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
-    from photostrip.triangulation.relative_orientation.pairs import Pairs
-
 
 STEPS = 10  # what follows is least squares
 SETS = 300  # with a third of the points wrong, 13 % of the sets of five are right

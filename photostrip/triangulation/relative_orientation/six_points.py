@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-
 SHARES = np.array([2.0, -2.0, -1.0, 1.0, -1.0, 1.0])  # of the six parallaxes in the closing error
 
 

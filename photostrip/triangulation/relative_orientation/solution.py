@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
-
 ELEMENTS = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
 CONVERGED = 1e-10  # rad
 ITERATIONS = 30

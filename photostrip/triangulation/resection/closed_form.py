@@ -14,14 +14,12 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.triangulation.resection.collinearity import derivatives
-from photostrip.triangulation.resection.resection import resect
+from photostrip.triangulation.resection.resection import Resection, resect
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.resection.resection import Resection
-
 
 LEAST_POINTS = 4  # of a photo: three have up to four solutions
 TRIPLES = 12  # sets of three points that are tried

@@ -16,7 +16,6 @@ from photostrip.triangulation.resection.collinearity import KnownPhotos, derivat
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
-
 ITERATIONS = 12
 CONVERGED = 1e-12  # of the distance of a point from its photos
 PARALLEL = 1e-9  # reciprocal condition of rays that meet nowhere

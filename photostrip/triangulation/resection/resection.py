@@ -13,7 +13,6 @@ from photostrip.triangulation.resection.collinearity import partials, project
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
-
 ITERATIONS = 20
 CONVERGED = 1e-10  # rad, and of the distance to the points; the next step would be its square
 UNKNOWNS = 6

@@ -10,7 +10,6 @@ import numpy as np
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats
 
-
 PARALLEL = 1e-6  # of the principal distance: a smaller x parallax intersects nothing
 
 

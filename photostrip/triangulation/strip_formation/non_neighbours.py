@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-
 SMALLEST_ANGLE = 1e-4  # sine of the angle between the rays
 
 

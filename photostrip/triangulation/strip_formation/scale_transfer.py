@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
-
 SCALE_TRANSFERS = ("least_squares", "distances")
 ALPHA = 0.01  # probability that a strip without gross errors loses a pass point
 FEWEST = 3  # with two ratios nobody can tell which is wrong

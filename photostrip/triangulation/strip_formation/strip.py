@@ -17,15 +17,13 @@ from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.solution import base_rays
 from photostrip.triangulation.strip_formation.intersection import intersect
-from photostrip.triangulation.strip_formation.scale_transfer import Junctions, transfer_scale
+from photostrip.triangulation.strip_formation.scale_transfer import Junctions, StripFormationSettings, transfer_scale
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
-
 
 STEEPEST_BASE = 1e-6  # cosine of the base inclination
 

@@ -15,7 +15,6 @@ from numpy.lib.stride_tricks import as_strided
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
-
 STEP = 48  # columns of the inverse that are found at a time
 
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.parameters import Parameters, ParameterStep, PreparedProblem
 
-
 DEFECT = SIMILARITY_PARAMETERS
 
 

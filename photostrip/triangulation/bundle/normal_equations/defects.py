@@ -11,16 +11,14 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import named
 from photostrip.triangulation.bundle.normal_equations import datum
-from photostrip.triangulation.bundle.normal_equations.reduced import factored, given_at
+from photostrip.triangulation.bundle.normal_equations.reduced import Reduced, factored, given_at
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
     from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
-
 
 PARALLEL = 1e-10  # square of the sine of the angle between rays
 LOOSE = 0.1  # standard deviation, as a part of the size of the network, from which a datum parameter is not determined

@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
-from photostrip.triangulation.bundle.observations.collinearity import PHOTO, by_point
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO, Rays, by_point
 from photostrip.triangulation.bundle.structure import triangle
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.observations.collinearity import Rays
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
-
 
 SMALL_GROUP = 24  # points: up to here it pays to bring the numbers of a group together before they are multiplied
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
 
-
 TOGETHER = 64  # photos whose columns of the inverse are found at a time
 
 

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.bundle.observations.problem import CALIBRATION
+from photostrip.triangulation.bundle.observations.problem import CALIBRATION, BundleCameras
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.bundle.observations.problem import BundleCameras
-
 
 PRINCIPAL_DISTANCE = CALIBRATION.index("c")
 

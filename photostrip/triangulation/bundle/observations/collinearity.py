@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
-
 PHOTO = 6  # parameters of a photo
 SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0])  # of a photo's parameters, see above
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import AttitudeObservations, PositionObservations
 
-
 SMALL = 1e-4  # radians: below it the series of the rotation's derivative is exact
 
 

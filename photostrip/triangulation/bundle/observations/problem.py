@@ -19,7 +19,6 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
 
-
 CALIBRATION = ("c", "x0", "y0", "k1", "k2", "k3", "p1", "p2", "b1", "b2")
 """Names of the calibration parameters of a camera, in the order of the columns of ``Calibration``.
 

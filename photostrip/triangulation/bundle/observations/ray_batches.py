@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import ImageObservations
 
-
 LARGEST_GROUP = 64  # points; larger groups are split
 RAYS_OF_BATCH = 6144  # the arrays of a batch then fill some 2 MB
 _SIZES = np.array([1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 28, 32, 40, 48, 56, LARGEST_GROUP])

@@ -15,19 +15,16 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.bundle.normal_equations import datum
-from photostrip.triangulation.bundle.normal_equations.reduced import factored, given_at, reduce
+from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced, factored, given_at, reduce
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS, by_photo, by_point
-from photostrip.triangulation.bundle.parameters import parameters_from
-from photostrip.triangulation.bundle.solution import Cofactors
+from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
+from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
-    from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced
     from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
-    from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
-    from photostrip.triangulation.bundle.solution import BundleSolution
 
 
 @dataclass(frozen=True, eq=False)

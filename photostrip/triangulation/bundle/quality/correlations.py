@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-
 LIMIT = 0.95
 ELEMENTS = (
     "shift along x",

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-
 IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"
 UNCONTROLLED = 0.01  # redundancy number below which an observation cannot be tested
 SIGMA0_LEVEL = 0.05  # probability that the test of sigma0 fails with right standard deviations

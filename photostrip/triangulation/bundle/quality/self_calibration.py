@@ -9,15 +9,13 @@ import numpy as np
 
 from photostrip.statistics import t_p_value
 from photostrip.triangulation.bundle.observations.calibration import corrections
-from photostrip.triangulation.bundle.observations.problem import CALIBRATION
+from photostrip.triangulation.bundle.observations.problem import CALIBRATION, BundleProblem
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
-
 
 COLUMNS = {
     "principal_distance": ("c",),

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-
 LEAST_REDUNDANCY = 3.0  # of a group, below which its residuals say nothing about it
 ITERATIONS = 12
 CONVERGED = 0.005  # relative change of a standard deviation
