@@ -123,7 +123,7 @@ def _call(name: str, arguments: list[str]) -> int:
     except typer.Exit as stop:
         return stop.exit_code
     except usage_error as error:
-        text: str = getattr(error, "format_message", error.__str__)()
+        text: str = getattr(error, "format_message", error.__str__)().replace(": Value error, ", ": ")
         end = "" if text.endswith((".", "?", "!")) else "."
         _complain(f"{text}{end} 'photostrip {name} --help' shows how it is called.")
         return EXIT_USAGE

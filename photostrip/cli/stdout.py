@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import sys
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from photostrip.pipeline import Result
+    from photostrip.report import SectionName
     from photostrip.report.page.parts import Section
 
     Document = dict[str, Any]
@@ -48,6 +49,14 @@ class CompareFormat(StrEnum):
     GITHUB = "github"
 
 
+class Parts(NamedTuple):
+    """How much of a report is wanted: by default a short one."""
+
+    quiet: bool = False  # the verdict alone
+    verbose: bool = False  # everything
+    names: Sequence[SectionName] = ()  # these sections
+
+
 ENDINGS = {".txt": Format.TEXT, ".json": Format.JSON, ".md": Format.MD}
 
 
@@ -75,22 +84,21 @@ def print_sections(title: str, sections: Iterable[Section], width: int | None = 
         console.print_report(title, sections, sys.stdout, width)
 
 
-def print_result(document: Document, form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
+def print_result(document: Document, form: Format, width: int | None, parts: Parts) -> None:
     """Print the report of a result; JSON is the content of result.json, GITHUB its notes as annotations."""
     if form is Format.TEXT:
-        print_sections(*_report(document, quiet=quiet, verbose=verbose), width, markdown=False)
+        print_sections(*_report(document, parts), width, markdown=False)
     else:
-        text = report_text(document, form, width, quiet=quiet, verbose=verbose, ascii_letters=ascii_only())
+        text = report_text(document, form, width, parts, ascii_letters=ascii_only())
         sys.stdout.write(text)
 
 
 def report_text(
     document: Document,
     form: Format,
-    width: int | None = None,
+    width: int | None,
+    parts: Parts,
     *,
-    quiet: bool = False,
-    verbose: bool = False,
     ascii_letters: bool = False,
 ) -> str:
     """Return the report of a result as text, without colours."""
@@ -104,17 +112,18 @@ def report_text(
         from photostrip.report.page.messages import annotated, result_findings
 
         return annotated(result_findings(document))
-    title, sections = _report(document, quiet=quiet, verbose=verbose)
+    title, sections = _report(document, parts)
     if form is Format.MD:
         return text.to_markdown(title, sections, ascii_only=ascii_letters)
     return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_letters)
 
 
-def _report(document: Document, *, quiet: bool, verbose: bool) -> tuple[str, tuple[Section, ...]]:
-    """Return title and sections; of a quiet report the verdict alone."""
+def _report(document: Document, parts: Parts) -> tuple[str, tuple[Section, ...]]:
+    """Return title and sections; the title stands over whole reports only."""
     from photostrip.report import chosen_sections, title_of
 
-    return "" if quiet else title_of(document), chosen_sections(document, quiet=quiet, everything=verbose)
+    sections = chosen_sections(document, quiet=parts.quiet, everything=parts.verbose, names=parts.names)
+    return "" if parts.quiet or parts.names else title_of(document), sections
 
 
 def trace_text(result: Result, form: Format) -> str:

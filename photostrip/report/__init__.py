@@ -8,6 +8,6 @@ and from these text, Markdown, HTML or a coloured terminal. Nothing is computed;
 - ``html`` with ``templates`` and ``pictures``: the report as one page with pictures.
 """
 
-from photostrip.report.sections.document import chosen_sections, require_complete, sections_of, title_of
+from photostrip.report.sections.document import SectionName, chosen_sections, require_complete, sections_of, title_of
 
-__all__ = ["chosen_sections", "require_complete", "sections_of", "title_of"]
+__all__ = ["SectionName", "chosen_sections", "require_complete", "sections_of", "title_of"]

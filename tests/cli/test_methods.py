@@ -108,12 +108,12 @@ def test_options_that_do_not_go_together(capsys: pytest.CaptureFixture[str], tmp
 
 
 def test_the_report_of_a_bundle(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    code, out, _ = run(capsys, PROJECT, *BUNDLE, "-o", str(tmp_path))
+    code, out, _ = run(capsys, PROJECT, *BUNDLE, "-o", str(tmp_path), "--verbose")
     assert code == 0
     for title in ("Bundle adjustment", "Reliability", "Precision", "Check points"):
         assert f"── {title} ──" in out
     assert "Ties between strips" not in out
-    code = main(["report", str(tmp_path / "result.json")])
+    code = main(["report", str(tmp_path / "result.json"), "--verbose"])
     assert capsys.readouterr().out == out
     header, first, *rest = (tmp_path / "reliability.csv").read_text(encoding="utf-8").splitlines()
     assert header == "photo,point,redundancy_x,redundancy_y,test_x,test_y,detectable_x_um,detectable_y_um"

@@ -13,6 +13,8 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.formats.output.result_json import to_json
+from photostrip.report import SectionName, sections_of
+from photostrip.report.sections.overview import MOST_LINES
 from tests.results import spec, write_project
 from tests.source_tree import ROOT
 
@@ -237,7 +239,9 @@ def test_the_rule_for_make_names_every_file_read(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("options", [[], ["--width", "60"], ["--format", "md"], ["--quiet"], ["--verbose"]])
+@pytest.mark.parametrize(
+    "options", [[], ["--width", "60"], ["--format", "md"], ["--quiet"], ["--verbose"], ["--section", "check"]]
+)
 def test_report_prints_what_run_printed(
     project: Path, result: Path, options: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -257,6 +261,47 @@ def test_report_into_a_file(result: Path, tmp_path: Path, capsys: pytest.Capture
     ):
         assert run(capsys, "report", result, "-o", tmp_path / name, *option) == (0, "", "")
         assert (tmp_path / name).read_text(encoding="utf-8").startswith(begin)
+
+
+def test_a_section_is_printed_alone(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "report", result, "--section", "rejected", "--section", "check")
+    assert (code, err) == (0, "")
+    assert [line.split(" ─")[0] for line in out.splitlines() if "──" in line] == ["── Check points", "── Rejected"]
+    assert run(capsys, "report", result, "--section", "bundle")[1] == "This result has no section `bundle`.\n"
+    assert run(capsys, "report", result, "--section", "check", "--format", "md")[1].startswith("## Check points\n")
+
+
+def test_a_section_that_no_report_has_is_refused_with_the_names(
+    result: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run(capsys, "report", result, "--section", "chek")
+    assert (code, out) == (2, "")
+    assert "error: Invalid value for '--section': 'chek' is not one of 'verdict', 'findings'" in err
+    names = run(capsys, "report", "--help")[1].split("NAME: ")[1].split(".")[0]
+    assert " ".join(names.split()) == ", ".join(SectionName)
+
+
+@pytest.mark.parametrize(("option", "what"), [(["-o", "r.html"], "HTML"), (["--format", "json"], "json")])
+def test_what_has_no_sections_refuses_them(
+    result: Path, option: list[str], what: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, _, err = run(capsys, "report", result, "--section", "check", *option)
+    assert code == 2
+    assert f"only a report as text or Markdown has sections, not {what}" in err
+
+
+def test_a_comparison_of_methods_has_no_sections(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, "run", project, "--section", "check", "--compare-methods")
+    assert code == 2
+    assert "not a comparison of methods" in err
+
+
+def test_verbose_prints_every_section(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    titles = [each.title for each in sections_of(json.loads((result / "result.json").read_text(encoding="utf-8")))]
+    _, out, _ = run(capsys, "report", result, "--verbose")
+    assert [line.strip("─ ") for line in out.splitlines() if line.startswith("── ")] == titles
+    _, out, _ = run(capsys, "report", result)
+    assert len(out.splitlines()) <= MOST_LINES < len(titles) * 10
 
 
 def test_report_into_a_file_of_unknown_kind(result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

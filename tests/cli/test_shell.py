@@ -63,6 +63,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
         ("terrestrial dis", {"displacement"}),
         ("run --set processing.polynomial.d", {"processing.polynomial.degree="}),
         ("completion f", {"fish"}),
+        ("report r --section ch", {"check"}),
     ],
 )
 def test_bash_completes(tmp_path: Path, words: str, expected: set[str]) -> None:

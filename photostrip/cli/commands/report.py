@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Quiet, Strict, Verbose, Width
-from photostrip.cli.stdout import Format, form_of, print_result, report_text
+from photostrip.cli.options import Quiet, Strict, Width
+from photostrip.cli.section_option import Sections, Verbose, refuse_sections
+from photostrip.cli.stdout import Format, Parts, form_of, print_result, report_text
 
 HTML = ".html"
 
@@ -23,6 +24,7 @@ def report(
     ] = None,
     width: Width = None,
     strict: Strict = False,
+    section: Sections = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
@@ -37,17 +39,21 @@ def report(
     from photostrip.report import require_complete
     from photostrip.result.verdict import exit_code
 
+    page = output is not None and form is None and output.suffix.lower() == HTML
+    wanted = form or (form_of(output) if output is not None and not page else Format.TEXT)
+    parts = Parts(quiet, verbose, section or ())
+    refuse_sections(section, "HTML" if page else wanted)
     file = str(result / "result.json" if result.is_dir() else result)
     document = read_result(file)
     require_complete(document, file)
     with faults_instead(file, "reported"):
         if output is None:
-            print_result(document, form or Format.TEXT, width, quiet=quiet, verbose=verbose)
-        elif form is None and output.suffix.lower() == HTML:
+            print_result(document, wanted, width, parts)
+        elif page:
             from photostrip.report.html import check_html, to_html
 
             check_html("--output")
             write_text(output, to_html(document, everything=verbose))
         else:
-            write_text(output, report_text(document, form or form_of(output), width, quiet=quiet, verbose=verbose))
+            write_text(output, report_text(document, wanted, width, parts))
     return exit_code(document["status"], strict=True) if strict else EXIT_DONE

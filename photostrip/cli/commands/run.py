@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Assignments, Quiet, Shape, Strict, Verbose, Width
-from photostrip.cli.stdout import Format, form_of, print_result, trace_text
+from photostrip.cli.options import Assignments, Quiet, Shape, Strict, Width
+from photostrip.cli.section_option import Sections, Verbose, refuse_sections
+from photostrip.cli.stdout import Format, Parts, form_of, print_result, trace_text
 
 
 def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
@@ -32,15 +33,17 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = False,
     html: Annotated[bool, typer.Option("--html", help="Write report.html into DIR, too.")] = False,
     strict: Strict = False,
+    section: Sections = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
     """Adjust the strips of a project and report the accuracy.
 
-    The report goes to stdout. With -o, DIR gets result.json with everything, the tables points.csv, photos.csv,
-    residuals.csv, parallaxes.csv and rejected.csv, and project.resolved.yaml. The exit code is 1 when a tolerance of
-    the project is not kept, with --strict also when the verdict is LOOK or UNVERIFIED. A bundle adjustment adds
-    reliability.csv. With --compare-methods and -o, each method gets a folder of its own in DIR.
+    The report goes to stdout, in at most 120 lines; --verbose prints all of it, --section a part. With -o, DIR gets
+    result.json with everything, the tables points.csv, photos.csv, residuals.csv, parallaxes.csv and rejected.csv, and
+    project.resolved.yaml. The exit code is 1 when a tolerance of the project is not kept, with --strict also when the
+    verdict is LOOK or UNVERIFIED. A bundle adjustment adds reliability.csv. With --compare-methods and -o, each method
+    gets a folder of its own in DIR.
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.stderr import Messages
@@ -52,6 +55,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.result.verdict import exit_code
 
     _refuse_contradictions(output, depfile=depfile, trace=trace, methods=methods, html=html, strict=strict)
+    refuse_sections(section, "a comparison of methods" if methods else form)
     messages = Messages(quiet=quiet, verbose=verbose)
     if methods:
         from photostrip.cli.jobs.method_comparison import compare_methods
@@ -79,7 +83,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             files = pages | result_files(document, loaded.resolved)
             write_files(output, files)
             messages.say(f"wrote {len(files)} files to {output}")
-    print_result(document, form, width, quiet=quiet, verbose=verbose)
+    print_result(document, form, width, Parts(quiet, verbose, section or ()))
     return exit_code(document["status"], strict=strict)
 
 

@@ -47,7 +47,10 @@ def _facts(block: Document, *, several: bool) -> Sequence[tuple[str, str]]:
 
 def _control(block: Document, *, everything: bool) -> Table:
     shown, note = worst_first(
-        block["control"], lambda row: abs(row["test"] or 0.0), "in `covariance`", everything=everything
+        block["control"],
+        lambda row: abs(row["test"] or 0.0),
+        ("coordinates", "covariance", "covariance"),
+        everything=everything,
     )
     columns = (
         words("control", "id"),

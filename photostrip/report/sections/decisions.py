@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 from photostrip.report.page.numbers import LEAST_PROBABILITY, counted, micrometres, short
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.sections.strip import elsewhere
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+NO_DEGREE = "none: no degree brings more than chance, or serves control that took no part"
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
 
 
@@ -44,13 +46,22 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
 
 def _degree(block: Document) -> str:
     """Say which degree was chosen in plan and in height, and what spoke for it."""
+    text = chosen_degrees(block)
+    if text == NO_DEGREE:
+        return text
+    return f"{text}; F is the ratio of the gain over the degree before, p its probability by chance"
+
+
+def chosen_degrees(block: Document) -> str:
+    """Say of which degree a polynomial is, in plan and in height."""
     parts = []
     for group in ("plan", "height"):
         chosen = [row for row in block["evidence"] if row["group"] == group and row["accepted"] and row["degree"]]
         parts.append(f"{_step(chosen[-1])} in {group}" if chosen else f"none in {group}")
     if all(part.startswith("none") for part in parts):
-        return "none: no degree brings more than chance, or serves control that took no part"
-    return f"{' and '.join(parts)}; F is the ratio of the gain over the degree before, p its probability by chance"
+        return NO_DEGREE
+    plan, height = (part.rpartition(" in ")[0] for part in parts)
+    return f"{plan} in plan and in height" if plan == height else " and ".join(parts)
 
 
 def _step(row: Document) -> str:
@@ -104,7 +115,7 @@ def weights_section(document: Document, *, everything: bool) -> Section:
         words("list", "list", rank=2),
     )
     rest = len(control) - len(shown)
-    more = f"{rest} more in `control` of result.json; " if rest else ""
+    more = f"{elsewhere(rest, 'points', 'weights', 'control')}; " if rest else ""
     note = f"{more}in fit: together with a point of one model; a coordinate weighs 1 / σ² there"
     if len({row["list"] for row in control}) > 1:
         note += "; columns in the order of the axes of each list"

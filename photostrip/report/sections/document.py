@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from photostrip.errors import faults_instead
@@ -9,9 +10,9 @@ from photostrip.report.page.parts import Document, Section, Words
 from photostrip.report.sections.bundle import bundle_sections
 from photostrip.report.sections.covariance import covariance_section
 from photostrip.report.sections.decisions import decisions_section, weights_section
-from photostrip.report.sections.deformations import deformation_section
 from photostrip.report.sections.findings import findings_sections
-from photostrip.report.sections.models import links_section, models_section, of_models
+from photostrip.report.sections.models import deformation_section, links_section, models_section, of_models
+from photostrip.report.sections.overview import overview
 from photostrip.report.sections.points import (
     check_section,
     control_section,
@@ -32,69 +33,108 @@ from photostrip.report.sections.strip import (
 from photostrip.report.sections.verdict import accuracy, headline, verdict_section
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
+
+
+class SectionName(StrEnum):
+    """Sections of the report, as ``--section`` names them, in their order."""
+
+    VERDICT = "verdict"
+    FINDINGS = "findings"
+    PROJECT = "project"
+    DECISIONS = "decisions"
+    COUNTS = "counts"
+    RELATIVE = "relative"
+    JUNCTIONS = "junctions"
+    LINKS = "links"
+    MODELS = "models"
+    ABSOLUTE = "absolute"
+    POLYNOMIAL = "polynomial"
+    COVARIANCE = "covariance"
+    BUNDLE = "bundle"
+    WEIGHTS = "weights"
+    PRECISION = "precision"
+    DEFORMATIONS = "deformations"
+    CONTROL = "control"
+    CHECK = "check"
+    TIES = "ties"
+    IMAGES = "images"
+    REJECTED = "rejected"
+    UNDETERMINED = "undetermined"
+    NOTES = "notes"
 
 
 def sections_of(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
-    """Return the sections of the accuracy report."""
-    several = document["counts"]["strips"] > 1
-    return (
-        verdict_section(document, everything=everything),
-        *findings_sections(document),
-        project_section(document),
-        decisions_section(document),
-        counts_section(document),
-        *_of_the_strips(document, everything=everything),
-        *_of_the_accuracy(document, everything=everything),
-        *_of_the_points(document, several=several, everything=everything),
-        Section("", (Words(headline(document), document["status"]), accuracy(document))),
-    )
+    """Return all sections of the accuracy report."""
+    return tuple(section for _, section in _named(document, everything=everything))
 
 
-def _of_the_strips(document: Document, *, everything: bool) -> Iterator[Section]:
-    """Return how the strips were formed and brought to the ground."""
+def _named(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:
+    """Give the sections of a report with their names; a name has several where its stage has."""
+    name = SectionName
+    yield name.VERDICT, verdict_section(document, everything=everything)
+    yield from ((name.FINDINGS, each) for each in findings_sections(document))
+    yield name.PROJECT, project_section(document)
+    yield name.DECISIONS, decisions_section(document)
+    yield name.COUNTS, counts_section(document)
+    yield from _of_the_strips(document, everything=everything)
+    yield from _of_the_accuracy(document, everything=everything)
+    yield from _of_the_points(document, everything=everything)
+
+
+def _of_the_strips(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:
+    """Give how the strips were formed and brought to the ground."""
     if of_models(document):
-        yield links_section(document, everything=everything)
-        yield models_section(document, everything=everything)
+        yield SectionName.LINKS, links_section(document, everything=everything)
+        yield SectionName.MODELS, models_section(document, everything=everything)
     elif len(document["models"]) > 0:  # single photos have none
-        yield relative_section(document, everything=everything)
-        yield junction_section(document, everything=everything)
+        yield SectionName.RELATIVE, relative_section(document, everything=everything)
+        yield SectionName.JUNCTIONS, junction_section(document, everything=everything)
     if document["absolute"]:
-        yield absolute_section(document)
+        yield SectionName.ABSOLUTE, absolute_section(document)
     if document.get("polynomials"):
-        yield polynomial_section(document, everything=everything)
+        yield SectionName.POLYNOMIAL, polynomial_section(document, everything=everything)
     if "covariance" in document:
-        yield covariance_section(document, everything=everything)
-    yield from bundle_sections(document)
+        yield SectionName.COVARIANCE, covariance_section(document, everything=everything)
+    yield from ((SectionName.BUNDLE, each) for each in bundle_sections(document))
 
 
-def _of_the_accuracy(document: Document, *, everything: bool) -> Iterator[Section]:
-    """Return what the control weighed and how precise the results are."""
+def _of_the_accuracy(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:
+    """Give what the control weighed and how precise the results are."""
     if "bundle" not in document:
-        yield weights_section(document, everything=everything)
+        yield SectionName.WEIGHTS, weights_section(document, everything=everything)
     if "precision" in document:
-        yield precision_section(document, everything=everything)
+        yield SectionName.PRECISION, precision_section(document, everything=everything)
     if document.get("deformations"):
-        yield deformation_section(document)
+        yield SectionName.DEFORMATIONS, deformation_section(document)
 
 
-def _of_the_points(document: Document, *, several: bool, everything: bool) -> Iterator[Section]:
-    """Return what is left at points and photos, what was rejected, what is not determined."""
-    yield control_section(document, everything=everything)
-    yield check_section(document, everything=everything)
-    if several and "bundle" not in document:
-        yield ties_section(document, everything=everything)
+def _of_the_points(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:
+    """Give what is left at points and photos, what was rejected, what is not determined."""
+    yield SectionName.CONTROL, control_section(document, everything=everything)
+    yield SectionName.CHECK, check_section(document, everything=everything)
+    if document["counts"]["strips"] > 1 and "bundle" not in document:
+        yield SectionName.TIES, ties_section(document, everything=everything)
     if not of_models(document):
-        yield image_section(document)
-    yield rejected_section(document, everything=everything)
-    yield not_determined_section(document, everything=everything)
-    yield notes_section(document, everything=everything)
+        yield SectionName.IMAGES, image_section(document)
+    yield SectionName.REJECTED, rejected_section(document, everything=everything)
+    yield SectionName.UNDETERMINED, not_determined_section(document, everything=everything)
+    yield SectionName.NOTES, notes_section(document, everything=everything)
 
 
-def chosen_sections(document: Document, *, quiet: bool = False, everything: bool = False) -> tuple[Section, ...]:
-    """Return the sections that are wanted: all of them, or the verdict that stands at the end."""
-    sections = sections_of(document, everything=everything)
-    return sections[-1:] if quiet else sections
+def chosen_sections(
+    document: Document, *, quiet: bool = False, everything: bool = False, names: Collection[SectionName] = ()
+) -> tuple[Section, ...]:
+    """Return the sections that are wanted: the verdict alone, some by name as a whole, all, or the overview."""
+    end = Section("", (Words(headline(document), document["status"]),))
+    if names:
+        named = list(_named(document, everything=True))
+        missing = [each for each in SectionName if each in names and each not in {name for name, _ in named}]
+        lacking = [Section("", (Words(f"This result has no section `{each}`."),)) for each in missing]
+        return (*(section for name, section in named if name in names), *lacking)
+    if quiet:
+        return (Section("", (*end.parts, accuracy(document))),)
+    return (*(sections_of(document, everything=True) if everything else overview(document)), end)
 
 
 def require_complete(document: Document, file: str) -> None:

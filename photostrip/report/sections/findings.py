@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.notes import before
 from photostrip.report.page.parts import Document, Part, Section, Words
+from photostrip.report.sections.strip import elsewhere
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,14 +21,38 @@ def findings_sections(document: Document) -> tuple[Section, ...]:
     return (Section("Plausibility of the data", parts),)
 
 
+def cures_section(document: Document, most: int) -> Section:
+    """Say what would put the findings right, and which of them are accepted; what they say stands in the verdict."""
+    findings = document.get("findings", [])
+    parts = [
+        Words(f"{each['code']} {each['title']} ({_word(each)}). {_cure(each)}".strip(), _colour(each), "-")
+        for each in findings[:most]
+    ]
+    if len(findings) > most:
+        parts.append(Words(elsewhere(len(findings) - most, "findings", "findings", "findings")))
+    return Section("Plausibility of the data", tuple(parts))
+
+
+def _word(finding: Document) -> str:
+    return "accepted" if finding["accepted"] else str(finding["severity"])
+
+
+def _colour(finding: Document) -> str:
+    return "" if finding["accepted"] else "failed" if finding["severity"] == "error" else "look"
+
+
+def _cure(finding: Document) -> str:
+    """Return what would put a finding right; nothing for one that is accepted."""
+    cure = "" if finding["accepted"] else str(finding["fix"])
+    return cure and f"To put it right: {cure}{'' if cure.endswith('?') else '.'}"
+
+
 def _paragraphs(finding: Document) -> Iterator[Part]:
     place = before(finding["file"], finding["line"], finding["column"])
-    word = "accepted" if finding["accepted"] else finding["severity"]
-    colour = "" if finding["accepted"] else "failed" if finding["severity"] == "error" else "look"
-    yield Words(f"{finding['code']} {finding['title']} ({word}): {place}{finding['message']}.", colour, "-")
+    text = f"{finding['code']} {finding['title']} ({_word(finding)}): {place}{finding['message']}."
+    yield Words(text, _colour(finding), "-")
     if finding["evidence"]:
         numbers = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in finding["evidence"].items())
         yield Words(f"Evidence: {numbers}.", "", " ")
-    if finding["fix"] and not finding["accepted"]:
-        cure = finding["fix"]
-        yield Words(f"To put it right: {cure}{'' if cure.endswith('?') else '.'}", "", " ")
+    if _cure(finding):
+        yield Words(_cure(finding), "", " ")

@@ -1,4 +1,4 @@
-"""Sections on independent models: how they fit each other, and how they lie in the strip."""
+"""Sections on models: how independent ones fit each other and lie in the strip, and which models are deformed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ def links_section(document: Document, *, everything: bool) -> Section:
     summary, links = document["summary"], document["links"]
     if not links:
         return Section("Links of the models", (Words("One model: nothing was linked."),))
-    shown, note = worst_first(links, lambda link: link["sigma0"] or 0.0, "links in `links`", everything=everything)
+    shown, note = worst_first(
+        links, lambda link: link["sigma0"] or 0.0, ("links", "links", "links"), everything=everything
+    )
     sigma0 = (
         f"{micrometres(summary['sigma0_um'])} µm, of a model coordinate, from a redundancy of {summary['redundancy']}"
         f"; stated are {micrometres(summary['sigma_given_um'])} µm"
@@ -74,7 +76,10 @@ def models_section(document: Document, *, everything: bool) -> Section:
     models = document["models"]
     middle = document["summary"]["model_scale"] or 1.0
     shown, note = worst_first(
-        models, lambda m: abs(m["model_scale"] / middle - 1), "models in `models`", everything=everything
+        models,
+        lambda m: abs(m["model_scale"] / middle - 1),
+        ("models", "models", "models"),
+        everything=everything,
     )
     text = (
         "The models are independent: each has a scale, a rotation and an origin of its own, and takes its place from "
@@ -110,3 +115,28 @@ def measured(document: Document) -> tuple[tuple[str, str], ...]:
     )
     gone = counts["rejected_in_links"]
     return (("model coordinates", points), ("rejected", f"{gone} in links" if gone else DASH))
+
+
+def deformation_section(document: Document) -> Section:
+    """Twist and bending of the models that have the height control for it."""
+    rows = document["deformations"]
+    bent = sum(row["significant"] for row in rows)
+    verdict = f"{bent} of them deformed" if bent else "none of them deformed"
+    text = Words(
+        f"{counted(len(rows), 'model')} with height control enough to see twist (x y) and bending (x²), {verdict} by"
+        " the t test at 5 % of all together.",
+        "look" if bent else "",
+    )
+    columns = (
+        words("photos", photos_of),
+        number("points", lambda row: len(row["points"])),
+        number("twist", "twist.at_corner_m", 3, "at a corner, m"),
+        number("t", "twist.t", 1),
+        number("bending", "bending.at_corner_m", 3, "at a corner, m"),
+        number("t", "bending.t", 1),
+        number("limit of t", "t_limit", 1),
+        number("Δω2", "omega2_arcsec", 1, "″", rank=2),
+        number("Δα2 – Δα1", "alpha2_minus_alpha1_arcsec", 1, "″", rank=2),
+        words("strip", "strip", rank=3),
+    )
+    return Section("Deformation of models", (text, tabulated(rows, columns)))

@@ -11,7 +11,7 @@ from photostrip.report.page.numbers import counted, joined, listed, metres, micr
 from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.models import scale_word
-from photostrip.report.sections.strip import WORST_SHOWN, worst_first
+from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN, elsewhere, worst_first
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ IDS_NAMED = 12
 WORST_POINTS = 8
 
 
-def control_section(document: Document, *, everything: bool) -> Section:
+def control_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
     """Residuals at the control."""
     rows = [row for row in document["control"] if row["role"] == "control" and row["measured"] and row["use"] != "off"]
     text = (
@@ -35,23 +35,28 @@ def control_section(document: Document, *, everything: bool) -> Section:
             " Coordinates with a minus in the column `use` were found wrong and took no part; the last lines leave "
             "them out."
         )
-    parts: list[Part] = [Words(text), _given(document, rows, "control", everything=everything), *_unused(document)]
+    parts: list[Part] = [
+        Words(text),
+        _given(document, rows, "control", everything=everything, most=most),
+        *_unused(document),
+    ]
     return Section("Control points", tuple(parts))
 
 
-def check_section(document: Document, *, everything: bool) -> Section:
+def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
     """Differences at the check points."""
     rows = [row for row in document["control"] if row["role"] == "check" and row["measured"]]
     if not rows:
         text = "None. What lies between the control points is not proven by anything in this report."
         return Section("Check points", (Words(text),))
     text = "Adjusted minus given. These points took no part in anything: they say how good the new points are."
-    return Section("Check points", (Words(text), _given(document, rows, "check", everything=everything)))
+    return Section("Check points", (Words(text), _given(document, rows, "check", everything=everything, most=most)))
 
 
-def _given(document: Document, given: Sequence[Document], role: str, *, everything: bool) -> Table:
+def _given(document: Document, given: Sequence[Document], role: str, *, everything: bool, most: int) -> Table:
     axes, summary = document["frame"]["axes"], document["summary"]
-    shown, note = worst_first(given, lambda row: row["normalised"] or 0.0, "points in `control`", everything=everything)
+    where = ("points", role, "control")
+    shown, note = worst_first(given, lambda row: row["normalised"] or 0.0, where, everything=everything, most=most)
     columns = (
         words("point", "id"),
         words("use", _used),
@@ -134,7 +139,7 @@ def ties_section(document: Document, *, everything: bool) -> Section:
     if not ties:
         return Section("Ties between strips", (Words("The strips have no point in common."),))
     shown, note = worst_first(
-        ties, lambda t: max(t["plan_um"], abs(t["height_um"])), "points in `ties`", everything=everything
+        ties, lambda t: max(t["plan_um"], abs(t["height_um"])), ("points", "ties", "ties"), everything=everything
     )
     columns = (
         words("point", "id"),
@@ -186,10 +191,15 @@ def image_section(document: Document) -> Section:
 
 def rejected_section(document: Document, *, everything: bool) -> Section:
     """Measurements that were rejected."""
-    rejected = [row for row in document["rejected"] if not row.get("readmitted", False)]
+    rejected = standing_rejections(document)
     if not rejected:
         return Section("Rejected", (Words("Nothing was rejected."),))
-    shown, note = worst_first(rejected, lambda r: abs(r["parallax_um"] or 0.0), "in `rejected`", everything=everything)
+    shown, note = worst_first(
+        rejected,
+        lambda r: abs(r["parallax_um"] or 0.0),
+        ("rejections", "rejected", "rejected"),
+        everything=everything,
+    )
     columns = (
         words("point", lambda row: row["point"] or DASH),
         words("photos", lambda row: " – ".join(row[key] for key in ("photo", "other_photo") if row[key] is not None)),
@@ -202,6 +212,11 @@ def rejected_section(document: Document, *, everything: bool) -> Section:
     return Section("Rejected", (tabulated(shown, columns, note=note),))
 
 
+def standing_rejections(document: Document) -> list[Document]:
+    """Return the measurements that were rejected and not taken back."""
+    return [row for row in document["rejected"] if not row.get("readmitted", False)]
+
+
 def _tested(key: str) -> Callable[[Document], str]:
     """Return what writes a value of a test: micrometres, or a ratio where it has no unit."""
     return lambda row: micrometres(row[key]) if row["unit"] else ratio(row[key])
@@ -209,28 +224,32 @@ def _tested(key: str) -> Callable[[Document], str]:
 
 def not_determined_section(document: Document, *, everything: bool) -> Section:
     """Points that have no coordinates, by reason."""
-    missing = sorted(document["not_determined"], key=itemgetter("reason"))
     parts: list[Part] = []
-    for reason, group in groupby(missing, key=itemgetter("reason")):
-        names = [row["id"] for row in group]
+    for reason, names in missing_points(document):
         named = listed(names, len(names) if everything else IDS_NAMED)
         parts.append(Words(f"{counted(len(names), 'point')} {reason}: {named}", mark="-"))
     return Section("Points without coordinates", tuple(parts) or (Words("None."),))
 
 
-def notes_section(document: Document, *, everything: bool) -> Section:
+def missing_points(document: Document) -> list[tuple[str, list[str]]]:
+    """Return the points without coordinates by reason."""
+    missing = sorted(document["not_determined"], key=itemgetter("reason"))
+    return [(reason, [row["id"] for row in group]) for reason, group in groupby(missing, key=itemgetter("reason"))]
+
+
+def notes_section(document: Document, *, everything: bool, most: int = 2 * WORST_SHOWN) -> Section:
     """Return the notes of the run, said again at the end."""
     notes = document["notes"]
-    limit = len(notes) if everything else 2 * WORST_SHOWN
+    limit = len(notes) if everything else most
     parts: list[Part] = [
-        Words(f"{note['severity']}: {_sentence_of(note)}", "look" if note["severity"] == "warning" else "", "-")
+        Words(f"{note['severity']}: {sentence_of(note)}", "look" if note["severity"] == "warning" else "", "-")
         for note in notes[:limit]
     ]
     if len(notes) > limit:
-        parts.append(Words(f"{len(notes) - limit} more in `notes` of result.json"))
+        parts.append(Words(elsewhere(len(notes) - limit, "notes", "notes", "notes")))
     return Section("Notes", tuple(parts) or (Words("None."),))
 
 
-def _sentence_of(note: Document) -> str:
+def sentence_of(note: Document) -> str:
     """Return a note with its place; results of older versions have none."""
     return before(note.get("file", ""), note.get("line", 0), note.get("column", 0)) + str(note["message"])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from photostrip.report.page.numbers import counted, fixed, metres, micrometres, ratio
 from photostrip.report.page.parts import Document, Facts, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
-from photostrip.report.sections.strip import ALL_SHOWN
+from photostrip.report.sections.strip import ALL_SHOWN, elsewhere
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,5 +106,5 @@ def _along(document: Document, rows: Sequence[Document], *, everything: bool) ->
     )
     note = "rms of the points nearest to each photo, and its perspective center"
     if left_out:
-        note += f"; {left_out} more photos in `precision` of result.json"
+        note += f"; {elsewhere(left_out, 'photos', 'precision', 'precision')}"
     return tabulated(shown, columns, note=note)

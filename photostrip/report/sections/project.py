@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from photostrip.report.page.numbers import counted, fixed, metres, micrometres
 from photostrip.report.page.parts import Document, Facts, Section
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.models import measured, of_models, project_rows, scale_word
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 def project_section(document: Document) -> Section:
@@ -13,12 +18,12 @@ def project_section(document: Document) -> Section:
     meaning = document["conventions"]
     scale, models = scale_word(document), of_models(document)
     rows = [
-        ("adjustment", _adjustment(document)),
+        ("adjustment", adjustment_of(document)),
         ("ground frame", document["frame"]["description"]),
         ("differences", meaning["dx, dy, dz"]),
         (f"at {scale} scale", f"metres divided by the denominator of the {scale} scale, in micrometres (µm)"),
         ("rotations", f"{meaning['angles']}; {meaning['rotation']}"),
-        *((f"camera {camera['id']}", _camera(camera)) for camera in document["cameras"]),
+        *((f"camera {camera['id']}", camera_line(camera)) for camera in document["cameras"]),
         *_corrections(document["corrections"])[1 if models else 0 :],
         *(project_rows(document) if models else _of_photos(document["settings"])),
     ]
@@ -30,7 +35,8 @@ def _of_photos(settings: Document) -> list[tuple[str, str]]:
     return [("screening", _screening(settings["relative"])), ("scale transfer", transfer)]
 
 
-def _adjustment(document: Document) -> str:
+def adjustment_of(document: Document) -> str:
+    """Say how the points were adjusted."""
     if document["adjustment"] == "covariance":
         alone = document["settings"].get("covariance", {}).get("distances") is False
         return "with the covariance of the strip itself" + (", control alone" if alone else "")
@@ -39,7 +45,8 @@ def _adjustment(document: Document) -> str:
     return f"polynomial, degree {document['settings']['polynomial']['degree']}"
 
 
-def _camera(camera: Document) -> str:
+def camera_line(camera: Document) -> str:
+    """Return a camera in a line."""
     x0, y0 = camera["principal_point_mm"]
     text = f"principal distance {camera['principal_distance_mm']:g} mm, principal point {x0:g}, {y0:g} mm"
     if camera["format_mm"]:
@@ -61,10 +68,11 @@ def _corrections(corrections: Document) -> list[tuple[str, str]]:
         size = f", up to {micrometres(curvature['largest_um'])} µm"
     interior = corrections["interior"]
     rows = [("image corrections", ", ".join(image)), ("Earth curvature", f"{curvature['treatment']}{size}")]
-    return [*([("fiducial marks", _interior(interior))] if interior else []), *rows]
+    return [*([("fiducial marks", interior_line(interior))] if interior else []), *rows]
 
 
-def _interior(interior: Document) -> str:
+def interior_line(interior: Document) -> str:
+    """Say how the fiducial marks were transformed, and what is left at them."""
     text = f"{' and '.join(interior['transforms'])} transformation of {counted(interior['photos'], 'photo')}"
     if interior["largest_um"] is not None:
         text += (
@@ -88,33 +96,32 @@ def _screening(settings: Document) -> str:
 
 def counts_section(document: Document) -> Section:
     """How much there is of everything."""
+    facts = Facts(tuple(counts_rows(document)))
+    strips = document["strips"]
+    return Section("Counts", (facts, tabulated(strips, STRIPS)) if len(strips) > 1 else (facts,))
+
+
+def counts_rows(document: Document) -> Iterator[tuple[str, str]]:
+    """Count photos, points and measurements; scale, height and base."""
     counts, strips = document["counts"], document["strips"]
+    yield "photos", f"{counts['photos']} in {counted(counts['strips'], 'strip')}, {counted(counts['models'], 'model')}"
     by_role = (
         f"{counts['points']}: {counts['new_points']} new, {counts['control_points']} control "
         f"({counts['control_plan']} in plan, {counts['control_height']} in height), {counts['check_points']} check"
     )
-    rows = [
-        ("photos", f"{counts['photos']} in {counted(counts['strips'], 'strip')}, {counted(counts['models'], 'model')}"),
-        ("points", by_role),
-        *(
-            measured(document)
-            if of_models(document)
-            else (
-                ("image points", f"{counts['image_points']} measured, {counts['image_points_used']} used"),
-                ("rejected", _rejections(counts)),
-            )
-        ),
-        ("without coordinates", counted(counts["not_determined"], "point")),
-    ]
+    yield "points", by_role
+    if of_models(document):
+        yield from measured(document)
+    else:
+        yield "image points", f"{counts['image_points']} measured, {counts['image_points_used']} used"
+        yield "rejected", _rejections(counts)
+    yield "without coordinates", counted(counts["not_determined"], "point")
     if len(strips) == 1:
-        rows.append((f"{scale_word(document)} scale", _scale(strips[0])))
-        return Section("Counts", (Facts(tuple(rows)),))
-    if not strips:  # single photos, which form none
+        yield f"{scale_word(document)} scale", _scale(strips[0])
+    elif not strips:  # single photos, which form none
         summary = document["summary"]
         scale = f"1:{summary['photo_scale']:.0f}, flying height {fixed(summary['flying_height'], 0)} m above ground"
-        rows.append(("photo scale", scale))
-        return Section("Counts", (Facts(tuple(rows)),))
-    return Section("Counts", (Facts(tuple(rows)), tabulated(strips, STRIPS)))
+        yield "photo scale", scale
 
 
 def _rejections(counts: Document) -> str:

@@ -24,22 +24,34 @@ GROUND_AXES = ("east", "north", "up")
 
 
 def worst_first(
-    rows: Sequence[Document], badness: Callable[[Document], float], where: str, *, everything: bool
+    rows: Sequence[Document],
+    badness: Callable[[Document], float],
+    where: tuple[str, str, str],
+    *,
+    everything: bool,
+    most: int = ALL_SHOWN,
 ) -> tuple[list[Document], str]:
     """Choose the rows of a table that are shown: all in their order, or the worst, and what to say of the others.
 
-    ``where`` says what the rows are and in which block of result.json all of them stand.
+    ``where`` says what the rows are, which section shows all of them and which block of the result holds them;
+    ``most`` is how many rows are shown whole.
     """
-    if everything or len(rows) <= ALL_SHOWN:
+    if everything or len(rows) <= most:
         return list(rows), ""
-    chosen = sorted(rows, key=badness, reverse=True)[:WORST_SHOWN]
-    return chosen, f"worst first; {len(rows) - WORST_SHOWN} more {where} of result.json"
+    chosen = sorted(rows, key=badness, reverse=True)[: min(most, WORST_SHOWN)]
+    return chosen, f"worst first; {elsewhere(len(rows) - len(chosen), *where)}"
+
+
+def elsewhere(rest: int, what: str, section: str, block: str) -> str:
+    """Say how many things are not shown, and where they are."""
+    return f"{rest} more {what}: --section {section}, or `{block}` in result.json"
 
 
 def relative_section(document: Document, *, everything: bool) -> Section:
     """Relative orientation: how good the image coordinates are, pair by pair."""
     summary, models = document["summary"], document["models"]
-    shown, note = worst_first(models, lambda m: m["sigma0_um"] or 0.0, "pairs in `models`", everything=everything)
+    where = ("pairs", "relative", "models")
+    shown, note = worst_first(models, lambda m: m["sigma0_um"] or 0.0, where, everything=everything)
     worst = max(models, key=lambda m: m["max_parallax_um"] or 0.0)
     rejected = sum(m["points_rejected"] for m in models)
     total = rejected + sum(m["points_used"] for m in models)
@@ -93,7 +105,7 @@ def junction_section(document: Document, *, everything: bool) -> Section:
     """Scale transfer: how well neighbouring models agree, and how the scale drifts."""
     junctions = document["junctions"]
     shown, note = worst_first(
-        junctions, lambda j: j["spread_ppm"] or 0.0, "joints in `junctions`", everything=everything
+        junctions, lambda j: j["spread_ppm"] or 0.0, ("joints", "junctions", "junctions"), everything=everything
     )
     columns = (
         words("photo", "photo"),
@@ -195,7 +207,7 @@ def _leverage(document: Document, block: Document) -> str:
 
 def _by_strip(blocks: Sequence[Document]) -> Table:
     def degree(axis: str) -> Callable[[Document], int]:
-        return lambda block: _degree(block["terms"][axis])
+        return lambda block: degree_of(block["terms"][axis])
 
     def effect(axis: str) -> Callable[[Document], float]:
         return lambda block: max(map(abs, block["effects"][axis]), default=0.0)
@@ -215,7 +227,7 @@ def _by_strip(blocks: Sequence[Document]) -> Table:
 
 def _choice(document: Document, block: Document) -> str:
     how = "decided by the evidence below" if block["asked"] == "auto" else f"degree {block['asked']} was asked for"
-    plan, height = (_degree(block["terms"][axis]) for axis in ("x", "z"))
+    plan, height = (degree_of(block["terms"][axis]) for axis in ("x", "z"))
     what = "no polynomial" if not block["degree"] else f"degree {plan} in plan and {height} in height"
     stations, (low, high) = block["stations"], block["reach"]
     text = (
@@ -225,7 +237,7 @@ def _choice(document: Document, block: Document) -> str:
     return text[0].upper() + text[1:] if len(document["strips"]) == 1 else f"Strip {block['strip']}: {text}"
 
 
-def _degree(terms: Sequence[str]) -> int:
+def degree_of(terms: Sequence[str]) -> int:
     """Return the highest power of X among the names of terms: 2 of X^2Y."""
     return max((int(found[1] or 1) for term in terms if (found := re.search(r"X(?:\^(\d))?", term))), default=0)
 

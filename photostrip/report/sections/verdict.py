@@ -7,6 +7,7 @@ from functools import partial
 from photostrip.report.page.numbers import counted, fixed, short, unit
 from photostrip.report.page.parts import Document, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.sections.strip import elsewhere
 
 HEADLINES = {
     "good": "GOOD: nothing calls for a second look.",
@@ -39,14 +40,14 @@ def accuracy(document: Document) -> Words:
     return Words(" ".join(f"{text[0].upper()}{text[1:]}." for text in texts))
 
 
-def verdict_section(document: Document, *, everything: bool = False) -> Section:
+def verdict_section(document: Document, *, everything: bool = False, most: int = LOOK_SHOWN) -> Section:
     """Whether the result can be used, and what to look at."""
     look_at = document["verdict"]["look_at"]
-    shown = look_at if everything else look_at[:LOOK_SHOWN]
+    shown = look_at if everything else look_at[:most]
     parts: list[Part] = [Words(headline(document), document["status"]), accuracy(document)]
     parts += [Words(text, "", f"{number}.") for number, text in enumerate(shown, 1)]
     if len(look_at) > len(shown):
-        parts.append(Words(f"{len(look_at) - len(shown)} more in `verdict` of result.json"))
+        parts.append(Words(elsewhere(len(look_at) - len(shown), "things", "verdict", "verdict")))
     if document["tolerances"]:
         parts.append(tabulated(document["tolerances"], TOLERANCES))
     return Section("Verdict", tuple(parts))

@@ -84,6 +84,6 @@ def test_long_lists_are_cut_and_say_so() -> None:
     document["control"] = [row | {"id": f"G{n}", "list": 1 + n % 2} for n in range(40)]
     table = weights(document)
     assert len(table.rows) == WEIGHTS_SHOWN
-    assert "16 more in `control`" in table.note
+    assert "16 more points: --section weights, or `control` in result.json" in table.note
     assert "axes of each list" in table.note
     assert len(weights(document, everything=True).rows) == 40

@@ -1,0 +1,235 @@
+"""The report on a page and a half: what a surveyor needs first, one line for each stage, the worst of long tables.
+
+Everything else stands in the sections, which ``--verbose`` prints all and ``--section`` one by one.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from photostrip.report.page.layout import USUAL, lay_out
+from photostrip.report.page.numbers import counted, fixed, listed, metres, micrometres, percent
+from photostrip.report.page.parts import Document, Facts, Section, Words
+from photostrip.report.sections.decisions import chosen_degrees
+from photostrip.report.sections.findings import cures_section
+from photostrip.report.sections.models import of_models
+from photostrip.report.sections.points import (
+    check_section,
+    control_section,
+    missing_points,
+    sentence_of,
+    standing_rejections,
+)
+from photostrip.report.sections.project import adjustment_of, camera_line, counts_rows, interior_line
+from photostrip.report.sections.strip import DIRECTIONS, GROUND_AXES, degree_of, elsewhere, photos_of
+from photostrip.report.sections.verdict import verdict_section
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    Rows = Iterator[tuple[str, str]]
+
+MOST_LINES = 120  # of a report as wide as usual, its title and its last line included
+MOST_OF_A_KIND = (12, 8, 6, 4, 2)  # points, reasons, findings, notes that are shown: as many as leave the report short
+STRIPS_NAMED = 8
+NAMED = 3  # worst pairs, photos and points; cameras
+AROUND = 4  # lines of the title and of the end
+
+
+def overview(document: Document) -> tuple[Section, ...]:
+    """Return the sections of the short report."""
+    for most in MOST_OF_A_KIND:
+        sections = _overview(document, most)
+        if len(lay_out("", sections, USUAL)) <= MOST_LINES - AROUND:
+            break
+    return sections
+
+
+def _overview(document: Document, most: int) -> tuple[Section, ...]:
+    remarks = [note for note in document["notes"] if note["severity"] != "warning"]  # warnings stand in the verdict
+    found = (
+        verdict_section(document, most=most),
+        cures_section(document, most),
+        Section("Project", (Facts(tuple(_project(document))),)),
+        Section("Stages", (Facts(tuple(_stages(document))),)),
+        control_section(document, everything=False, most=most),
+        check_section(document, everything=False, most=most),
+        Section("Worst", (Facts(tuple(_worst(document))),)),
+        _notes(remarks, most),
+        Section("", (Words("All sections: --verbose; some of them: --section NAME, names in --help."),)),
+    )
+    return tuple(section for section in found if section.parts)
+
+
+def _project(document: Document) -> Rows:
+    """Say what was adjusted, and how much of it there is."""
+    yield "adjustment", adjustment_of(document)
+    yield "ground frame", document["frame"]["description"]
+    cameras = document["cameras"]
+    for camera in cameras[:NAMED]:
+        yield f"camera {camera['id']}", camera_line(camera)
+    if len(cameras) > NAMED:
+        yield "more cameras", listed((camera["id"] for camera in cameras[NAMED:]), NAMED)
+    yield from counts_rows(document)
+
+
+def _stages(document: Document) -> Rows:
+    """Say in a line for each stage how it went."""
+    interior, summary = document["corrections"]["interior"], document["summary"]
+    if interior:
+        yield "interior orientation", interior_line(interior)
+    if of_models(document):
+        yield from _links(document)
+    elif document["models"]:
+        yield from _pairs(document)
+    yield from _absolute(document["absolute"])
+    yield from _degrees(document.get("polynomials", []))
+    for block in _worst_of(document.get("covariance", []), "sigma0", 1):
+        of = f" of strip {block['strip']}, the largest" if len(document["covariance"]) > 1 else ""
+        chance = "" if block["p"] is None else f"; a larger one by chance {fixed(100 * block['p'], 1)} %"
+        yield "covariance adjustment", f"σ0 {fixed(block['sigma0'], 2)}{of}, redundancy {block['redundancy']}{chance}"
+    if "bundle" in document:
+        yield "bundle adjustment", _bundle(document["bundle"])
+    if summary["image_rms_um"] is not None:
+        yield "image residuals", f"rms {micrometres(summary['image_rms_um'])} µm"
+    if "precision" in document:
+        yield from _precision(document["precision"])
+
+
+def _pairs(document: Document) -> Rows:
+    summary, models = document["summary"], document["models"]
+    out = sum(model["points_rejected"] for model in models)
+    total = out + sum(model["points_used"] for model in models)
+    sigma0 = summary.get("sigma0_pairs_um", summary["sigma0_um"])
+    text = (
+        f"σ0 {micrometres(sigma0)} µm, stated {micrometres(summary['sigma_given_um'])} µm; {out} of "
+        f"{counted(total, 'point')} in {counted(len(models), 'pair')} rejected, {percent(out, total)}"
+    )
+    yield "relative orientation", text
+    joints = document["junctions"]
+    if joints:
+        yield "scale transfer", f"{counted(len(joints), 'joint')}; {_differences(document)}"
+
+
+def _links(document: Document) -> Rows:
+    summary, links = document["summary"], document["links"]
+    if links:
+        sigma0 = f"σ0 {micrometres(summary['sigma0_um'])} µm, stated {micrometres(summary['sigma_given_um'])} µm"
+        yield "links of the models", f"{sigma0}; {counted(len(links), 'link')}"
+        yield "between models", _differences(document)
+
+
+def _differences(document: Document) -> str:
+    """Say by how much neighbouring models differ; in the worst strip, where there are several."""
+    strips = [strip for strip in document["strips"] if strip["discrepancy"]["up"] is not None]
+    if not strips:
+        return "no common points"
+    worst = max(strips, key=lambda strip: strip["discrepancy"]["up"])
+    size = ", ".join(f"{metres(worst['discrepancy'][name])} m {name}" for name in DIRECTIONS)
+    return f"rms {size}{_in_strip(worst['id'], strips)}"
+
+
+def _in_strip(strip: str, strips: Sequence[object]) -> str:
+    return f", worst in strip {strip}" if len(strips) > 1 else ""
+
+
+def _absolute(rows: Sequence[Document]) -> Rows:
+    for row in _worst_of(rows, "sigma0", 1):
+        size = ", ".join(f"{metres(row['misclosure_rms'][axis])} m {axis}" for axis in GROUND_AXES)
+        yield "absolute orientation", f"misclosure rms {size}{_in_strip(row['strip'], rows)}"
+
+
+def _degrees(blocks: Sequence[Document]) -> Rows:
+    """Say of which degree the polynomials are; of several, how many strips have each."""
+    if len(blocks) == 1:
+        yield "polynomial", chosen_degrees(blocks[0])
+    elif blocks:
+        number = Counter(tuple(degree_of(block["terms"][axis]) for axis in "xz") for block in blocks)
+        found = (f"{plan} and {height} in {counted(number[plan, height], 'strip')}" for plan, height in sorted(number))
+        yield "polynomials", f"degrees in plan and height: {', '.join(found)}"
+
+
+def _bundle(block: Document) -> str:
+    test, out = block["sigma0_test"], sum(block["screening"].get("rejected", {}).values())
+    said = "no redundancy to test it"
+    if test["passed"] is not None:
+        said = (
+            f"{'passed' if test['passed'] else 'NOT PASSED'} ({fixed(test['lower'], 3)} to {fixed(test['upper'], 3)})"
+        )
+    free = "free network, " if block["free_network"] else ""
+    return f"{free}σ0 {fixed(block['sigma0'], 3)}, test {said}; {counted(out, 'observation')} rejected"
+
+
+def _precision(block: Document) -> Rows:
+    for name, part in block["points"].items():
+        yield f"precision in {name}", f"rms {metres(part['rms'])} m, largest {metres(part['max'])} m at {part['worst']}"
+    check = block.get("check")
+    if check:
+        inside = [
+            f"{check[name]['inside_95']} of {check[name]['count']} in {name}"
+            for name in ("plan", "height")
+            if check[name]["count"]
+        ]
+        chance = [
+            f"p = {fixed(test['p'], 3)}" for test in sorted(check["tests"], key=lambda test: float(test["p"]))[:1]
+        ]
+        yield "errors at check points", "; ".join([f"{', '.join(inside)} inside 95 % limits", *chance])
+
+
+def _worst(document: Document) -> Rows:
+    """Name the worst pairs, photos and points, what was rejected and what has no coordinates."""
+    kinds: tuple[tuple[str, str, str, Callable[[Document], str]], ...] = (
+        ("pairs, σ0", "models", "sigma0_um", photos_of),
+        ("photos, rms residual", "photos", "image_rms_um", lambda row: str(row["id"])),
+        ("points, rms residual", "points", "image_rms_um", lambda row: str(row["id"])),
+    )
+    for label, block, key, name in kinds:
+        rows = _worst_of(document[block], key, NAMED)
+        if rows:
+            yield label, ", ".join(f"{name(row)} {micrometres(row[key])} µm" for row in rows)
+    rejected = standing_rejections(document)
+    if rejected:
+        yield "rejected", _and_more((_rejection(row) for row in rejected), len(rejected), "rejected")
+    missing = missing_points(document)
+    if missing:
+        text = _and_more((f"{counted(len(ids), 'point')} {why}" for why, ids in missing), len(missing), "undetermined")
+        yield "without coordinates", text
+
+
+def _notes(notes: Iterable[Document], most: int) -> Section:
+    """Return the first note of each kind, and how many more there are of it."""
+    kinds: dict[str, list[Document]] = {}
+    for note in notes:
+        kinds.setdefault(note["code"], []).append(note)
+    parts = [Words(sentence_of(first) + _likewise(rest), mark="-") for first, *rest in list(kinds.values())[:most]]
+    if len(kinds) > most:
+        parts.append(Words(elsewhere(len(kinds) - most, "kinds of notes", "notes", "notes")))
+    return Section("Notes", tuple(parts))
+
+
+def _likewise(rest: Sequence[Document]) -> str:
+    """Say for what else a note holds, in other words: strips, where it is about strips."""
+    if not rest:
+        return ""
+    strips = [note["strip"] for note in rest if note["strip"]]
+    if len(strips) == len(rest):
+        return f" (likewise {'strip' if len(strips) == 1 else 'strips'} {listed(strips, STRIPS_NAMED)})"
+    return f" (and {len(rest)} more like this: --section notes)"
+
+
+def _worst_of(rows: Iterable[Document], key: str, most: int) -> list[Document]:
+    """Return the rows with the largest values of a key, where it is known."""
+    known = (row for row in rows if row.get(key) is not None)
+    return sorted(known, key=lambda row: float(row[key]), reverse=True)[:most]
+
+
+def _rejection(row: Document) -> str:
+    photos = " – ".join(row[key] for key in ("photo", "other_photo") if row[key] is not None)
+    return " on ".join(part for part in (row["point"], photos) if part)
+
+
+def _and_more(said: Iterable[str], number: int, section: str) -> str:
+    """Say the first of some things, and where the others stand."""
+    head = ", ".join([text for text, _ in zip(said, range(NAMED), strict=False)])
+    return head if number <= NAMED else f"{head} and {number - NAMED} more: --section {section}"
