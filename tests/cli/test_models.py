@@ -39,7 +39,7 @@ def test_everything_that_is_written(project: Path, capsys: pytest.CaptureFixture
     assert lines[0] == "before,after,point,vx_um,vy_um,vz_um,test,used"
     assert len(lines) == 1 + sum(len(link["points"]) for link in document["link_residuals"])
     assert (folder / "a" / "photos.csv").read_text(encoding="utf-8").splitlines()[1].count(",") == 24
-    assert "Links of the models" in printed
+    assert "links of the models" in printed
     assert "at model scale" in printed
     assert "Links of the models" in (folder / "a" / "report.html").read_text(encoding="utf-8")
     for form in ("text", "md", "json"):
