@@ -6,7 +6,7 @@ from functools import lru_cache
 from math import sqrt
 from statistics import NormalDist
 
-from photostrip.distributions import chi2_ppf, f_isf, f_sf, t_isf, t_sf
+from photostrip.distributions import beta_cdf, chi2_ppf, f_isf, f_sf, t_isf, t_sf
 
 SIGMA_FROM_MEDIAN = 1.4826  # standard deviation over the median of |x|, of a normal distribution
 
@@ -37,6 +37,11 @@ def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
 def f_quantile(probability: float, dof_numerator: float, dof_denominator: float) -> float:
     """Quantile of F."""
     return f_isf(1 - probability, dof_numerator, dof_denominator)
+
+
+def binomial_p_value(count: float, number: float, probability: float) -> float:
+    """Probability of `count` or more among `number` cases of a probability; the numbers need not be whole."""
+    return beta_cdf(probability, count, number - count + 1) if count > 0 else 1.0
 
 
 @lru_cache(maxsize=4096)

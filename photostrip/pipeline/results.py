@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.quality.correlations import Correlation
     from photostrip.triangulation.bundle.selection import Selection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.error_propagation.covariances import CheckTest
+    from photostrip.triangulation.error_propagation.check_errors import CheckErrors
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
     from photostrip.triangulation.gross_errors.pairs import screening
@@ -205,8 +205,8 @@ class Precision:
     sigma: tuple[float, ...]
     # for each strip: ``"a-priori"`` when that is the stated one, ``"a-posteriori"`` when it was found by the adjustment
     basis: tuple[str, ...]
-    # for each strip the test of its check points together; None without any, empty when no strip was tested
-    checks: tuple[CheckTest | None, ...] = ()
+    # for each strip the errors at its check points, of a bundle those of all strips together; None without any
+    checks: tuple[CheckErrors | None, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

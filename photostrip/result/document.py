@@ -45,7 +45,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "absolute": strips.absolute_of(result),
         **strips.polynomials_of(result),
         **covariance.covariances_of(result),
-        **precision.precision_of(result),
+        **precision.precision_of(result, found),
         **bundle.bundle_of(result),
         "control": given.control_of(result, found),
         "misclosures": given.misclosures_of(result),

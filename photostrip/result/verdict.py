@@ -10,9 +10,9 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
-from photostrip.notes import before
+from photostrip.notes import before, listed
 from photostrip.result.verification import verification_of
-from photostrip.statistics import chi2_quantile
+from photostrip.statistics import chi2_quantile, f_p_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,15 +22,16 @@ if TYPE_CHECKING:
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
 
 SIGMA0_RATIO = 1.5  # of sigma0 to the stated standard deviation
-PAIR_RATIO = 1.5  # of a pair's sigma0 to that of the project, when chance does not explain it
+PAIR_RATIO = 1.5  # of a pair's sigma0 to that of the others, or to the stated one, when chance does not explain it
 PAIR_LEVEL = 0.01  # probability that any sound pair of the project is named
 PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
 # Rms of the control's residuals in units of their standard deviation; a long strip bends by that much.
 POOR_CONTROL = 5.0
-ODD_POINT = 4.0  # difference at a given point against the rms of the others
-ODD_RATIO = 3.0  # and against its standard deviation: a few good points can be better than they should be
-FEW = 4  # given points below which none can stand out
+CHECK_LEVEL = 0.01  # probability that the check points of a sound result contradict its standard deviations
 MANY_REJECTED = 0.05  # share of the points in pairs
+SMALLEST = 0.001  # probability that is written as a number
+PARTS = "plan", "height"
+AREAS = {"plan": "ellipse", "height": "interval"}
 NAMED = 3  # pairs, photos, findings or notes of one kind that are named
 
 
@@ -43,6 +44,7 @@ def verdict_of(document: Document) -> Document:
         *_control(document),
         *_odd(document, "control"),
         *_odd(document, "check"),
+        *_checks(document),
         *_sigma0(document),
         *_pairs(document),
         *_photos(document),
@@ -51,7 +53,7 @@ def verdict_of(document: Document) -> Document:
     ]
     verification = verification_of(document)
     status = FAILED if failed else LOOK if look_at else GOOD if verification["verified"] else UNVERIFIED
-    return {"status": status, "accuracy": accuracy(document["summary"]), **verification, "look_at": look_at}
+    return {"status": status, "accuracy": accuracy(document), **verification, "look_at": look_at}
 
 
 def exit_code(status: str, *, strict: bool) -> int:
@@ -59,19 +61,48 @@ def exit_code(status: str, *, strict: bool) -> int:
     return EXIT_TOLERANCE if status == FAILED or (strict and status != GOOD) else EXIT_DONE
 
 
-def accuracy(summary: Document) -> str:
-    """Say in one sentence how good the points are, and from what that is known."""
-    scale = "model" if summary.get("model_scale") else "photo"
+def accuracy(document: Document) -> str:
+    """Say in one sentence how good the points are, and from what that is known.
+
+    Check points that stand out are told apart: one wrong given point says nothing about the others.
+    """
+    scale = "model" if document["summary"].get("model_scale") else "photo"
     for role, words in (("check", "check points, which took no part"), ("control", "control points")):
-        plan, height = summary[role]["plan"], summary[role]["height"]
-        if plan["count"] or height["count"]:
-            parts = [
-                f"{part['rms']:.3f} m in {name} ({part['rms_um']:.1f} µm at {scale} scale, {part['count']} points)"
-                for name, part in (("plan", plan), ("height", height))
-                if part["count"]
+        whole = document["summary"][role]
+        sound = {name: headline_rms(document, role, name) for name in PARTS}
+        parts = [
+            f"{part['rms']:.3f} m in {name} ({part['rms_um']:.1f} µm at {scale} scale, {part['count']} points)"
+            for name, part in sound.items()
+            if part["count"]
+        ]
+        if parts:
+            out = [
+                f"{whole[name]['rms']:.3f} m in {name} with {listed(names)}"
+                for name in PARTS
+                if (names := _standing_out(document, role, name))
             ]
-            return f"rms {' and '.join(parts)} at {words}"
+            return f"rms {' and '.join(parts)} at {words}" + (f"; {' and '.join(out)}" if out else "")
     return "no given point was measured"
+
+
+def headline_rms(document: Document, role: str, part: str) -> Document:
+    """Return count and rms of the differences in plan or height without those that stand out, metres and µm."""
+    whole: Document = document["summary"][role][part]
+    out = _standing_out(document, role, part)
+    if not out:
+        return whole
+    rows = [row for row in document["control"] if row["role"] == role and row[part] is not None]
+    kept = [_without_rejected(row) for row in rows if row["id"] not in out]
+    kept = [row for row in kept if row[part] is not None]
+    return {"count": len(kept), "rms": _rms(kept, part), "rms_um": _rms(kept, f"{part}_um")}
+
+
+def _standing_out(document: Document, role: str, part: str) -> list[str]:
+    return [row["id"] for row in document["control"] if row["role"] == role and part in row["stands_out"]]
+
+
+def _rms(rows: list[Document], key: str) -> float:
+    return float((sum(row[key] ** 2 for row in rows) / len(rows)) ** 0.5)
 
 
 def _tolerances(document: Document) -> Iterator[str]:
@@ -101,19 +132,41 @@ def _without_rejected(row: Document) -> Document:
 
 
 def _odd(document: Document, role: str) -> Iterator[str]:
-    """Name the point that does not go with the others, in plan and in height."""
-    rows = [_without_rejected(row) for row in document["control"] if row["role"] == role]
-    for name in ("plan", "height"):
-        known = sorted((row for row in rows if row[name] is not None), key=lambda row: abs(row[name]), reverse=True)
-        if len(known) < FEW:
-            continue
-        worst, rest = known[0], known[1:]
-        others = (sum(row[name] ** 2 for row in rest) / len(rest)) ** 0.5
-        if abs(worst[name]) > ODD_POINT * others and (worst["normalised"] or 0.0) > ODD_RATIO:
-            yield (
-                f"{role} point {worst['id']} stands out: {abs(worst[name]):.3f} m in {name}, "
-                f"the others have an rms of {others:.3f} m"
-            )
+    """Name the points that do not go with the others, in plan and in height, and that no finding has named."""
+    named = {point for each in _open_findings(document) for point in each["points"]}
+    for name in PARTS:
+        others = headline_rms(document, role, name)["rms"]
+        for row in document["control"]:
+            if row["role"] == role and name in row["stands_out"] and row["id"] not in named:
+                yield (
+                    f"{role} point {row['id']} stands out: {abs(row[name]):.3f} m in {name}, "
+                    f"the others have an rms of {others:.3f} m"
+                )
+
+
+def _checks(document: Document) -> Iterator[str]:
+    """Say when the check points contradict the standard deviations of the points."""
+    check = document.get("precision", {}).get("check")
+    if not check:
+        ratio = document["summary"]["check"]["normalised"]
+        if ratio is not None and ratio > POOR_CONTROL:
+            yield f"the check points are {ratio:.1f} times farther off than their points of one model let expect"
+        return
+    parts = [(name, check[name]) for name in PARTS if check[name]["count"]]
+    chances = [part["p"] for _, part in parts] + [test["p"] for test in check["tests"]]
+    if chances and min(chances) < CHECK_LEVEL / len(chances):
+        said = [
+            f"in {name} {part['rms']:.1f} times, {part['inside_95']} of {part['count']} inside the 95 % {AREAS[name]}"
+            for name, part in parts
+        ]
+        yield (
+            f"the check points are farther off than the standard deviations of the points let expect: {'; '.join(said)}"
+            f"; probability {_percent(min(chances) * len(chances))} by chance"
+        )
+
+
+def _percent(chance: float) -> str:
+    return f"{100 * chance:.1f} %" if chance >= SMALLEST else f"below {100 * SMALLEST:g} %"
 
 
 def _sigma0(document: Document) -> Iterator[str]:
@@ -130,24 +183,31 @@ def _sigma0(document: Document) -> Iterator[str]:
 
 
 def _pairs(document: Document) -> Iterator[str]:
-    whole, models = document["summary"]["sigma0_um"], document["models"]
-    odd = [model for model in models if _stands_out(model, whole, len(models))]
-    odd.sort(key=itemgetter("sigma0_um"), reverse=True)
-    for model in odd[:NAMED]:
+    """Name the pairs that are worse than the others, or than stated, by more than chance."""
+    given = document["summary"]["sigma_given_um"]
+    # said of the whole project already, or explained by what the photos have in common
+    quiet = any(True for _ in _sigma0(document)) or bool(document.get("bundle", {}).get("calibration"))
+    pairs = [model for model in document["models"] if model["sigma0_um"] is not None]
+    level = PAIR_LEVEL / max(len(pairs), 1)
+    squares = sum(pair["redundancy"] * pair["sigma0_um"] ** 2 for pair in pairs)
+    redundancy = sum(pair["redundancy"] for pair in pairs)
+    odd = []
+    for pair in pairs:
+        found, own = pair["sigma0_um"], pair["redundancy"]
+        left = redundancy - own
+        others = (max(squares - own * found**2, 0.0) / left) ** 0.5 if left else 0.0
+        if (others and found > PAIR_RATIO * others and f_p_value((found / others) ** 2, own, left) < level) or (
+            not quiet and found > PAIR_RATIO * given and (found / given) ** 2 * own > chi2_quantile(1 - level, own)
+        ):
+            odd.append((found, others, pair))
+    odd.sort(key=itemgetter(0), reverse=True)
+    for found, others, pair in odd[:NAMED]:
+        beside = f", the other pairs have {others:.1f} µm" if others else ""
         yield (
-            f"photos {model['left']} and {model['right']}: sigma0 {model['sigma0_um']:.1f} µm, that of the project is "
-            f"{whole:.1f} µm; the largest y parallax is at point {model['max_parallax_point']}"
+            f"photos {pair['left']} and {pair['right']}: sigma0 {found:.1f} µm, stated {given:.1f} µm{beside}; the "
+            f"largest y parallax is at point {pair['max_parallax_point']}"
         )
     yield from _more(len(odd), "pairs")
-
-
-def _stands_out(model: Document, whole: float, models: int) -> bool:
-    """Whether a pair is worse than the project by more than chance."""
-    found = model["sigma0_um"]
-    if found is None or found <= PAIR_RATIO * whole:
-        return False
-    limit = chi2_quantile(1 - PAIR_LEVEL / models, model["redundancy"]) / model["redundancy"]
-    return bool((found / whole) ** 2 > limit)
 
 
 def _more(number: int, what: str) -> Iterator[str]:
@@ -174,9 +234,13 @@ def _rejected(document: Document) -> Iterator[str]:
         yield f"{gone} of {used + gone} points in pairs were rejected, {100 * gone / (used + gone):.0f} %"
 
 
+def _open_findings(document: Document) -> list[Document]:
+    return [each for each in document["findings"] if not each["accepted"]]
+
+
 def _findings(document: Document, severity: str) -> Iterator[str]:
     """Name what the data say against themselves and nobody has accepted."""
-    open_ones = [each for each in document["findings"] if each["severity"] == severity and not each["accepted"]]
+    open_ones = [each for each in _open_findings(document) if each["severity"] == severity]
     for _, group in groupby(open_ones, key=itemgetter("code")):
         kind = list(group)
         yield from (f"{each['code']} {each['message']}" for each in kind[:NAMED])

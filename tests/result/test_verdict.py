@@ -7,10 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from photostrip.formats.output.simulation import inputs_of
+from photostrip.pipeline import Settings
 from photostrip.report import chosen_sections
 from photostrip.report.page.text import to_text
-from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code
-from tests.results import Document, case, solved
+from photostrip.result.points.standing_out import stand_out
+from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, verdict_of
+from photostrip.simulate.simulation import simulate
+from photostrip.statistics import binomial_p_value
+from tests.results import Document, case, solved, spec
 
 
 def with_checks(plan: int, height: int) -> Document:
@@ -53,6 +58,101 @@ def test_what_is_to_be_looked_at_can_be_unverified_too() -> None:
     verdict = {**document["verdict"], "verified": False, "verification": "no point verifies the result: do this"}
     text = quiet({**document, "status": LOOK, "verdict": {**verdict, "look_at": ["a thing"]}})
     assert text.count("No point verifies the result: do this.") == 1
+
+
+# ------------------------------------------------------------------------------------------- the tests of the program
+
+
+def moved(points: int, metres: float, axis: int = 0, adjustment: str = "polynomial") -> Document:
+    """Displace the first so many of eight check points."""
+    wanted = spec("projected", 2)
+    inputs = inputs_of(simulate(replace(wanted, control=replace(wanted.control, check=8))))
+    enu = inputs.control.enu.copy()
+    enu[np.flatnonzero(inputs.control.check)[:points], axis] += metres
+    return solved(replace(inputs, control=replace(inputs.control, enu=enu)), Settings(adjustment=adjustment)).document
+
+
+@pytest.mark.parametrize("adjustment", ["polynomial", "covariance", "bundle"])
+def test_check_points_beyond_their_standard_deviations_are_not_good(adjustment: str) -> None:
+    sound = moved(0, 0.0, adjustment=adjustment)
+    assert (sound["status"], sound["verdict"]["look_at"]) == (GOOD, [])
+    document = moved(8, 1.0, axis=2, adjustment=adjustment)
+    (text,) = (text for text in document["verdict"]["look_at"] if text.startswith("the check points are farther off"))
+    check = document["precision"]["check"]
+    assert f"in height {check['height']['rms']:.1f} times, {check['height']['inside_95']} of 8 inside" in text
+    assert text.endswith("; probability below 0.1 % by chance")
+    assert document["status"] == LOOK
+
+
+def test_few_inside_is_enough() -> None:
+    """None of two points inside the ellipse, and the squares of all coordinates nothing out of the way."""
+    document = moved(0, 0.0)
+    check = document["precision"]["check"]
+    few = {"count": 2, "inside_95": 0, "rms": 2.0, "p": binomial_p_value(2, 2, 0.05)}
+    test = {**check["tests"][0], "p": 0.03}
+    changed = {**check, "plan": few, "tests": [test]}
+    found = verdict_of({**document, "precision": {**document["precision"], "check": changed}})
+    assert found["status"] == LOOK
+    assert "in plan 2.0 times, 0 of 2 inside the 95 % ellipse" in found["look_at"][0]
+
+
+def test_a_check_point_that_stands_out_is_taken_out_of_the_headline() -> None:
+    document = moved(1, 447.0)
+    rows = {row["id"]: row for row in document["control"]}
+    assert [name for name, row in rows.items() if row["stands_out"]] == ["K01"]
+    (text,) = document["verdict"]["look_at"]
+    assert text.startswith("check point K01 stands out: 447.")
+    with_it, without = document["summary"]["check"]["plan"]["rms"], headline_rms(document, "check", "plan")
+    assert without["count"] == 7
+    assert without["rms"] < 0.3
+    assert with_it > 150
+    accuracy = document["verdict"]["accuracy"]
+    assert accuracy.startswith(f"rms {without['rms']:.3f} m in plan")
+    assert accuracy.endswith(f"; {with_it:.3f} m in plan with K01")
+    assert document["precision"]["check"]["plan"]["count"] == 7  # named once, not tested again with the others
+
+
+def test_wrong_check_points_do_not_hide_each_other() -> None:
+    values = np.array([0.1, 447.0, -0.05, 0.08, 447.2, 0.02, -0.07, 0.11])
+    found = stand_out(values, 1, np.full(8, 100.0))
+    assert np.flatnonzero(found).tolist() == [1, 4]
+    assert not stand_out(values, 1, np.full(8, 2.0)).any()  # nothing beyond its standard deviation
+    assert not stand_out(np.array([np.nan, 5.0]), 1, np.full(2, 100.0)).any()
+    assert stand_out(np.array([447.0, 0.088]), 2, np.full(2, 100.0)).tolist() == [True, False]
+
+
+def test_sound_differences_hardly_ever_stand_out() -> None:
+    rng = np.random.default_rng(20261122)
+    wrong = [stand_out(rng.normal(size=n), 1, np.full(n, 9.0)).any() for n in (2, 4, 9, 30) for _ in range(1500)]
+    assert np.mean(wrong) < 0.002
+
+
+# ------------------------------------------------------------------------------------------------------------ pairs
+
+
+def with_pairs(sigma0: list[float], project: float, *, calibration: bool = False) -> list[str]:
+    """Give a sound result pairs with another sigma0, that of the project being what a bundle makes of it."""
+    document = case("projected", 2).document
+    pairs = [{**document["models"][0], "sigma0_um": each, "redundancy": 10} for each in sigma0]
+    bundle = {"bundle": {"calibration": [{"parameter": "f"}]}} if calibration else {}
+    summary = {**document["summary"], "sigma0_um": project, "sigma_given_um": 5.0}
+    found: list[str] = verdict_of({**document, **bundle, "summary": summary, "models": pairs})["look_at"]
+    return found
+
+
+def test_a_pair_is_compared_with_the_other_pairs_and_with_what_is_stated() -> None:
+    (text,) = with_pairs([5.0, 5.2, 675.0], 5.1)
+    assert "sigma0 675.0 µm, stated 5.0 µm, the other pairs have 5.1 µm" in text
+    # two wrong pairs of three hide each other behind their mean
+    assert len(with_pairs([5.0, 675.0, 670.0], 5.1)) == 2
+    assert len(with_pairs([675.0], 5.1)) == 1
+    # pairs are not worse because the bundle is better
+    assert with_pairs([5.5, 5.2, 5.4, 5.0], 3.0) == []
+    # a lens that the bundle takes up bends every pair
+    assert with_pairs([20.0, 21.0, 19.0], 5.0, calibration=True) == []
+    # what is said of the whole project is not said again of each pair
+    (text,) = with_pairs([20.0, 21.0, 19.0], 20.0)
+    assert text.startswith("the image coordinates are 4.0 times worse than stated")
 
 
 @pytest.mark.parametrize(("status", "code", "strict"), [(GOOD, 0, 0), (UNVERIFIED, 0, 1), (LOOK, 0, 1), (FAILED, 1, 1)])

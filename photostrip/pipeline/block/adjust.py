@@ -11,6 +11,7 @@ from photostrip.errors import GeometryError
 from photostrip.pipeline.block import block_result
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
+from photostrip.pipeline.block.check_points import check_errors
 from photostrip.pipeline.block.datum import known_of
 from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart, Bundle, SinglePhoto
 from photostrip.pipeline.strips.forming import form_photos
@@ -68,7 +69,10 @@ def adjust_block(
     bundle = _bundle(inputs, settings, start, estimated, sigma0)
     _refuse_inseparable(bundle.correlations, set(asked))
     adjusted = block_result.adjusted_strips(inputs, observations, ground.output, bundle)
-    return adjusted if settings.precision else replace(adjusted, precision=None)
+    if adjusted.precision is None or not settings.precision:
+        return replace(adjusted, precision=None)
+    checks = check_errors(bundle, adjusted, inputs.control, ground.control)
+    return replace(adjusted, precision=replace(adjusted.precision, checks=(checks,)))
 
 
 def _refilled(block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame]) -> BlockProblem:

@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors, covariances
+from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
 if TYPE_CHECKING:
@@ -77,19 +78,19 @@ def compare_with_checks(
     return CheckDifferences(checks, found, targets.misclosures(xyz)[found.point, found.axis])
 
 
-def by_fit(found: Propagation, compared: CheckDifferences, factor: float) -> covariances.CheckTest:
-    """Test the check points of a strip that was fitted to the control.
+def by_fit(found: Propagation, compared: CheckDifferences, factor: float) -> CheckErrors:
+    """Return the errors at the check points of a strip that was fitted to the control.
 
     factor: variance factor of the image coordinates.
     """
     at = compared.coordinates
     by_parameters = np.einsum("wi,wit->wt", at.direction, found.influence[compared.checks.rows][at.point])
     subtracted = _Subtracted(found.control.rows, found.control.variance, by_parameters @ found.fit.operator)
-    return _tested(compared, found.errors, at.rows, subtracted, factor)
+    return _errors(compared, found.errors, at.rows, subtracted, factor)
 
 
-def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> covariances.CheckTest:
-    """Test the check points of a strip that was adjusted with its own covariance."""
+def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> CheckErrors:
+    """Return the errors at the check points of a strip that was adjusted with its own covariance."""
     from photostrip.triangulation.covariance_adjustment import prediction  # no other adjustment needs it
 
     system, at = adjusted.system, compared.coordinates
@@ -97,7 +98,7 @@ def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) ->
     operator = prediction.influence(system, at.rows, np.arange(len(wanted.value)))[:, 0]
     # the similarities of the models are unknowns of this adjustment, not errors
     subtracted = _Subtracted(wanted.rows.without_similarity(), wanted.noise, operator)
-    return _tested(compared, system.errors, at.rows.without_similarity(), subtracted, adjusted.factor)
+    return _errors(compared, system.errors, at.rows.without_similarity(), subtracted, adjusted.factor)
 
 
 class _Subtracted(NamedTuple):
@@ -108,13 +109,12 @@ class _Subtracted(NamedTuple):
     operator: Floats
 
 
-def _tested(
+def _errors(
     compared: CheckDifferences, errors: StripErrors, rows: ErrorRows, subtracted: _Subtracted, factor: float
-) -> covariances.CheckTest:
-    """Test all differences with their covariance: that of their own rows minus what is subtracted, and of the given."""
+) -> CheckErrors:
+    """Return all differences; their covariance is that of their rows minus what is subtracted, and of the given."""
     operator = np.concatenate([-subtracted.operator, np.eye(len(rows.first))], axis=1)
     covariance = factor * covariances.sums_of(errors, ErrorRows.joined([subtracted.rows, rows]), operator)
     covariance = covariance + (subtracted.operator * subtracted.variance) @ subtracted.operator.T
     covariance = covariance + np.diag(compared.coordinates.variance)
-    squares = float(compared.difference @ np.linalg.solve(covariance, compared.difference))
-    return covariances.CheckTest(len(compared.checks.points), len(compared.difference), squares)
+    return CheckErrors(compared.checks.points.ids, compared.coordinates.point, compared.difference, covariance)

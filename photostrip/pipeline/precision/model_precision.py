@@ -12,7 +12,8 @@ from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
-from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL, CheckTest
+from photostrip.triangulation.error_propagation.check_errors import CheckErrors
+from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL
 from photostrip.triangulation.independent_models import model_errors, model_misclosures, perspective_centers
 from photostrip.triangulation.polynomial.terms import POWERS
 
@@ -119,8 +120,8 @@ def _check(
     influence: Floats,
     checks: CheckPoints,
     factor: float,
-) -> CheckTest | None:
-    """Test of the check points together; None without any."""
+) -> CheckErrors | None:
+    """Return the errors at the check points with their covariance; None without any."""
     found, control = oriented.errors, oriented.misclosures
     if not len(checks.rows):
         return None
@@ -132,5 +133,4 @@ def _check(
     sums = model_errors.sums(found, *model_misclosures.weights(at, checks.rows))
     sums = sums - model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, by_control))
     spread = model_errors.covariance_of_sums(found, sums) * factor + (by_control * control.variance) @ by_control.T
-    squares = float(difference @ np.linalg.solve(spread + np.diag(at.variance), difference))
-    return CheckTest(len(checks.points), len(difference), squares)
+    return CheckErrors(checks.points.ids, at.point, difference, spread + np.diag(at.variance))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.error_propagation import covariances
+    from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 
 AT_A_TIME = 100  # control coordinates that two strips share, looked at together
 
@@ -34,7 +34,7 @@ class StripPrecision:
     variance: Floats  # (w,): their variances, metres^2
     sigma: float  # standard deviation of an image coordinate of weight one, mm
     basis: str  # where that comes from
-    check: covariances.CheckTest | None  # test of the strip's check points together
+    check: CheckErrors | None  # errors at the strip's check points, with their covariance
 
 
 def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:

@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.points import locate
 from photostrip.result.numbers import Document, natural_rank
+from photostrip.result.points.standing_out import stand_out
 from photostrip.result.quantities import records
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline import Result
 
+PARTS = "plan", "height"
 CONTROL = "control"  # kind of observations of a bundle adjustment
 LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of itself at least
 
@@ -34,6 +36,8 @@ class Differences:
     scale: Floats  # (c,): denominator of the photo scale at the point; NaN where it has no coordinates
     strips: tuple[tuple[str, ...], ...]
     rejected: Flags  # (c, 3): coordinates east, north, up of the control that were found wrong and not used
+    # (c, 2): whether the difference in plan, in height, is too large beside those of the other points of its role
+    stands_out: Flags
 
     @property
     def plan(self) -> Floats:
@@ -67,15 +71,27 @@ def differences(result: Result) -> Differences:
     sigma = _expected(result, held)
     with np.errstate(invalid="ignore"):
         ratio = np.abs(result.control_differences) / sigma
+    normalised = np.where(np.isnan(ratio).all(axis=1), np.nan, np.nan_to_num(ratio).max(axis=1, initial=0.0))
+    rejected = _rejected(result)
     return Differences(
         axes=result.output.user_from_internal(axes),
         parts=parts,
         sigma=sigma,
-        normalised=np.where(np.isnan(ratio).all(axis=1), np.nan, np.nan_to_num(ratio).max(axis=1, initial=0.0)),
+        normalised=normalised,
         scale=_scale(result, held),
         strips=tuple(tuple(s.strip.id for s, yes in zip(result.strips, row, strict=True) if yes) for row in held.T),
-        rejected=_rejected(result),
+        rejected=rejected,
+        stands_out=_stands_out(control.check, np.where(rejected, np.nan, parts), normalised),
     )
+
+
+def _stands_out(check: Flags, parts: Floats, normalised: Floats) -> Flags:
+    """Return which points do not go with the others of their role, in plan and in height."""
+    found = np.zeros((len(check), 2), bool)
+    for role in (check, ~check):
+        found[role, 0] = stand_out(np.hypot(parts[role, 0], parts[role, 1]), 2, normalised[role])
+        found[role, 1] = stand_out(parts[role, 2], 1, normalised[role])
+    return found
 
 
 def of_used(result: Result, found: Differences) -> Differences:
@@ -179,6 +195,7 @@ def control_of(result: Result, found: Differences) -> list[Document]:
         "sigma": _in_list_order(result, control.sigma),
         "sigma_fit": _in_list_order(result, found.sigma),
         "normalised": found.normalised,
+        "stands_out": [[part for part, yes in zip(PARTS, row, strict=True) if yes] for row in found.stands_out],
         "list": control.frame + 1,
         "strips": [list(strips) for strips in found.strips],
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import erfc, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,14 +11,17 @@ from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
 from photostrip.result.numbers import PER_RADIAN, Document, rms
 from photostrip.result.quantities import record, records
-from photostrip.statistics import chi2_quantile, normal_quantile
+from photostrip.statistics import binomial_p_value, chi2_quantile, normal_quantile
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline import Result, StripResult
+    from photostrip.result.points.given import Differences
+
 
 UPPER = np.triu_indices(6)
-INSIDE = {"plan": float(np.sqrt(chi2_quantile(0.95, 2))), "height": normal_quantile(0.975)}
+OUTSIDE = 0.05  # share of sound differences that lie outside their ellipse or interval
+INSIDE = {"plan": float(np.sqrt(chi2_quantile(1 - OUTSIDE, 2))), "height": normal_quantile(1 - OUTSIDE / 2)}
 
 
 def turned(covariances: Floats, axes: Floats) -> Floats:
@@ -114,8 +118,10 @@ def _rates(rotations: Floats, system: str) -> Floats:
         return np.concatenate(single)
 
 
-def precision_of(result: Result) -> Document:
+def precision_of(result: Result, found: Differences) -> Document:
     """Return the block ``precision`` under its key; nothing when no covariances are known.
+
+    found: what is left at the given points.
 
     It says what the covariances rest on, how large they are, and how they change along the strips.
     """
@@ -137,7 +143,7 @@ def precision_of(result: Result) -> Document:
             for row in _along(result, strip, sigma, photos)
         ],
     }
-    check = _check(result)
+    check = _check(result, found)
     return {"precision": record("precision", block | ({"check": check} if check else {}))}
 
 
@@ -190,40 +196,51 @@ def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) ->
     return records("precision.along", columns)
 
 
-def _check(result: Result) -> Document:
+def _check(result: Result, found: Differences) -> Document:
     """Compare the differences at check points with what the covariances let expect; empty without check points.
 
-    The covariance of a difference is that of the point and that of the given coordinate. Point by point the differences
-    are counted; their errors go together along a strip, so the test of all of them is made with their joint covariance.
+    The covariance of a difference is that of the point and that of the given coordinate. Errors go together along a
+    strip: the test of all of them is made with their joint covariance, and points that lie outside are counted as so
+    many as are independent. Points that stand out take no part in these tests: they have been named.
     """
     rows, values = _normalised(result)
     if result.precision is None or np.isnan(values).all():
         return {}
-    tests = [
-        {
-            "strip": strip.strip.id,
-            "points": test.points,
-            "coordinates": test.coordinates,
-            "squares": test.squares,
-            "p": test.probability,
-        }
-        for strip, test in zip(result.strips, result.precision.checks, strict=False)
-        if test is not None
-    ]
-    points = {"id": [result.inputs.control.ids[row] for row in rows], "plan": values[:, 0], "height": values[:, 1]}
+    ids = [result.inputs.control.ids[row] for row in rows]
+    left_out = {result.inputs.control.ids[row] for row in np.flatnonzero(found.stands_out.any(axis=1))}
+    names = [strip.strip.id for strip in result.strips] if result.bundle is None else [""]
+    kept = [None if errors is None else errors.without(left_out) for errors in result.precision.checks]
+    tests = {name: errors for name, errors in zip(names, kept, strict=False) if errors is not None}
+    coordinates = sum(errors.coordinates for errors in tests.values())
+    share = sum(errors.independent for errors in tests.values()) / max(coordinates, 1)
+    sound = values[[name not in left_out for name in ids]]
+    chance = np.column_stack([np.exp(-(values[:, 0] ** 2) / 2), [erfc(abs(z) / sqrt(2)) for z in values[:, 1]]])
+    points = {"id": ids, "plan": values[:, 0], "height": values[:, 1]}
     return {
-        "plan": _inside(values[:, 0], INSIDE["plan"], 2),
-        "height": _inside(values[:, 1], INSIDE["height"], 1),
-        "points": records("precision.check.points", points),
-        "tests": tests,
+        "plan": _inside(sound[:, 0], INSIDE["plan"], 2, share),
+        "height": _inside(sound[:, 1], INSIDE["height"], 1, share),
+        "points": records("precision.check.points", {**points, "p_plan": chance[:, 0], "p_height": chance[:, 1]}),
+        "tests": [
+            {
+                "strip": name,
+                "points": errors.points,
+                "coordinates": errors.coordinates,
+                "independent": errors.independent,
+                "squares": errors.squares,
+                "p": errors.probability,
+            }
+            for name, errors in tests.items()
+        ],
     }
 
 
-def _inside(values: Floats, limit: float, coordinates: int) -> Document:
+def _inside(values: Floats, limit: float, coordinates: int, share: float) -> Document:
     """Count the differences within their 95 % ellipse or interval; their rms, of one coordinate."""
     known = values[~np.isnan(values)]
     size = np.sqrt(np.mean(known**2) / coordinates) if len(known) else None
-    return {"count": len(known), "inside_95": int((np.abs(known) <= limit).sum()), "rms": size}
+    inside = int((np.abs(known) <= limit).sum())
+    chance = binomial_p_value(share * (len(known) - inside), share * len(known), OUTSIDE)
+    return {"count": len(known), "inside_95": inside, "rms": size, "p": chance}
 
 
 def _normalised(result: Result) -> tuple[Numbers, Floats]:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.distributions import gamma_cdf
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows, add_by_item
@@ -29,20 +28,6 @@ if TYPE_CHECKING:
 A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
 LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
 ENTRIES = 2000  # coefficients of image points worked on at a time: what fits into the processor's cache
-
-
-@dataclass(frozen=True, eq=False)
-class CheckTest:
-    """Test of the check points of a strip together; their errors are correlated along the strip."""
-
-    points: int
-    coordinates: int  # their coordinates, the expectation of the sum of squares
-    squares: float  # e^T C^-1 e with the covariance C of the differences, that of the given coordinates included
-
-    @property
-    def probability(self) -> float:
-        """Probability of a larger sum by chance."""
-        return 1 - gamma_cdf(self.squares / 2, self.coordinates / 2)
 
 
 def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:

@@ -254,7 +254,7 @@ def test_coordinates_worse_than_stated_are_told() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("adjustment", ["similarity", "covariance"])
+@pytest.mark.parametrize("adjustment", ["similarity", "covariance", "bundle"])
 def test_check_points_together_follow_chi_square(adjustment: str) -> None:
     """Joint test of twelve check points over 60 repetitions: mean and scatter as chi-square has them."""
     wanted = spec(10)

@@ -68,7 +68,7 @@ class Inverse:
 def cofactors_of(solution: BundleSolution) -> Cofactors:
     """Cofactors of all parameters and residuals; ``bundle-rank`` when the normal matrix is singular at the solution."""
     prepared = solution.prepared
-    state, reduced, band = _factored(solution)
+    state, reduced, band = at_solution(solution)
     inverse = _inverse(reduced, band)
     points = np.full((prepared.problem.points, 3, 3), np.nan)
     residuals = np.zeros((len(prepared.problem.images), 2, 2))
@@ -103,7 +103,7 @@ class _Factored(NamedTuple):
     band: Factor
 
 
-def _factored(solution: BundleSolution) -> _Factored:
+def at_solution(solution: BundleSolution) -> _Factored:
     """Factor the reduced normal equations at the solution."""
     prepared = solution.prepared
     state = parameters_from(prepared, solution.centers, solution.rotations, solution.points, solution.common)
@@ -126,7 +126,7 @@ class JointCofactors:
     @classmethod
     def of_solution(cls, solution: BundleSolution) -> Self:
         """Invert the normal matrix at a solution."""
-        _, reduced, band = _factored(solution)
+        _, reduced, band = at_solution(solution)
         return cls(_inverse(reduced, band), solution.prepared.structure.rank, solution.rotations)
 
     def of(self, photos: Numbers) -> Floats:
@@ -262,7 +262,7 @@ def _inner(
         eliminated.root.forward(pushed)
         white.append(pushed)
         _push(batch, eliminated, pushed, right, corner)
-    photos, common = _solved(reduced, band, right, corner)
+    photos, common = solved_for(reduced, band, right, corner)
     total = np.zeros((datum.DEFECT, datum.DEFECT))
     shifts = []
     for batch, eliminated, pushed, move in zip(prepared.structure.batches, reduced.points, white, moves, strict=True):
@@ -302,7 +302,7 @@ def _push(batch: Batch, eliminated: Eliminated, pushed: Floats, right: Floats, c
     corner[:calibrated] -= np.einsum("pcs,cds->pd", eliminated.rows[n:-1], pushed)
 
 
-def _solved(reduced: Reduced, band: Factor, right: Floats, corner: Floats) -> tuple[Floats, Floats]:
+def solved_for(reduced: Reduced, band: Factor, right: Floats, corner: Floats) -> tuple[Floats, Floats]:
     """Solve for right-hand sides of photos (m, 6, c) and common parameters (p, c)."""
     p = len(corner)
     border = reduced.border.reshape(-1, p + 1)[:, :p]

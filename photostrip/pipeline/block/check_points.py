@@ -1,0 +1,44 @@
+"""Errors at the check points of a bundle adjustment with their joint covariance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.pipeline.given_points import compare_with_given
+from photostrip.pipeline.precision.check_points import LARGEST
+from photostrip.triangulation.bundle.quality.joint_points import joint_cofactors
+from photostrip.triangulation.error_propagation.check_errors import CheckErrors
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.pipeline.results import AdjustedStrips, Bundle
+    from photostrip.points import ControlPoints
+
+
+def check_errors(
+    bundle: Bundle, adjusted: AdjustedStrips, given: ControlPoints, frames: Sequence[GroundFrame]
+) -> CheckErrors | None:
+    """Compare a bundle adjustment with its check points; None without any."""
+    points = adjusted.points
+    compared = compare_with_given(given, frames, points, adjusted.observations)
+    rows = np.flatnonzero(given.check & np.isfinite(compared.differences).any(axis=1))
+    if not len(rows):
+        return None
+    if len(rows) > LARGEST:
+        rows = rows[np.linspace(0, len(rows) - 1, LARGEST).round().astype(int)]
+    rows = rows[np.argsort(compared.rows[rows], kind="stable")]
+    at = compared.rows[rows]
+    axes = np.array(
+        [frames[given.frame[row]].axes_at(points.cartesian[[place]])[0] for row, place in zip(rows, at, strict=True)]
+    )
+    solution = bundle.screened.solution
+    joint = joint_cofactors(solution, points.number[at]).reshape(len(at), 3, len(at), 3) * bundle.unit**2
+    turned = np.einsum("iap,ipjq,jbq->iajb", axes, joint, axes).reshape(3 * len(at), 3 * len(at))
+    difference = compared.differences[rows].ravel()
+    known = np.flatnonzero(np.isfinite(difference))
+    covariance = turned[np.ix_(known, known)] + np.diag(given.sigma[rows].ravel()[known] ** 2)
+    return CheckErrors(given.take(rows).ids, known // 3, difference[known], covariance)

@@ -1,0 +1,37 @@
+"""Given points whose differences do not go with those of the others."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.statistics import f_p_value
+
+if TYPE_CHECKING:
+    from photostrip.arrays import Flags, Floats
+
+LEVEL = 0.001  # probability that the largest of sound differences stands out
+ODD_RATIO = 3.0  # times its standard deviation: a few good points can be better than they should be
+MOST = 4  # at most one in so many points stands out
+
+
+def stand_out(size: Floats, coordinates: int, ratio: Floats) -> Flags:
+    """Return which differences (n,) are too large for those that remain without them; NaN where there is none.
+
+    The k largest stand out when the least of them does, by the F test of its square against the mean square of the
+    n - k others: two wrong points must not hide each other.
+
+    coordinates: coordinates in a difference, 2 in plan.
+    ratio: (n,), differences over their standard deviations.
+    """
+    found = np.zeros(len(size), bool)
+    known = np.flatnonzero(np.isfinite(size))
+    order = known[np.argsort(-np.abs(size[known]), kind="stable")]
+    squares = size[order] ** 2
+    for k in range(1, min(max(1, len(order) // MOST), len(order) - 1) + 1):
+        rest = squares[k:].mean()
+        chance = f_p_value(squares[k - 1] / rest, coordinates, coordinates * (len(order) - k)) if rest else 0.0
+        if chance * (len(order) - k + 1) < LEVEL and ratio[order[k - 1]] > ODD_RATIO:
+            found[order[:k]] = True
+    return found

@@ -1,0 +1,62 @@
+"""Errors at check points with their joint covariance: they go together along a strip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.distributions import gamma_cdf
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from photostrip.arrays import Floats, Numbers
+
+
+@dataclass(frozen=True, eq=False)
+class CheckErrors:
+    """What check coordinates show of an adjustment, and what they may show."""
+
+    ids: tuple[str, ...]  # the check points
+    point: Numbers  # (w,): check point of each coordinate
+    difference: Floats  # (w,): adjusted minus given, metres
+    covariance: Floats  # (w, w): of the differences, the errors of the given coordinates included, metres^2
+
+    def without(self, ids: Collection[str]) -> CheckErrors | None:
+        """Leave points out; None when none is left."""
+        rows = np.flatnonzero([self.ids[point] not in ids for point in self.point])
+        if not len(rows):
+            return None
+        return CheckErrors(self.ids, self.point[rows], self.difference[rows], self.covariance[np.ix_(rows, rows)])
+
+    @property
+    def points(self) -> int:
+        """Number of points that are compared."""
+        return len(np.unique(self.point))
+
+    @property
+    def coordinates(self) -> int:
+        """Number of coordinates, which is the expectation of the sum of squares."""
+        return len(self.difference)
+
+    @property
+    def squares(self) -> float:
+        """e^T C^-1 e with the covariance C of the differences e."""
+        return float(self.difference @ np.linalg.solve(self.covariance, self.difference))
+
+    @property
+    def probability(self) -> float:
+        """Probability of a larger sum of squares by chance."""
+        return 1 - gamma_cdf(self.squares / 2, self.coordinates / 2)
+
+    @property
+    def independent(self) -> float:
+        """Number of independent coordinates whose squares would scatter as much in the mean as these do.
+
+        The mean of n squares of standard normal variables with correlations r has the variance 2 sum(r^2) / n^2.
+        """
+        sigma = np.sqrt(np.diag(self.covariance))
+        correlation = self.covariance / sigma / sigma[:, None]
+        return self.coordinates**2 / float((correlation**2).sum())
