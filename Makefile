@@ -19,8 +19,13 @@ demo: $(VENV)/photostrip.installed ## run the main job on every sample project a
 	    $(BIN)/photostrip run "$$project" -o "build/demo/$$name" || exit $$?; \
 	done
 
-test: lint types ## lint, format, types and all tests
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+# The types are checked while tests wait for processes; what is wrong with them is told at the end.
+test: lint ## lint, format, types and all tests
+	@mkdir -p build
+	@$(BIN)/mypy $(SOURCES) >build/types.txt 2>&1 & types=$$!; \
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal; tests=$$?; \
+	wait $$types; types=$$?; cat build/types.txt; \
+	exit $$((tests ? tests : types))
 
 check: lint types ## the fast gates: no slow tests, few random examples
 	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -q -m "not slow"

@@ -19,11 +19,6 @@ if TYPE_CHECKING:
 WORK = "tests.batch.faulty:evaluate"
 
 
-def _hang() -> None:
-    while True:
-        pass
-
-
 def _eat() -> None:
     hoard = []
     while True:
@@ -34,8 +29,7 @@ FAULTS: dict[str, Callable[[], object]] = {
     "segfault": lambda: os.kill(os.getpid(), signal.SIGSEGV),
     "exit": lambda: os._exit(5),
     "raise": lambda: sys.exit(0),
-    "hang": _hang,
-    "sleep": lambda: time.sleep(1000),
+    "hang": lambda: time.sleep(1000),
     "memory": _eat,
     "grow": lambda: _kept.append(bytearray(140_000_000)),
 }

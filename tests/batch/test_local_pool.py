@@ -38,7 +38,7 @@ FAULTS = {
     "segfault": ("crashed", "died, 2 times in a row: killed by SIGSEGV"),
     "exit": ("crashed", "died, 2 times in a row: it ended with exit code 5"),
     "raise": ("crashed", "died, 2 times in a row: it ended with exit code 0"),
-    "hang": ("timeout", "took longer than 8 s"),
+    "hang": ("timeout", "took longer than 4 s"),
     "memory": ("memory", "needs more memory than a worker may have"),
     "unlucky": ("good", ""),
 }
@@ -48,7 +48,7 @@ FAULTS = {
 def test_every_fault_takes_only_its_own_project_along(tmp_path: Path) -> None:
     names = ["good1", *(name for fault in FAULTS for name in (fault, f"after-{fault}"))]
     tasks = tasks_of(tmp_path, names)
-    with LocalPool(2, Limits(seconds=8.0, megabytes=500.0), WORK) as pool:
+    with LocalPool(2, Limits(seconds=4.0, megabytes=500.0), WORK) as pool:
         answers = list(pool.answers(iter(tasks), never))
         assert len({worker.process.pid for worker in pool.workers}) == len(pool.workers) <= 2
     assert sorted(answer.number for answer in answers) == list(range(len(tasks)))  # one for each, none twice
@@ -75,7 +75,7 @@ def test_a_worker_that_has_grown_is_replaced(tmp_path: Path) -> None:
 
 
 def test_workers_are_gone_when_the_pool_is(tmp_path: Path) -> None:
-    (task,) = tasks_of(tmp_path, ["sleep"])
+    (task,) = tasks_of(tmp_path, ["hang"])
     stop: list[bool] = []
     with LocalPool(1, work=WORK, begun=lambda _: stop.append(True)) as pool:
         assert list(pool.answers(iter([task]), lambda: bool(stop))) == []
