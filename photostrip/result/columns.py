@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from photostrip.result.numbers import Document
 
+AZIMUTH_DECIMALS = {"deg": 1, "gon": 1, "rad": 3}
 MATRIX = [f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)]
 
 
@@ -32,12 +33,6 @@ def columns(block: str, names: str) -> list[Column]:
     return [Column(name, key, found) for name, key in pairs if isinstance(found := table[key], Quantity)]
 
 
-points_csv = partial(
-    columns,
-    "points",
-    "point=id role x y z sigma_x sigma_y sigma_z rays models image_rms_um cov_xy cov_xz cov_yz "
-    "ellipse_a ellipse_b ellipse_azimuth_deg",
-)
 rejected_csv = partial(
     columns,
     "rejected",
@@ -49,6 +44,15 @@ links_csv = partial(columns, "link_residuals", "before after point=points vx_um 
 reliability_csv = partial(
     columns, "residuals", "photo point=points redundancy_x redundancy_y test_x test_y detectable_x_um detectable_y_um"
 )
+
+
+def points_csv(unit: str) -> list[Column]:
+    """List the columns of points.csv for a unit of angles; the keys are those of flat records."""
+    names = "point=id role x y z sigma_x sigma_y sigma_z rays models image_rms_um cov_xy cov_xz cov_yz"
+    (azimuth,) = columns("points", "ellipse_azimuth_deg")
+    name, decimals = f"ellipse_azimuth_{unit}", AZIMUTH_DECIMALS[unit]
+    azimuth = Column(name, name, replace(azimuth.quantity, unit=unit, decimals=decimals))
+    return [*columns("points", f"{names} ellipse_a ellipse_b"), azimuth]
 
 
 def photos_csv(angles: Document) -> list[Column]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
-DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES}
+DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES, "gon": DEGREES, "rad": RADIANS}
 
 
 def rounded_as(entry: Quantity, value: ArrayLike, unit: str = "") -> Plain:

@@ -110,11 +110,12 @@ def test_the_manual_names_every_key() -> None:
 
 def test_columns_of_tables_have_a_unit_and_a_meaning() -> None:
     angles = {"system": "omega-phi-kappa", "unit": "gon"}
-    for columns in (points_csv(), photos_csv(angles), rejected_csv(), reliability_csv()):
+    for columns in (points_csv("gon"), photos_csv(angles), rejected_csv(), reliability_csv()):
         assert all(column.quantity.meaning for column in columns)
     by_name = {column.name: column.quantity for column in photos_csv(angles)}
     assert by_name["omega_gon"] == replace(by_name["sigma_omega_gon"], meaning=by_name["omega_gon"].meaning)
     assert by_name["omega_gon"].unit == "gon"
+    assert (points_csv("gon")[-1].name, points_csv("gon")[-1].quantity.unit) == ("ellipse_azimuth_gon", "gon")
 
 
 def test_ratios_of_given_points_have_two_decimals() -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.formats.output.result_json import to_json
 from photostrip.result import columns as tables
+from photostrip.result.numbers import PER_RADIAN
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -27,8 +28,9 @@ def result_files(document: Document, resolved: str = "") -> dict[str, str]:
     """
     frame, photos = document["frame"], document["photos"]
     angles = photos[0]["angles"] if photos else {"system": "alpha-omega-kappa", "unit": "deg"}
+    unit = angles["unit"]
     files = {
-        "points.csv": _table(tables.in_frame(tables.points_csv(), frame), document["points"]),
+        "points.csv": _table(tables.in_frame(tables.points_csv(unit), frame), _flat_points(document["points"], unit)),
         "photos.csv": _table(tables.in_frame(tables.photos_csv(angles), frame), map(_flat_photo, photos)),
         "residuals.csv": _grouped(tables.residuals_csv(), document["residuals"]),
         "parallaxes.csv": _grouped(tables.parallaxes_csv(), document["parallaxes"]),
@@ -46,6 +48,15 @@ def result_files(document: Document, resolved: str = "") -> dict[str, str]:
 def rejected_csv(document: Document) -> str:
     """Return rejected.csv: measurements that were taken out, and why."""
     return _table(tables.rejected_csv(), document["rejected"])
+
+
+def _flat_points(points: Iterable[Document], unit: str) -> Iterable[Document]:
+    """Return the points with the azimuths of their ellipses in the unit of the output."""
+    if unit == "deg":
+        return points
+    key, per_degree = f"ellipse_azimuth_{unit}", PER_RADIAN[unit] / PER_RADIAN["deg"]
+    known = ((point, point["ellipse_azimuth_deg"]) for point in points)
+    return ({**point, key: None if azimuth is None else azimuth * per_degree} for point, azimuth in known)
 
 
 def _flat_photo(photo: Document) -> Document:

@@ -98,6 +98,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         sigma = {"image_sigma": sigma_of(project, "observations", tables, inputs.observations.sigma)}
     document: Document = {
         "name": inputs.name,
+        "angle_unit": project.settings.angle_unit,
         "counts": _counts(project),
         **sigma,
         "frames": frames,

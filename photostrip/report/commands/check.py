@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.report.page.angles import UNITS
 from photostrip.report.page.numbers import counted, listed, short
 from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+
+    from photostrip.report.page.angles import AngleUnit
 
 CONTROL_SHOWN = 24  # rows of the table of control; --verbose prints all
 IDS_SHOWN = 8
@@ -19,7 +22,7 @@ def check_sections(document: Document, *, everything: bool = False) -> tuple[Sec
     """Return the sections for one project that could be read, from what was decoded."""
     return (
         _contents(document),
-        _frames(document["frames"]),
+        _frames(document["frames"], UNITS[document["angle_unit"]]),
         _sigmas(document["control"], everything=everything),
         _rows(document["rows"], everything=everything),
     )
@@ -67,17 +70,17 @@ def _image_sigma(sigma: Document) -> str:
     return f"{size}; {', '.join(parts)}"
 
 
-def _frames(frames: Sequence[Document]) -> Section:
+def _frames(frames: Sequence[Document], unit: AngleUnit) -> Section:
     parts: list[Words | Facts] = []
     for frame in frames:
         name = frame["file"] or "output"
         also = " (also of the results)" if frame["is_output"] and frame["file"] else ""
         parts.append(Words(f"{name}{also}: {frame['frame']}", "head"))
-        parts.append(Facts(tuple(_decoded(frame))))
+        parts.append(Facts(tuple(_decoded(frame, unit))))
     return Section("Ground frames, decoded at one point", tuple(part for part in parts if part != Facts(())))
 
 
-def _decoded(frame: Document) -> Iterator[tuple[str, str]]:
+def _decoded(frame: Document, unit: AngleUnit) -> Iterator[tuple[str, str]]:
     """Return the facts of one frame: a point as given, as decoded, and back."""
     if "point" not in frame:
         return
@@ -96,9 +99,9 @@ def _decoded(frame: Document) -> Iterator[tuple[str, str]]:
         )
     yield "  and back", f"{frame['back_mm']:.6f} mm from what is given"
     if "convergence_deg" in frame:
-        low, high = (f"{value:+.4f}" for value in frame["convergence_deg"])
+        low, high = (f"{value * unit.per_degree:+.{4 + unit.more}f}" for value in frame["convergence_deg"])
         size = low if low == high else f"{low} to {high}"
-        yield "  grid convergence", f"{size} deg (grid north from true north, clockwise)"
+        yield "  grid convergence", f"{size} {unit.name} (grid north from true north, clockwise)"
     if frame["kind"] != "local" and frame["datum_accuracy"] != 0.0:
         accuracy = frame["datum_accuracy"]
         yield "  datum shift", "accuracy not known" if accuracy is None else f"accuracy {accuracy:g} m"

@@ -14,6 +14,8 @@ from photostrip.report.page.parts import Column, Table
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from photostrip.report.page.angles import AngleUnit
+
     Form = Callable[[float], str]
     Row = Any  # of a document: a mapping, or whatever the functions of the columns know to read
     Value = str | Callable[[Row], Any]  # key of a row, with dots where it lies deeper (``discrepancy.up``), or function
@@ -38,6 +40,12 @@ def number(name: str, value: Value, form: int | Callable[[Any], str] = str, unit
     if isinstance(form, int):
         return Shown(Column(name, unit, rank=rank), lambda row: fixed(read(row), form))
     return Shown(Column(name, unit, rank=rank), lambda row: form(read(row)))
+
+
+def angle(name: str, value: Value, decimals: int, unit: AngleUnit, *, rank: int = 0) -> Shown:
+    """Return a column of angles that the document has in degrees."""
+    read = _reader(value)
+    return Shown(Column(name, unit.name, rank=rank), lambda row: unit.text(read(row), decimals))
 
 
 def tabulated(

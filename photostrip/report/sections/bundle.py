@@ -5,12 +5,15 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+from photostrip.report.page.angles import angle_unit
 from photostrip.report.page.numbers import counted, fixed, power, short, unit
 from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from photostrip.report.page.angles import AngleUnit
 
 NAMES = {"image": "image coordinates", "control": "control", "position": "camera positions", "attitude": "attitudes"}
 CORRELATIONS_SHOWN = 12
@@ -22,7 +25,7 @@ def bundle_sections(document: Document) -> list[Section]:
     block = document.get("bundle")
     if block is None:
         return []
-    found = [_adjustment(block), _reliability(block)]
+    found = [_adjustment(block, angle_unit(document)), _reliability(block)]
     if block["variance_components"]:
         found.append(_components(block["variance_components"]))
     if block["calibration"] or block["corrections"]:
@@ -30,7 +33,7 @@ def bundle_sections(document: Document) -> list[Section]:
     return found
 
 
-def _adjustment(block: Document) -> Section:
+def _adjustment(block: Document, angles: AngleUnit) -> Section:
     test, screening, unknowns = block["sigma0_test"], block["screening"], block["unknowns"]
     observed = ", ".join(f"{number} of {NAMES[kind]}" for kind, number in block["observations"].items())
     parts = f"{sum(unknowns.values())}: {unknowns['photos']} of photos, {unknowns['points']} of points"
@@ -49,7 +52,7 @@ def _adjustment(block: Document) -> Section:
         number("length", "length", partial(short, digits=3)),
         number("damping", "damping", partial(short, digits=2)),
         number("largest shift", "shift", partial(power, digits=1), "m"),
-        number("turn", "turn_deg", partial(power, digits=1), "deg"),
+        number("turn", lambda step: power(angles.of(step["turn_deg"]), digits=1), unit=angles.name),
     )
     steps = [{"count": count, **step} for count, step in enumerate(block["convergence"], 1)]
     note = "of the last adjustment, from the one before it; length: of the step, in standard deviations"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from photostrip.report.page.angles import angle_unit
 from photostrip.report.page.numbers import counted, joined, micrometres, percent, ratio
 from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
@@ -119,7 +120,7 @@ def measured(document: Document) -> tuple[tuple[str, str], ...]:
 
 def deformation_section(document: Document) -> Section:
     """Twist and bending of the models that have the height control for it."""
-    rows = document["deformations"]
+    rows, unit = document["deformations"], angle_unit(document)
     bent = sum(row["significant"] for row in rows)
     verdict = f"{bent} of them deformed" if bent else "none of them deformed"
     text = Words(
@@ -135,8 +136,8 @@ def deformation_section(document: Document) -> Section:
         number("bending", "bending.at_corner_m", 3, "at a corner, m"),
         number("t", "bending.t", 1),
         number("limit of t", "t_limit", 1),
-        number("Δω2", "omega2_arcsec", 1, "″", rank=2),
-        number("Δα2 – Δα1", "alpha2_minus_alpha1_arcsec", 1, "″", rank=2),
+        number("Δω2", lambda row: unit.of_seconds(row["omega2_arcsec"]), 1, unit.small, rank=2),
+        number("Δα2 – Δα1", lambda row: unit.of_seconds(row["alpha2_minus_alpha1_arcsec"]), 1, unit.small, rank=2),
         words("strip", "strip", rank=3),
     )
     return Section("Deformation of models", (text, tabulated(rows, columns)))

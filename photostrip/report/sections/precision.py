@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.report.page.angles import angle_unit
 from photostrip.report.page.numbers import counted, fixed, metres, micrometres, ratio
 from photostrip.report.page.parts import Document, Facts, Section, Table, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.tables import angle, number, tabulated, words
 from photostrip.report.sections.strip import ALL_SHOWN, elsewhere
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def _worst(document: Document) -> Table:
         *(number(f"σ {axis}", f"sigma_{key}", 3, "m") for key, axis in zip("xyz", axes, strict=True)),
         number("ellipse a", "ellipse_a", 3, "m"),
         number("b", "ellipse_b", 3, "m"),
-        number("azimuth", "ellipse_azimuth_deg", 0, "deg", rank=1),
+        angle("azimuth", "ellipse_azimuth_deg", 0, angle_unit(document), rank=1),
         number("photos", "rays", rank=2),
         words("role", "role", rank=3),
     )

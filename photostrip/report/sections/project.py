@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.report.page.angles import angle_unit
 from photostrip.report.page.numbers import counted, fixed, metres, micrometres
 from photostrip.report.page.parts import Document, Facts, Section
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.tables import angle, number, tabulated, words
 from photostrip.report.sections.models import measured, of_models, project_rows, scale_word
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from photostrip.report.page.angles import AngleUnit
+    from photostrip.report.page.tables import Shown
 
 
 def project_section(document: Document) -> Section:
@@ -98,7 +102,7 @@ def counts_section(document: Document) -> Section:
     """How much there is of everything."""
     facts = Facts(tuple(counts_rows(document)))
     strips = document["strips"]
-    return Section("Counts", (facts, tabulated(strips, STRIPS)) if len(strips) > 1 else (facts,))
+    return Section("Counts", (facts, tabulated(strips, _strips(angle_unit(document)))) if len(strips) > 1 else (facts,))
 
 
 def counts_rows(document: Document) -> Iterator[tuple[str, str]]:
@@ -117,7 +121,7 @@ def counts_rows(document: Document) -> Iterator[tuple[str, str]]:
         yield "rejected", _rejections(counts)
     yield "without coordinates", counted(counts["not_determined"], "point")
     if len(strips) == 1:
-        yield f"{scale_word(document)} scale", _scale(strips[0])
+        yield f"{scale_word(document)} scale", _scale(strips[0], angle_unit(document))
     elif not strips:  # single photos, which form none
         summary = document["summary"]
         scale = f"1:{summary['photo_scale']:.0f}, flying height {fixed(summary['flying_height'], 0)} m above ground"
@@ -132,21 +136,22 @@ def _rejections(counts: Document) -> str:
     return f"{text}, {counted(points, 'point')} with rays that contradict each other" if points else text
 
 
-def _scale(strip: Document) -> str:
+def _scale(strip: Document, unit: AngleUnit) -> str:
     return (
         f"1:{strip['photo_scale'] or strip['model_scale']:.0f}, flying height {fixed(strip['flying_height'], 0)} m "
-        f"above ground, base {fixed(strip['base'], 0)} m, azimuth {strip['azimuth_deg']:.1f} deg"
+        f"above ground, base {fixed(strip['base'], 0)} m, azimuth {unit.text(strip['azimuth_deg'], 1)} {unit.name}"
     )
 
 
-STRIPS = (
-    words("strip", "id"),
-    number("photos", "photos"),
-    number("points", "points"),
-    number("scale 1:", lambda strip: f"{strip['photo_scale'] or strip['model_scale']:.0f}"),
-    number("height", "flying_height", 0, "m"),
-    number("base", "base", 0, "m"),
-    number("azimuth", "azimuth_deg", lambda angle: f"{angle:.1f}", "deg"),
-    number("σ0", "sigma0_um", 1, "µm"),
-    number("image rms", "image_rms_um", 1, "µm", rank=1),
-)
+def _strips(unit: AngleUnit) -> tuple[Shown, ...]:
+    return (
+        words("strip", "id"),
+        number("photos", "photos"),
+        number("points", "points"),
+        number("scale 1:", lambda strip: f"{strip['photo_scale'] or strip['model_scale']:.0f}"),
+        number("height", "flying_height", 0, "m"),
+        number("base", "base", 0, "m"),
+        angle("azimuth", "azimuth_deg", 1, unit),
+        number("σ0", "sigma0_um", 1, "µm"),
+        number("image rms", "image_rms_um", 1, "µm", rank=1),
+    )

@@ -6,12 +6,16 @@ import re
 from functools import partial
 from typing import TYPE_CHECKING
 
+from photostrip.report.page.angles import angle_unit
 from photostrip.report.page.numbers import LEAST_PROBABILITY, counted, fixed, metres, micrometres, percent, power, short
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.tables import angle, number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from photostrip.report.page.angles import AngleUnit
+    from photostrip.report.page.tables import Shown
 
 ALL_SHOWN = 24  # rows up to which a table is printed whole
 HIGH_LEVERAGE = 0.7  # share of a control point in the polynomial at its own place
@@ -65,8 +69,9 @@ def relative_section(document: Document, *, everything: bool) -> Section:
     )
     gone = f"{rejected} of {counted(total, 'point')} in pairs, {percent(rejected, total)}"
     facts = Facts((("σ0", sigma0), ("largest y parallax", largest), ("rejected", gone)))
-    pairs = tabulated(shown, PAIRS, note=note or "q: y parallax of the points used")
-    return Section("Relative orientation", (facts, pairs, tabulated(shown, ELEMENTS_OF_PAIRS, note=note)))
+    unit = angle_unit(document)
+    pairs = tabulated(shown, _pairs(unit), note=note or "q: y parallax of the points used")
+    return Section("Relative orientation", (facts, pairs, tabulated(shown, _elements(unit), note=note)))
 
 
 def photos_of(row: Document) -> str:
@@ -74,31 +79,33 @@ def photos_of(row: Document) -> str:
     return f"{row['left']} – {row['right']}"
 
 
-PAIRS = (
-    words("photos", photos_of),
-    number("points", "points_used"),
-    number("rej.", "points_rejected"),
-    number("σ0", "sigma0_um", 1, "µm"),
-    number("rms q", "rms_parallax_um", 1, "µm"),
-    number("max q", "max_parallax_um", 1, "µm"),
-    words("at point", "max_parallax_point"),
-    number("condition", "condition", partial(short, digits=3), rank=2),
-    number("base", "base", 2, "m", rank=1),
-    number("direction", "base_direction_deg", 3, "deg", rank=3),
-    number("inclin.", "base_inclination_deg", 3, "deg", rank=3),
-    words("strip", "strip", rank=4),
-)
+def _pairs(unit: AngleUnit) -> tuple[Shown, ...]:
+    return (
+        words("photos", photos_of),
+        number("points", "points_used"),
+        number("rej.", "points_rejected"),
+        number("σ0", "sigma0_um", 1, "µm"),
+        number("rms q", "rms_parallax_um", 1, "µm"),
+        number("max q", "max_parallax_um", 1, "µm"),
+        words("at point", "max_parallax_point"),
+        number("condition", "condition", partial(short, digits=3), rank=2),
+        number("base", "base", 2, "m", rank=1),
+        angle("direction", "base_direction_deg", 3, unit, rank=3),
+        angle("inclin.", "base_inclination_deg", 3, unit, rank=3),
+        words("strip", "strip", rank=4),
+    )
 
 
 def _largest_sigma(model: Document) -> float | None:
     return max((model["sigmas"][key] for key, _ in ELEMENTS if model["sigmas"][key] is not None), default=None)
 
 
-ELEMENTS_OF_PAIRS = (
-    words("photos", photos_of),
-    *(number(name, f"elements.{key}", 4, "deg") for key, name in ELEMENTS),
-    number("largest σ", _largest_sigma, 4, "deg", rank=1),
-)
+def _elements(unit: AngleUnit) -> tuple[Shown, ...]:
+    return (
+        words("photos", photos_of),
+        *(angle(name, f"elements.{key}", 4, unit) for key, name in ELEMENTS),
+        angle("largest σ", _largest_sigma, 4, unit, rank=1),
+    )
 
 
 def junction_section(document: Document, *, everything: bool) -> Section:
@@ -151,7 +158,7 @@ def absolute_section(document: Document) -> Section:
         number("scale", "scale", 3, "m per mm", rank=3)
         if "links" in document
         else number("base of scale", "scale", 3, "m", rank=3),
-        *(number(name, _angle(key), 4, "deg", rank=2) for key, name in ANGLES),
+        *(angle(name, _angle(key), 4, angle_unit(document), rank=2) for key, name in ANGLES),
     )
     note = (
         "east, north, up: rms misclosures of the similarity; σ0: their ratio to what the control and one model let "

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.result.numbers import MICROMETRES, Document, rms
+from photostrip.result.numbers import MICROMETRES, PER_RADIAN, Document, rms
 from photostrip.result.quantities import record
 from photostrip.triangulation.bundle.quality import reliability
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from photostrip.arrays import Floats
     from photostrip.pipeline import Result
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.settings import BundleSettings
 
+OBSERVED = (reliability.IMAGE, reliability.CONTROL, reliability.POSITION, reliability.ATTITUDE)
 SHOWN = 10  # observations named as the weakest and as the worst
 RELIABILITY = ("redundancy_x", "redundancy_y", "test_x", "test_y", "detectable_x_um", "detectable_y_um")
 
@@ -33,12 +34,14 @@ class Kind(NamedTuple):
     factor: float  # of the unit in the unit of the adjustment
 
 
-KINDS = {
-    reliability.IMAGE: Kind(("x", "y"), "um", MICROMETRES),
-    reliability.CONTROL: Kind(GROUND_AXES, "m", 1.0),
-    reliability.POSITION: Kind(GROUND_AXES, "m", 1.0),
-    reliability.ATTITUDE: Kind(("1", "2", "3"), "deg", 180 / np.pi),
-}
+def kinds(angle_unit: str) -> dict[str, Kind]:
+    """Return how observations are written, with angles in the unit of the output."""
+    return {
+        reliability.IMAGE: Kind(("x", "y"), "um", MICROMETRES),
+        reliability.CONTROL: Kind(GROUND_AXES, "m", 1.0),
+        reliability.POSITION: Kind(GROUND_AXES, "m", 1.0),
+        reliability.ATTITUDE: Kind(("1", "2", "3"), angle_unit, PER_RADIAN[angle_unit]),
+    }
 
 
 def bundle_of(result: Result) -> Document:
@@ -49,6 +52,7 @@ def bundle_of(result: Result) -> Document:
     screened, settings = found.screened, result.settings.bundle
     problem, solution = screened.problem, screened.solution
     shift = reliability.noncentrality(screened.limit.alpha, settings.power)
+    written = kinds(result.settings.angle_unit)
     block: Document = {
         "free_network": solution.free,
         "sigma0": solution.sigma0,
@@ -76,15 +80,15 @@ def bundle_of(result: Result) -> Document:
         "reliability": {
             "power": settings.power,
             "noncentrality": shift,
-            "groups": [_group(group, shift) for group in found.groups],
-            "weakest": _foremost(found, shift, [-group.redundancy for group in found.groups]),
-            "worst": _foremost(found, shift, [np.abs(group.standardised) for group in found.groups]),
+            "groups": [_group(group, shift, written[group.kind]) for group in found.groups],
+            "weakest": _foremost(found, shift, written, [-group.redundancy for group in found.groups]),
+            "worst": _foremost(found, shift, written, [np.abs(group.standardised) for group in found.groups]),
         },
         "variance_components": _components(found),
         "calibration": _calibration(found),
         "correlations": [asdict(each) for each in found.correlations],
         "given": [
-            _observed(found, group, (row, axis), shift)
+            _observed(found, group, (row, axis), shift, written[group.kind])
             for group in found.groups
             if group.kind != reliability.IMAGE
             for row, axis in np.argwhere(np.isfinite(group.sigma)).tolist()
@@ -115,7 +119,7 @@ def _screening(found: Bundle, settings: BundleSettings) -> Document:
         "test": settings.test,
         "alpha": screened.limit.alpha,
         "limit": screened.limit.value,
-        "rejected": {kind: sum(each.kind == kind for each in out) for kind in KINDS},
+        "rejected": {kind: sum(each.kind == kind for each in out) for kind in OBSERVED},
         "readmitted": len(screened.rejections) - len(out),
     }
 
@@ -180,9 +184,9 @@ def image_fit(found: Bundle) -> Document:
     }
 
 
-def _group(group: reliability.Group, shift: float) -> Document:
+def _group(group: reliability.Group, shift: float, kind: Kind) -> Document:
     """Sum up the redundancy of one kind of observations; effects of errors of those that others check."""
-    kind, given = KINDS[group.kind], np.isfinite(group.sigma)
+    given = np.isfinite(group.sigma)
     share, controlled = group.redundancy[given], group.redundancy[given] >= reliability.UNCONTROLLED
     nothing = np.array([np.nan])
     detectable = group.detectable(shift)[given][controlled] * kind.factor if controlled.any() else nothing
@@ -226,7 +230,7 @@ def with_reliability(result: Result, residuals: list[Document]) -> list[Document
     return rows
 
 
-def _foremost(found: Bundle, shift: float, values: list[Floats]) -> list[Document]:
+def _foremost(found: Bundle, shift: float, written: Mapping[str, Kind], values: list[Floats]) -> list[Document]:
     """Return the observations with the largest of the values that are given for each group."""
     chosen = []
     for number, (group, value) in enumerate(zip(found.groups, values, strict=True)):
@@ -237,13 +241,12 @@ def _foremost(found: Bundle, shift: float, values: list[Floats]) -> list[Documen
     rows = []
     for _, number, at in sorted(chosen)[:SHOWN]:
         group = found.groups[number]
-        rows.append(_observed(found, group, divmod(at, group.sigma.shape[1]), shift))
+        rows.append(_observed(found, group, divmod(at, group.sigma.shape[1]), shift, written[group.kind]))
     return rows
 
 
-def _observed(found: Bundle, group: reliability.Group, at: tuple[int, int], shift: float) -> Document:
+def _observed(found: Bundle, group: reliability.Group, at: tuple[int, int], shift: float, kind: Kind) -> Document:
     """Return everything about one observed coordinate; errors that would be found where others check it."""
-    kind = KINDS[group.kind]
     photo, point = names_of_observation(found.screened.problem, group.kind, at[0])
     checked = group.redundancy[at] >= reliability.UNCONTROLLED
     external = group.external(shift)[at] if checked else np.nan

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.result.adjustment.bundle import KINDS, names_of_observation
+from photostrip.result.adjustment.bundle import Kind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import AXES, names_of
 from photostrip.result.numbers import MICROMETRES, Document, natural, rounded
@@ -66,8 +66,9 @@ def rejected_of(result: Result) -> list[Document]:
         found += [_from_control(strip, wrong) for wrong in strip.wrong_control]
     if result.bundle is None:
         return found
+    written = kinds(result.settings.angle_unit)
     return _after_bundle(result.bundle, found) + [
-        _from_bundle(result.bundle, each) for each in result.bundle.screened.rejections
+        _from_bundle(result.bundle, each, written[each.kind]) for each in result.bundle.screened.rejections
     ]
 
 
@@ -273,8 +274,7 @@ def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
     return rows
 
 
-def _from_bundle(found: Bundle, each: Rejection) -> Document:
-    kind = KINDS[each.kind]
+def _from_bundle(found: Bundle, each: Rejection, kind: Kind) -> Document:
     photo, point = names_of_observation(found.block.problem, each.kind, each.row)
     size = rounded(each.worst * kind.factor, DECIMALS_BY_UNIT[kind.unit])
     if each.readmitted:

@@ -1,0 +1,53 @@
+"""Angles as they are printed: in the unit that the project asks for.
+
+The keys of a result name their units, most of them degrees or seconds of arc; tables show the unit of the angles of the
+photos.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from photostrip.report.page.numbers import fixed
+
+if TYPE_CHECKING:
+    from photostrip.report.page.numbers import Number
+    from photostrip.report.page.parts import Document
+
+
+class AngleUnit(NamedTuple):
+    """A unit of angles with one for small angles, and how they are written."""
+
+    name: str
+    per_degree: float
+    more: int  # decimals more than degrees have
+    small: str  # unit of small angles
+    per_second: float  # its number in a second of arc
+
+    def text(self, degrees: Number, decimals: int) -> str:
+        """Return an angle without its unit; ``decimals`` are those of degrees."""
+        return fixed(self.of(degrees), decimals + self.more)
+
+    def of(self, degrees: Number) -> Number:
+        """Return an angle in this unit."""
+        return None if degrees is None else degrees * self.per_degree
+
+    def of_seconds(self, seconds: Number) -> Number:
+        """Return a small angle in the unit of small angles."""
+        return None if seconds is None else seconds * self.per_second
+
+
+UNITS = {
+    unit.name: unit
+    for unit in (
+        AngleUnit("deg", 1.0, 0, "″", 1.0),
+        AngleUnit("gon", 10 / 9, 0, "mgon", 10 / 32.4),
+        AngleUnit("rad", 0.017453292519943295, 2, "µrad", 4.84813681109536),
+    )
+}
+
+
+def angle_unit(document: Document) -> AngleUnit:
+    """Return the unit of the angles of the photos of a result."""
+    photos = document["photos"]
+    return UNITS[photos[0]["angles"]["unit"] if photos else "deg"]
