@@ -60,7 +60,7 @@ def test_ids_that_two_strips_share_by_mistake_are_named(method: str) -> None:
     found = [each for each in result.findings if each.code == "P301"]
     assert {name for each in found for name in each.points} == names
     assert {each.strips for each in found} == {("A", "B")}
-    assert all(45.0 < float(each.evidence["distance_m"]) < 60.0 for each in found)
+    assert all(40.0 < float(each.evidence["distance_m"]) < 60.0 for each in found)
 
 
 @pytest.mark.parametrize("size", [0.0, 150.0, 400.0])
