@@ -449,6 +449,14 @@ def feet(case: Case) -> Planted | None:
     return with_control(case, enu=case.inputs.control.enu / foot), NOBODY
 
 
+def lost_digits(case: Case) -> Planted | None:
+    """Give projected coordinates in kilometres, or without their last digits."""
+    if kind_of(case) != "EPSG":
+        return None
+    factor = float(case.rng.choice([0.1, 0.01, 0.001]))
+    return with_control(case, enu=case.inputs.control.enu * factor), NOBODY
+
+
 def in_two_lists(case: Case, change: Callable[[Floats], Floats]) -> Planted | None:
     """Put every third control point into a second list of the same frame, changed."""
     if kind_of(case) in {"geocentric", "geographic"} or not enough(case, 9):
@@ -760,6 +768,7 @@ MISTAKES = (
     Mistake("an axis of a local system backwards", left_handed, ("P401",)),
     Mistake("crs of another country", another_crs, ("P402",)),
     Mistake("control in feet (projected)", feet, ("P403",)),
+    Mistake("control times 0.1 to 0.001 (projected)", lost_digits, ("P402",)),
     Mistake("one of two lists in feet", list_in_feet, ("P403",)),
     Mistake("one of two lists in another frame", list_in_another_frame, ("P407",)),
     Mistake("heights of two kinds in two lists", heights_of_another_kind, ("P404",)),

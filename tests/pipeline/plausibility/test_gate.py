@@ -171,6 +171,15 @@ def test_control_of_another_country() -> None:
     assert finding.key == "control[0].crs"
 
 
+@pytest.mark.parametrize("factor", [0.1, 0.01, 0.001])
+@pytest.mark.parametrize("frame", ["utm", "south"])
+def test_control_in_kilometres_or_without_its_last_digits(frame: str, factor: float) -> None:
+    """North of the equator such numbers lie beside their zone, near its origin: runs were called good."""
+    (finding,) = told(with_control(inputs_of(simulation(frame)), lambda enu: enu * factor))
+    assert finding.code == "P402"
+    assert finding.evidence["factor"] == pytest.approx(1 / factor)
+
+
 def test_heights_in_feet_and_plan_in_metres() -> None:
     (finding,) = told(with_control(inputs_of(simulation("local")), lambda enu: enu * [1, 1, 1 / FOOT]))
     assert finding.code == "P405"

@@ -30,6 +30,7 @@ CIRCLE_DEG = 360.0
 MOST_OUTSIDE_SHARE = 0.5  # of the points: single ones are slips
 MOST_ROUND_TRIP = 1.0  # units of the frame between a point and where its geocentric coordinates lead back to
 MILLION = 1e6
+TENS = (10.0, 100.0, 1000.0)  # of coordinates with lost digits, or in kilometres
 
 
 class FramePlace(NamedTuple):
@@ -52,7 +53,8 @@ def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number:
         return FramePlace([], None, inside=True)
     level = np.column_stack([known[:, :2], np.zeros(len(known))])
     exchanged = level[:, [1, 0, 2]]
-    if _inside(frame, area, level):
+    tens = _tens(frame, area, level)
+    if _inside(frame, area, level) and not tens:
         return FramePlace([], None if _inside(frame, area, exchanged) else True, inside=True)
     key = f"control[{number}]"
     where = _where(frame, level, known)
@@ -63,6 +65,11 @@ def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number:
         "area_north_deg": area[3],
     }
     head = f"{key} {where}, and {frame.title} is made for {area[0]:g} to {area[2]:g} E, {area[1]:g} to {area[3]:g} N"
+    if tens:
+        message = f"{head}; multiplied by {tens:g} it would lie there"
+        fix = "give metres; was a digit lost, or are the coordinates in kilometres?"
+        evidence["factor"] = tens
+        return FramePlace([found("P402", message, fix, evidence, key=key)], sure=None, inside=False)
     if _inside(frame, area, exchanged):
         message = f"{head}; with east and north exchanged it would lie there"
         fix = "put `control.axes` into the order of the columns"
@@ -91,19 +98,28 @@ def _readings(level: Floats) -> Iterator[tuple[str, Floats, str, str]]:
         "with northings of the other sign it would lie there",
         "is the crs southern?",
     )
-    yield "P402", level * 1000.0, "read as kilometres it would lie there", "give metres"
     yield "P402", level / 1000.0, "read as millimetres it would lie there", "give metres"
 
 
-def _inside(frame: GroundFrame, area: Area, enu: Floats) -> bool:
-    """Whether most points lie in an area or beside it."""
+def _tens(frame: GroundFrame, area: Area, level: Floats) -> float:
+    """Power of ten that brings points from outside the area, or from beside it, into it; 0 where none does.
+
+    Near the origin of a map, where scaled numbers lie, some areas are not far.
+    """
+    if frame.kind != "projected" or _inside(frame, area, level, margin=0.0):
+        return 0.0
+    return next((each for each in TENS if _inside(frame, area, each * level, margin=0.0)), 0.0)
+
+
+def _inside(frame: GroundFrame, area: Area, enu: Floats, *, margin: float = 1.0) -> bool:
+    """Whether most points lie in an area or beside it, within a part of the usual margin."""
     degrees = _degrees(frame, enu)
     if degrees is None:
         return False
     west, south, east, north = area
     width = (east - west) % CIRCLE_DEG or CIRCLE_DEG
     beside, above = (
-        float(np.clip(part * size, *MARGIN_LIMITS_DEG))
+        margin * float(np.clip(part * size, *MARGIN_LIMITS_DEG))
         for part, size in zip(MARGIN_SHARES, (width, north - south), strict=True)
     )
     lon = (degrees[:, 0] - west + beside) % CIRCLE_DEG
