@@ -15,6 +15,7 @@ from photostrip.triangulation.image_coordinates.settings import ImageCorrectionS
 from photostrip.triangulation.independent_models.settings import LinkSettings
 from photostrip.triangulation.polynomial import correction as polynomial
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
+from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
@@ -38,6 +39,10 @@ class Strip:
     def positions(self, observations: PhotoPoints) -> Numbers:
         """Place in the strip of the photo of every image point; -1 for photos of other strips."""
         return locate(observations.photo_ids, self.photos)[observations.photo]
+
+    def oriented(self, centers: Floats, rotations: Floats) -> KnownPhotos:
+        """Its photos with their orientations."""
+        return KnownPhotos(centers, rotations, np.full(len(centers), self.camera.principal_distance))
 
     def median_sigma(self, observations: PhotoPoints) -> float:
         """Median standard deviation of the image coordinates of its photos, mm."""

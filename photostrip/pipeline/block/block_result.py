@@ -88,8 +88,8 @@ def _strip(
     shape = np.where(known[:, None], formed.xyz[at], np.nan)
     control_at = np.searchsorted(number, formed.point[strip.control_rows])
     at_rows = np.searchsorted(number, observations.point[rows])
-    focal = np.full(len(centers), strip.of_photos.strip.camera.principal_distance)
-    resection = with_residuals(observations.xy[rows], xyz[at_rows], position[rows], focal, centers, rotations)
+    oriented = strip.of_photos.strip.oriented(centers, rotations)
+    resection = with_residuals(observations.xy[rows], xyz[at_rows], position[rows], oriented)
     stages = replace(
         strip.of_photos,
         formed=replace(formed, point=number, xyz=shape, model_count=models),

@@ -23,7 +23,7 @@ from photostrip.triangulation.bundle.observations.problem import (
 )
 from photostrip.triangulation.bundle.quality.self_calibration import sigmas
 from photostrip.triangulation.bundle.selection import Selection
-from photostrip.triangulation.resection.collinearity import project
+from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -284,9 +284,8 @@ def _begin(
     free = ~paired[rows]
     focal = problem.cameras.focal[problem.cameras.of_photo]
     with np.errstate(invalid="ignore"):
-        computed = project(
-            problem.start.points[images.point], problem.start.centers, problem.start.rotations, images.photo, focal
-        )
+        photos = KnownPhotos(problem.start.centers, problem.start.rotations, focal)
+        computed = project(problem.start.points[images.point], photos, images.photo)
         miss = (np.abs(images.xy - computed) / images.sigma).max(axis=1)
     known = miss[np.isfinite(miss)]
     far = np.full(len(miss), max(LEAST_FAR, FAR * float(np.median(known)) if len(known) else 0.0))

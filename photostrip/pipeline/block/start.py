@@ -239,7 +239,7 @@ def _resected(xy: Floats, points: Floats, focal: float, begin: tuple[Floats, Flo
     """Resect one photo; not solved either where it would look away from its points."""
     one = np.zeros(len(xy), np.intp)
     with np.errstate(all="ignore"):  # a start far off sends the iteration anywhere
-        found = resect(xy, points, one, np.array([focal]), (begin[0][None], begin[1][None]))
+        found = resect(xy, points, one, KnownPhotos(begin[0][None], begin[1][None], np.array([focal])))
     center, rotation = found.centers[0], found.rotations[0]
     before = bool((((points - center) @ rotation)[:, 2] < 0).all())
     return _SingleStart(center, rotation, solved=bool(found.solved[0]) and before)

@@ -135,11 +135,8 @@ class FormedPhotos:
         if covariance is None:
             resection = self._resected(oriented, rays, points, xyz)
         else:
-            focal, xy = (
-                np.full(len(covariance.centers), strip.camera.principal_distance),
-                self.observations.xy[rays.rows],
-            )
-            resection = with_residuals(xy, xyz[points], rays.photo, focal, covariance.centers, covariance.rotations)
+            photos = strip.oriented(covariance.centers, covariance.rotations)
+            resection = with_residuals(self.observations.xy[rays.rows], xyz[points], rays.photo, photos)
         arm = xyz[points] - resection.centers[rays.photo]
         return StripResult(
             precision=oriented.precision,
@@ -213,9 +210,9 @@ class FormedPhotos:
         moved = adjusted[points] - similarity(formed.xyz[points])
         count = np.maximum(np.bincount(rays.photo, minlength=len(strip.photos)), 1)
         shift = [np.bincount(rays.photo, moved[:, axis], len(strip.photos)) / count for axis in range(3)]
-        start = similarity(formed.centers) + np.column_stack(shift), similarity.rotation @ formed.rotations
-        focal = np.full(len(strip.photos), strip.camera.principal_distance)
-        resection = resect(self.observations.xy[rays.rows], adjusted[points], rays.photo, focal, start)
+        centers = similarity(formed.centers) + np.column_stack(shift)
+        start = strip.oriented(centers, similarity.rotation @ formed.rotations)
+        resection = resect(self.observations.xy[rays.rows], adjusted[points], rays.photo, start)
         if not resection.solved.any():
             msg = (
                 f"strip {strip.id}: no photo can be oriented on its adjusted points: strip and control belong to two "

@@ -52,10 +52,9 @@ def _of_strip(result: Result, strip: StripResult, rank: Numbers) -> ImageResidua
     used = np.zeros(len(observations), bool)
     used[stages.rows] = True
     places = known[observations.point[rows]]
-    centers, rotations = stages.resection.centers, stages.resection.rotations
-    focal = np.full(len(strip.strip.photos), stages.strip.camera.principal_distance)
+    photos = stages.strip.oriented(stages.resection.centers, stages.resection.rotations)
     with np.errstate(invalid="ignore"):
-        residuals = observations.xy[rows] - project(places, centers, rotations, position[rows], focal)
+        residuals = observations.xy[rows] - project(places, photos, position[rows])
     return ImageResiduals(strip=stages.strip, rows=rows, photo=position[rows], residuals=residuals, used=used[rows])
 
 
@@ -72,9 +71,9 @@ def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
         rows = np.flatnonzero(observations.photo == observations.photo_ids.index(single.strip.photos[0]))
         rows = rows[np.argsort(rank[observations.point[rows]], kind="stable")]
         photo, places = np.zeros(len(rows), np.intp), known[observations.point[rows]]
-        focal = np.array([single.strip.camera.principal_distance])
+        photos = single.strip.oriented(single.center[None], single.rotation[None])
         with np.errstate(invalid="ignore"):
-            computed = project(places, single.center[None], single.rotation[None], photo, focal)
+            computed = project(places, photos, photo)
         found.append(
             ImageResiduals(
                 strip=single.strip, rows=rows, photo=photo, residuals=observations.xy[rows] - computed, used=used[rows]

@@ -13,7 +13,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import Similarity, collinearity
-from photostrip.triangulation.resection.collinearity import derivatives
+from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives
 from photostrip.triangulation.resection.resection import Resection, resect
 
 if TYPE_CHECKING:
@@ -51,11 +51,11 @@ def space_resection(xy: Floats, sigma: Floats, points: Floats, focal: float) -> 
     """
     center, rotation = approximate(xy, points, focal)
     number = np.zeros(len(xy), np.intp)
-    f = np.array([focal])
-    found: Resection = resect(xy, points, number, f, (center[None], rotation[None]))
+    start = KnownPhotos(center[None], rotation[None], np.array([focal]))
+    found: Resection = resect(xy, points, number, start)
     if not found.solved[0]:
         raise GeometryError("the space resection does not settle: the points are too few or too weak", code="resection")
-    by_photo, _ = derivatives(points, found.centers, found.rotations, number, f)
+    by_photo, _ = derivatives(points, KnownPhotos(found.centers, found.rotations, start.focal), number)
     design = (by_photo / sigma[:, :, None]).reshape(-1, 6)
     redundancy = 2 * len(xy) - 6
     squares = float(((found.residuals / sigma) ** 2).sum())

@@ -30,30 +30,23 @@ class PhotoPartials(NamedTuple):
     xy: Floats  # (2, m): image coordinates in mm
 
 
-def project(points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats) -> Floats:
-    """Ideal image coordinates (m, 2), relative to the principal point, of a point and a photo in each row.
-
-    rotations: (n, 3, 3), photo to the frame of the points and of the centres (n, 3).
-    photo: (m,), photo of each row.
-    focal: (n,), principal distances in mm.
-    """
-    ray = np.einsum("mi,mij->mj", points - centers[photo], rotations[photo])
-    return np.asarray(-focal[photo, None] * ray[:, :2] / ray[:, 2:], float)
+def project(points: Floats, photos: KnownPhotos, photo: Numbers) -> Floats:
+    """Ideal image coordinates (m, 2), relative to the principal point, of a point and a photo in each row."""
+    ray = np.einsum("mi,mij->mj", points - photos.centers[photo], photos.rotations[photo])
+    return np.asarray(-photos.focal[photo, None] * ray[:, :2] / ray[:, 2:], float)
 
 
-def derivatives(
-    points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats
-) -> tuple[Floats, Floats]:
+def derivatives(points: Floats, photos: KnownPhotos, photo: Numbers) -> tuple[Floats, Floats]:
     """Differentiate the image coordinates of rows, each of a point on a photo.
 
     Returns by_photo: (n, 2, 6), by the centre (mm/m) and by a small rotation of the photo about the axes of the frame
         (mm/rad).
     Returns by_point: (n, 2, 3), by the point (mm/m).
     """
-    arm = points - centers[photo]
-    turn = rotations[photo].transpose(0, 2, 1)
+    arm = points - photos.centers[photo]
+    turn = photos.rotations[photo].transpose(0, 2, 1)
     sight = np.einsum("nij,nj->ni", turn, arm)
-    f, w = focal[photo], sight[:, 2]
+    f, w = photos.focal[photo], sight[:, 2]
     by_sight = np.zeros((len(points), 2, 3))
     by_sight[:, 0, 0] = by_sight[:, 1, 1] = -f / w
     by_sight[:, :, 2] = f[:, None] * sight[:, :2] / w[:, None] ** 2

@@ -53,9 +53,9 @@ def intersect_points(
     covariance = np.full((count, 3, 3), np.nan)
     for _ in range(ITERATIONS):
         with np.errstate(invalid="ignore", divide="ignore"):
-            _, slope = derivatives(xyz[point], centers, rotations, photo, focal)
+            _, slope = derivatives(xyz[point], photos, photo)
             slope = slope / sigma[:, :, None]
-            misfit = (xy - project(xyz[point], centers, rotations, photo, focal)) / sigma
+            misfit = (xy - project(xyz[point], photos, photo)) / sigma
         bad = ~np.isfinite(slope).all(axis=(1, 2)) | ~np.isfinite(misfit).all(axis=1)
         slope[bad], misfit[bad] = 0.0, 0.0
         normal = _summed(np.einsum("nki,nkj->nij", slope, slope), point, count)
@@ -70,7 +70,7 @@ def intersect_points(
     sound[point[~ahead]] = False
     xyz[~sound], covariance[~sound] = np.nan, np.nan
     with np.errstate(invalid="ignore"):
-        residuals = xy - project(xyz[point], centers, rotations, photo, focal)
+        residuals = xy - project(xyz[point], photos, photo)
     return Intersected(xyz=xyz, covariance=covariance, residuals=residuals, rays=rays)
 
 

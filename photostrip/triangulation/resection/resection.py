@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import from_vector
-from photostrip.triangulation.resection.collinearity import partials, project
+from photostrip.triangulation.resection.collinearity import KnownPhotos, partials, project
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
@@ -32,30 +32,28 @@ class Resection:
     solved: Flags
 
 
-def with_residuals(
-    xy: Floats, points: Floats, photo: Numbers, focal: Floats, centers: Floats, rotations: Floats
-) -> Resection:
+def with_residuals(xy: Floats, points: Floats, photo: Numbers, photos: KnownPhotos) -> Resection:
     """Image residuals of photos whose orientation is known already, as a resection.
 
     xy, points, photo: (m, 2), (m, 3), (m,), image coordinates in mm, their points, and the photo of each.
     """
+    centers, rotations, _ = photos
     count = len(centers)
-    residuals = xy - project(points, centers, rotations, photo, focal)
+    residuals = xy - project(points, photos, photo)
     squares = np.bincount(photo, (residuals**2).sum(axis=1), count)
     rms = np.sqrt(squares / np.maximum(2 * np.bincount(photo, minlength=count), 1))
     return Resection(centers=centers, rotations=rotations, residuals=residuals, rms=rms, solved=np.ones(count, bool))
 
 
-def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tuple[Floats, Floats]) -> Resection:
+def resect(xy: Floats, points: Floats, photo: Numbers, start: KnownPhotos) -> Resection:
     """Orient every photo on its points by least squares on the image coordinates.
 
     xy: (m, 2), image coordinates in mm, reduced to the principal point; rows ordered by photo.
     points: (m, 3), known points of the rows.
-    focal: (n,), principal distances in mm.
-    start: centres (n, 3) and rotations (n, 3, 3) to start from. They stay for a photo with fewer than four points, or
-        whose iteration does not converge.
+    start: orientations to start from. They stay for a photo with fewer than four points, or whose iteration does not
+        converge.
     """
-    centers, rotations = start[0].copy(), start[1].copy()
+    centers, rotations, focal = start
     counts = np.bincount(photo, minlength=len(centers))
     enough = counts >= UNKNOWNS // 2 + 1
     present = np.flatnonzero(counts)
@@ -64,7 +62,7 @@ def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tup
     distance[present] = np.add.reduceat(np.linalg.norm(points - centers[photo], axis=1), starts) / counts[present]
     converged = np.zeros(len(centers), bool)
     for _ in range(ITERATIONS):
-        step = _steps(xy, points, photo, focal, (centers, rotations), distance, (present, starts))
+        step = _steps(xy, points, photo, KnownPhotos(centers, rotations, focal), distance, (present, starts))
         step[~enough] = 0.0
         centers = centers + step[:, :3] * distance[:, None]
         rotations = from_vector(step[:, 3:]) @ rotations
@@ -72,17 +70,16 @@ def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tup
         if converged.all():
             break
     solved = converged & enough
-    centers = np.where(solved[:, None], centers, start[0])
-    rotations = np.where(solved[:, None, None], rotations, start[1])
-    return replace(with_residuals(xy, points, photo, focal, centers, rotations), solved=solved)
+    centers = np.where(solved[:, None], centers, start.centers)
+    rotations = np.where(solved[:, None, None], rotations, start.rotations)
+    return replace(with_residuals(xy, points, photo, KnownPhotos(centers, rotations, focal)), solved=solved)
 
 
 def _steps(
     xy: Floats,
     points: Floats,
     photo: Numbers,
-    focal: Floats,
-    orientation: tuple[Floats, Floats],
+    photos: KnownPhotos,
     distance: Floats,
     segments: tuple[Numbers, Numbers],
 ) -> Floats:
@@ -90,7 +87,7 @@ def _steps(
 
     The partials are taken along the photo's own axes, where they are functions of the image point and its depth alone.
     """
-    centers, rotations = orientation
+    centers, rotations, focal = photos
     present, starts = segments
     by_x, by_y, (x, y) = partials(points - centers[photo], rotations[photo], focal[photo], distance[photo])
     misfit_x, misfit_y = xy[:, 0] - x, xy[:, 1] - y

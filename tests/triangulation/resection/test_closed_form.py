@@ -28,7 +28,7 @@ def scene(seed: int, points: int = 8, tilt: float = 0.1, flat: float = 0.1) -> t
     center = np.array([0.0, 0.0, 1500.0]) + random.normal(size=3) * 50
     spin = from_vector(random.normal(size=3))  # the whole scene at any attitude
     xyz, center, turn = xyz @ spin.T, spin @ center, spin @ turn
-    xy = project(xyz, center[None], turn[None], np.zeros(points, np.intp), np.array([FOCAL]))
+    xy = project(xyz, KnownPhotos(center[None], turn[None], np.array([FOCAL])), np.zeros(points, np.intp))
     return xy, xyz, center, turn
 
 
@@ -66,17 +66,17 @@ def test_the_covariance_is_that_of_many_noisy_photos() -> None:
 def test_derivatives_are_those_of_the_projection() -> None:
     _, xyz, center, turn = scene(3)
     photo, focal = np.zeros(len(xyz), np.intp), np.array([FOCAL])
-    by_photo, by_point = derivatives(xyz, center[None], turn[None], photo, focal)
+    photos = KnownPhotos(center[None], turn[None], focal)
+    by_photo, by_point = derivatives(xyz, photos, photo)
     step = 1e-4
     for column in range(6):
         change = np.zeros(6)
         change[column] = step
-        ends = [
-            project(
-                xyz, (center + s * change[:3])[None], (from_vector(s * change[3:] * 1e-3) @ turn)[None], photo, focal
-            )
+        moved = [
+            KnownPhotos((center + s * change[:3])[None], (from_vector(s * change[3:] * 1e-3) @ turn)[None], focal)
             for s in (1, -1)
         ]
+        ends = [project(xyz, each, photo) for each in moved]
         scale = 1.0 if column < 3 else 1e-3
         np.testing.assert_allclose(
             by_photo[:, :, column], (ends[0] - ends[1]) / (2 * step * scale), rtol=1e-6, atol=1e-7
@@ -84,7 +84,7 @@ def test_derivatives_are_those_of_the_projection() -> None:
     for column in range(3):
         change3 = np.zeros(3)
         change3[column] = step
-        ends = [project(xyz + s * change3, center[None], turn[None], photo, focal) for s in (1, -1)]
+        ends = [project(xyz + s * change3, photos, photo) for s in (1, -1)]
         np.testing.assert_allclose(by_point[:, :, column], (ends[0] - ends[1]) / (2 * step), rtol=1e-6, atol=1e-9)
 
 
@@ -105,7 +105,7 @@ def two_photos(seed: int) -> tuple[np.ndarray, ...]:
     photo, point = np.repeat(np.arange(3), 20), np.tile(np.arange(20), 3)
     kept = ~((photo == 2) & (point % 3 == 0))
     photo, point = photo[kept], point[kept]
-    xy = project(points[point], centers, rotations, photo, np.full(3, FOCAL))
+    xy = project(points[point], KnownPhotos(centers, rotations, np.full(3, FOCAL)), photo)
     return xy, photo, point, centers, rotations, points
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.triangulation.resection import resection
-from photostrip.triangulation.resection.collinearity import project
+from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 from photostrip.triangulation.resection.resection import Resection, resect
 from tests.strips import MICROMETRE, attitude, photograph
 
@@ -39,14 +39,18 @@ class Scene:
     centers: Floats
     rotations: Floats
 
-    def start(self, rng: np.random.Generator, metres: float, degrees: float) -> tuple[Floats, Floats]:
+    @property
+    def photos(self) -> KnownPhotos:
+        return KnownPhotos(self.centers, self.rotations, self.focal)
+
+    def start(self, rng: np.random.Generator, metres: float, degrees: float) -> KnownPhotos:
         """Orientations that are wrong by up to so much."""
         n = len(self.centers)
         turn = Rotation.from_rotvec(np.radians(rng.uniform(-degrees, degrees, (n, 3)))).as_matrix()
-        return self.centers + rng.uniform(-metres, metres, (n, 3)), turn @ self.rotations
+        return KnownPhotos(self.centers + rng.uniform(-metres, metres, (n, 3)), turn @ self.rotations, self.focal)
 
-    def resect(self, start: tuple[Floats, Floats]) -> Resection:
-        return resect(self.xy, self.points, self.photo, self.focal, start)
+    def resect(self, start: KnownPhotos) -> Resection:
+        return resect(self.xy, self.points, self.photo, start)
 
 
 def scene(seed: int, counts: list[int], sigma: float = 0.0, *, relief: float = 100.0, tilt: float = 5.0) -> Scene:
@@ -72,9 +76,9 @@ def scene(seed: int, counts: list[int], sigma: float = 0.0, *, relief: float = 1
 @given(SEEDS)
 def test_the_projection_is_central(seed: int) -> None:
     one = scene(seed, [5, 7])
-    assert np.allclose(project(one.points, one.centers, one.rotations, one.photo, one.focal), one.xy, rtol=0, atol=1e-9)
+    assert np.allclose(project(one.points, one.photos, one.photo), one.xy, rtol=0, atol=1e-9)
     along = one.centers[one.photo] + 2.5 * (one.points - one.centers[one.photo])
-    again = project(along, one.centers, one.rotations, one.photo, one.focal)
+    again = project(along, one.photos, one.photo)
     assert np.allclose(again, one.xy, rtol=0, atol=1e-9)
 
 
@@ -119,11 +123,11 @@ def test_level_ground_is_no_special_case() -> None:
 def test_residuals_are_as_large_as_the_noise() -> None:
     sigma, n = 5 * MICROMETRE, 25
     one = scene(5, [n] * 200, sigma)
-    found = one.resect((one.centers, one.rotations))
+    found = one.resect(one.photos)
     assert found.solved.all()
     variance = (found.rms**2).mean() * 2 * n / (2 * n - 6)
     assert variance / sigma**2 == pytest.approx(1, abs=0.05)  # of 200 photos with 44 degrees of freedom: 1.5 percent
-    residuals = one.xy - project(one.points, found.centers, found.rotations, one.photo, one.focal)
+    residuals = one.xy - project(one.points, KnownPhotos(found.centers, found.rotations, one.focal), one.photo)
     assert np.allclose(found.residuals, residuals, rtol=0, atol=1e-12)  # measured minus computed
     by_photo = np.sqrt((found.residuals**2).sum(axis=1).reshape(200, n).mean(axis=1) / 2)
     assert np.allclose(found.rms, by_photo, rtol=1e-9, atol=0)
@@ -150,9 +154,10 @@ def test_an_optimiser_finds_the_same(seed: int) -> None:
 @given(SEEDS)
 def test_a_step_is_that_of_derivatives_taken_as_differences(seed: int) -> None:
     one = scene(seed, [7, 5], 50 * MICROMETRE)
-    centers, rotations = one.start(np.random.default_rng(seed), metres=30.0, degrees=2.0)
+    start = one.start(np.random.default_rng(seed), metres=30.0, degrees=2.0)
+    centers, rotations, _ = start
     distance, segments = np.array([1500.0, 1400.0]), (np.array([0, 1]), np.array([0, 7]))
-    found = resection._steps(one.xy, one.points, one.photo, one.focal, (centers, rotations), distance, segments)
+    found = resection._steps(one.xy, one.points, one.photo, start, distance, segments)
     for number in range(2):
         rows = one.photo == number
 
@@ -175,7 +180,7 @@ def differences(one: Scene, found: Resection, axis: int) -> Floats:
         change[axis] = step
         turn = Rotation.from_rotvec(change[3:]).as_matrix() @ found.rotations
         center = found.centers + change[:3] * HEIGHT
-        values.append(((one.xy - project(one.points, center, turn, one.photo, one.focal)) ** 2).sum())
+        values.append(((one.xy - project(one.points, KnownPhotos(center, turn, one.focal), one.photo)) ** 2).sum())
     return np.array([(values[0] - values[1]) / 2e-6 / (one.xy**2).sum()])
 
 
@@ -193,8 +198,7 @@ def test_many_photos_at_once_are_what_each_is_alone(seed: int) -> None:
             one.xy[rows],
             one.points[rows],
             np.zeros(rows.sum(), int),
-            one.focal[number : number + 1],
-            (start[0][number : number + 1], start[1][number : number + 1]),
+            KnownPhotos(*(each[number : number + 1] for each in start)),
         )
         assert np.allclose(alone.centers[0], together.centers[number], rtol=0, atol=1e-6)
         assert np.allclose(alone.rotations[0], together.rotations[number], rtol=0, atol=1e-9)
@@ -204,8 +208,9 @@ def test_many_photos_at_once_are_what_each_is_alone(seed: int) -> None:
 def test_the_frame_of_the_points_does_not_matter(seed: int) -> None:
     one = scene(seed, [8], 5 * MICROMETRE)
     turn = Rotation.random(random_state=seed % 2**31).as_matrix()
-    there = resect(one.xy, one.points, one.photo, one.focal, (one.centers, one.rotations))
-    moved = resect(one.xy, one.points @ turn.T, one.photo, one.focal, (one.centers @ turn.T, turn @ one.rotations))
+    there = resect(one.xy, one.points, one.photo, one.photos)
+    turned = KnownPhotos(one.centers @ turn.T, turn @ one.rotations, one.focal)
+    moved = resect(one.xy, one.points @ turn.T, one.photo, turned)
     assert np.allclose(there.centers @ turn.T, moved.centers, rtol=0, atol=1e-5)
     assert np.allclose(turn @ there.rotations, moved.rotations, rtol=0, atol=1e-8)
     assert np.allclose(there.residuals, moved.residuals, rtol=0, atol=1e-8)
@@ -223,7 +228,7 @@ def test_a_photo_with_three_points_or_fewer_keeps_its_start(few: int) -> None:
     assert np.array_equal(found.centers[1], start[0][1])
     assert np.array_equal(found.rotations[1], start[1][1])
     assert np.abs((found.centers - one.centers)[[0, 2]]).max() < 1e-6
-    theirs = one.xy - project(one.points, *start, one.photo, one.focal)
+    theirs = one.xy - project(one.points, start, one.photo)
     rows = one.photo == 1
     assert np.allclose(found.residuals[rows], theirs[rows], rtol=0, atol=1e-12)
 
@@ -233,7 +238,7 @@ def test_points_in_one_direction_do_not_orient_a_photo() -> None:
     points = one.points.copy()
     points[8:] = points[8]  # all points of the second photo are the same
     start = one.start(np.random.default_rng(6), metres=20.0, degrees=1.0)
-    found = resect(one.xy, points, one.photo, one.focal, start)
+    found = resect(one.xy, points, one.photo, start)
     assert found.solved.tolist() == [True, False]
     assert np.array_equal(found.centers[1], start[0][1])
     assert np.array_equal(found.rotations[1], start[1][1])

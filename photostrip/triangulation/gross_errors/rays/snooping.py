@@ -35,7 +35,7 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import (
     decide,
     undecided,
 )
-from photostrip.triangulation.resection.collinearity import derivatives, project
+from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 from photostrip.triangulation.strip_formation.non_neighbours import meeting
 
 if TYPE_CHECKING:
@@ -265,10 +265,10 @@ class _Search:
         """Decide on rays of a point, linearised at a place near it."""
         images, solution, control = self.problem.images, done.solution, self.problem.control
         photo, sigma, r = images.photo[rows], images.sigma[rows], len(rows)
-        photos = solution.centers, solution.rotations, photo, self._focal
+        photos = KnownPhotos(solution.centers, solution.rotations, self._focal)
         place = np.broadcast_to(xyz, (r, 3))
-        by_photo, by_point = derivatives(place, *photos)
-        misfit = (self._measured(solution, rows) - project(place, *photos)) / sigma
+        by_photo, by_point = derivatives(place, photos, photo)
+        misfit = (self._measured(solution, rows) - project(place, photos, photo)) / sigma
         if not (np.isfinite(misfit).all() and np.isfinite(by_photo).all()):
             return undecided(r)
         by_photos = np.zeros((r, 2, r, PHOTO))
@@ -321,11 +321,8 @@ class _Search:
         ray = np.einsum("nij,nj->ni", solution.rotations[photo], np.column_stack([xy, -self._focal[photo]]))
         two = np.array(list(combinations(range(len(rows)), 2)), np.intp)
         place, _ = meeting(solution.centers[photo][two], ray[two])
-        off = [
-            xy
-            - project(np.broadcast_to(each, (len(rows), 3)), solution.centers, solution.rotations, photo, self._focal)
-            for each in place
-        ]
+        photos = KnownPhotos(solution.centers, solution.rotations, self._focal)
+        off = [xy - project(np.broadcast_to(each, (len(rows), 3)), photos, photo) for each in place]
         size = np.abs(np.array(off) / self.problem.images.sigma[rows]).max(axis=2)
         best = np.log1p(np.nan_to_num(size, nan=np.inf)).sum(axis=1).argmin()
         return np.asarray(place[best], float)

@@ -17,7 +17,7 @@ from photostrip.triangulation.bundle.observations.problem import (
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.gross_errors.rays.snooping import screen_bundle
-from photostrip.triangulation.resection.collinearity import project
+from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 from photostrip.triangulation.strip_formation.strip import mean_points
 
 if TYPE_CHECKING:
@@ -65,7 +65,8 @@ def _free_network(
         mean = mean_points(oriented.point, formed.model_xyz, use)
         xyz[np.searchsorted(point, mean.point)] = mean.xyz
     focal = np.array([oriented.pairs.focal])
-    computed = project(xyz[at], formed.centers, formed.rotations, photo, np.repeat(focal, len(formed.centers)))
+    photos = KnownPhotos(formed.centers, formed.rotations, np.repeat(focal, len(formed.centers)))
+    computed = project(xyz[at], photos, photo)
     size = np.abs((o.xy[rows] - computed) / sigma).max(axis=1)
     limit = FAR * max(1.0, float(np.nanmedian(size)))
     far = np.zeros(len(point), bool)

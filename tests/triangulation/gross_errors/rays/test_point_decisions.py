@@ -22,7 +22,7 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import (
     PointRays,
     decide,
 )
-from photostrip.triangulation.resection.collinearity import derivatives
+from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives
 from tests.loops import nonempty
 
 SIGMA = 0.005  # mm
@@ -41,7 +41,7 @@ def a_point(seed: int, rays: int = 3) -> PointRays:
     rotations = from_vector(rng.normal(0, 0.03, (rays, 3)))
     xyz = np.array([rng.uniform(0, rays - 1), rng.uniform(-1, 1), -1.7])
     place = np.broadcast_to(xyz, (rays, 3))
-    by_photo, by_point = derivatives(place, centers, rotations, np.arange(rays), np.full(rays, 153.0))
+    by_photo, by_point = derivatives(place, KnownPhotos(centers, rotations, np.full(rays, 153.0)), np.arange(rays))
     wide = np.zeros((rays, 2, rays, 6))
     wide[np.arange(rays), :, np.arange(rays)] = by_photo / SIGMA
     return PointRays(
