@@ -188,7 +188,7 @@ def _pairs(document: Document) -> Iterator[str]:
     # said of the whole project already, or explained by what the photos have in common
     quiet = any(True for _ in _sigma0(document)) or bool(document.get("bundle", {}).get("calibration"))
     pairs = [model for model in document["models"] if model["sigma0_um"] is not None]
-    level = PAIR_LEVEL / max(len(pairs), 1)
+    level = PAIR_LEVEL / max(2 * len(pairs), 1)  # two tests of each pair
     squares = sum(pair["redundancy"] * pair["sigma0_um"] ** 2 for pair in pairs)
     redundancy = sum(pair["redundancy"] for pair in pairs)
     odd = []

@@ -7,7 +7,9 @@ import json
 import re
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
+from scipy import stats
 
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import to_json
@@ -212,10 +214,14 @@ def test_every_number_of_a_table_has_its_unit() -> None:
 
 
 def test_ranks_keep_the_point_and_its_differences() -> None:
-    for title in ("Control points", "Check points"):
-        (table,) = tables(section(saved(), title))
-        always = [column.name for column in table.columns if column.rank == 0]
-        assert always == ["point", "use", "d north", "d east", "d up", "plan", "height"]
+    differences = ["d north", "d east", "d up"]
+    expected = {
+        "Control points": ["point", "use", *differences, "plan", "height"],
+        "Check points": ["point", *differences, "z plan", "p", "z height", "p"],
+    }
+    for title, names in nonempty(expected.items()):
+        (table,) = tables(section(case("north first", 2).document, title))
+        assert [column.name for column in table.columns if column.rank == 0] == names
 
 
 def test_rows_of_a_table_have_all_its_columns() -> None:
@@ -233,14 +239,35 @@ def test_check_points_stand_apart_from_the_control() -> None:
 
 
 def test_numbers_are_those_of_the_result() -> None:
-    (table,) = tables(section(saved(), "Check points"))
-    rows = [row for row in saved()["control"] if row["role"] == "check"]
+    document = case("north first", 2).document
+    (table,) = tables(section(document, "Check points"))
+    rows = [row for row in document["control"] if row["role"] == "check"]
+    points, tested = ({row["id"]: row for row in found} for found in (document["points"], _tested(document)))
     for shown, row in nonempty(zip(table.rows, rows, strict=True)):
-        assert shown[:7] == (
-            row["id"], "xyz", *(f"{row[key]:+.3f}" for key in ("dx", "dy", "dz")),
-            f"{row['plan_um']:.1f}", f"{row['height_um']:.1f}",
+        point, z = points[row["id"]], tested[row["id"]]
+        assert shown[:-2] == (
+            row["id"], *(f"{row[key]:+.3f}" for key in ("dx", "dy", "dz")),
+            *(f"{point[key]:.3f}" for key in ("sigma_x", "sigma_y", "sigma_z")),
+            f"{z['plan']:.2f}", f"{100 * z['p_plan']:.1f}", f"{z['height']:.2f}", f"{100 * z['p_height']:.1f}",
         )  # fmt: skip
-    assert table.foot[0][2:5] == tuple(f"{saved()['summary']['check_rms'][axis]:.3f}" for axis in "xyz")
+    assert table.foot[0][1:4] == tuple(f"{document['summary']['check_rms'][axis]:.3f}" for axis in "xyz")
+
+
+def _tested(document: Document) -> list[Document]:
+    found: list[Document] = document["precision"]["check"]["points"]
+    return found
+
+
+def test_the_probability_of_a_check_point_is_that_of_its_difference() -> None:
+    """By scipy, and the difference by the point's own standard deviation and the given one."""
+    document = case("projected", 2).document
+    points = {row["id"]: row for row in document["points"]}
+    given = {row["id"]: row for row in document["control"]}
+    for row in nonempty(_tested(document)):
+        sigma = np.hypot(points[row["id"]]["sigma_z"], given[row["id"]]["sigma"][2])
+        assert row["height"] == pytest.approx(given[row["id"]]["dz"] / sigma, abs=0.01)
+        assert row["p_height"] == pytest.approx(2 * stats.norm.sf(abs(row["height"])), abs=0.006)
+        assert row["p_plan"] == pytest.approx(stats.chi2.sf(row["plan"] ** 2, 2), abs=0.006)
 
 
 def test_given_points_that_were_not_measured_are_named() -> None:

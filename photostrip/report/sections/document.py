@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from photostrip.errors import faults_instead
 from photostrip.report.page.parts import Document, Section, Words
 from photostrip.report.sections.bundle import bundle_sections
+from photostrip.report.sections.check_points import check_section
 from photostrip.report.sections.covariance import covariance_section
 from photostrip.report.sections.decisions import decisions_section, weights_section
 from photostrip.report.sections.findings import findings_sections
 from photostrip.report.sections.models import deformation_section, links_section, models_section, of_models
 from photostrip.report.sections.overview import overview
 from photostrip.report.sections.points import (
-    check_section,
     control_section,
     image_section,
     not_determined_section,

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 from photostrip.report.page.layout import USUAL, lay_out
 from photostrip.report.page.numbers import counted, fixed, listed, metres, micrometres, percent
 from photostrip.report.page.parts import Document, Facts, Section, Words
+from photostrip.report.sections.check_points import check_section
 from photostrip.report.sections.decisions import chosen_degrees
 from photostrip.report.sections.findings import cures_section
 from photostrip.report.sections.models import of_models
 from photostrip.report.sections.points import (
-    check_section,
     control_section,
     missing_points,
     sentence_of,

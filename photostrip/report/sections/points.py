@@ -37,23 +37,14 @@ def control_section(document: Document, *, everything: bool, most: int = ALL_SHO
         )
     parts: list[Part] = [
         Words(text),
-        _given(document, rows, "control", everything=everything, most=most),
+        given_table(document, rows, "control", everything=everything, most=most),
         *_unused(document),
     ]
     return Section("Control points", tuple(parts))
 
 
-def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
-    """Differences at the check points."""
-    rows = [row for row in document["control"] if row["role"] == "check" and row["measured"]]
-    if not rows:
-        text = "None. What lies between the control points is not proven by anything in this report."
-        return Section("Check points", (Words(text),))
-    text = "Adjusted minus given. These points took no part in anything: they say how good the new points are."
-    return Section("Check points", (Words(text), _given(document, rows, "check", everything=everything, most=most)))
-
-
-def _given(document: Document, given: Sequence[Document], role: str, *, everything: bool, most: int) -> Table:
+def given_table(document: Document, given: Sequence[Document], role: str, *, everything: bool, most: int) -> Table:
+    """Return the table of given points of a role with their differences, the worst first."""
     axes, summary = document["frame"]["axes"], document["summary"]
     where = ("points", role, "control")
     shown, note = worst_first(given, lambda row: row["normalised"] or 0.0, where, everything=everything, most=most)
@@ -84,7 +75,7 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
         (
             "largest",
             "",
-            *(_largest(given, key, axis) for key, axis in zip(DIFFERENCES, axes, strict=True)),
+            *(largest(given, key, axis) for key, axis in zip(DIFFERENCES, axes, strict=True)),
             micrometres(plan["max_um"]),
             micrometres(height["max_um"]),
             _most(given),
@@ -109,7 +100,8 @@ def _used(row: Document) -> str:
     return f"{kept} -{row['rejected']}".strip()
 
 
-def _largest(rows: Sequence[Document], key: str, axis: str) -> str:
+def largest(rows: Sequence[Document], key: str, axis: str) -> str:
+    """Return the largest difference along an axis of those that were not rejected."""
     letter = LETTERS.get(axis, axis)
     rows = [row for row in rows if letter not in row.get("rejected", "")]
     return signed(max((row[key] for row in rows if row[key] is not None), key=abs, default=None))
