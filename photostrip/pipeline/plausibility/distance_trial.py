@@ -32,7 +32,6 @@ LEAST_MISFIT = 2.5  # times what makes sense: heights that fit better need no ot
 LEFT_SHARE = 0.4  # of that misfit, left with another principal distance that is reported
 MOST_SIGMA0_RATIO = 1.1  # times the sigma0 of the pairs
 BETTER_SIGMA0_RATIO = 0.7  # times that sigma0: pairs that ask for the other distance themselves
-SHOWN_MISFIT = 3.0  # times what makes sense: stretch of the relief that no bend explains
 TRIALS = 3  # of forming a strip anew
 GIVEN_UP_MISFIT = 60.0  # misfit after two of them
 MOST_PHOTOS = 40  # photos: a longer strip would take too long
@@ -44,7 +43,9 @@ class DistanceTrial(NamedTuple):
     """A strip formed with another principal distance."""
 
     factor: float  # of the principal distance given
-    misfit: float  # of the heights, in units of what makes sense
+    # misfit, in_relief: of the heights, in units of what makes sense; without and with a bend of the strip
+    misfit: float
+    in_relief: float
     sigma0: float  # of the pairs, mm
 
 
@@ -64,7 +65,7 @@ def find_wrong_distance(
         trial = _followed(formed.strip, observations, settings, compare, start)
         if trial is None or trial.misfit > LEFT_SHARE * first.misfit or trial.sigma0 > MOST_SIGMA0_RATIO * sigma0:
             continue
-        if abs(trial.factor - 1.0) * first.relief > SHOWN_MISFIT or trial.sigma0 < BETTER_SIGMA0_RATIO * sigma0:
+        if trial.in_relief < LEFT_SHARE * first.in_relief or trial.sigma0 < BETTER_SIGMA0_RATIO * sigma0:
             break  # else a bend of the strip explains it
     else:
         return []
@@ -113,7 +114,7 @@ def _followed(
         pairs = _middle_sigma0(again)
         if trial and last.misfit > GIVEN_UP_MISFIT:
             break
-    return None if last is None else DistanceTrial(ratio, last.misfit, pairs)
+    return None if last is None else DistanceTrial(ratio, last.misfit, last.in_relief, pairs)
 
 
 def _finding(strip: Strip, ratio: float, how: str, numbers: Evidence) -> list[Finding]:

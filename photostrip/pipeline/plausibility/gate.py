@@ -102,7 +102,7 @@ def of_failure(
         whole = [each for each in formed if each is not None]
         for each in whole:
             findings += _of_formed(each, points)
-        findings += given_cameras.centers(inputs, images.observations, images.strips, directory)
+        findings += given_cameras.centers(inputs, images.observations, images.strips, directory, starts=True)
         findings += given_cameras.angles(inputs, whole, points, directory)
         broken = [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]
         findings += _of_ids(broken, images)

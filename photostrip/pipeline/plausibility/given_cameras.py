@@ -64,15 +64,21 @@ class LevelPlan(NamedTuple):
 
 
 def centers(
-    inputs: Inputs, observations: PhotoPoints, strips: Sequence[Strip], directory: Path | None = None
+    inputs: Inputs,
+    observations: PhotoPoints,
+    strips: Sequence[Strip],
+    directory: Path | None = None,
+    *,
+    starts: bool = False,
 ) -> Iterator[Finding]:
     """Look at given perspective centres: below the ground, at another height, with bases that jump.
 
     observations: image points in the system of the photo, mm.
     strips: the strips, their photos as they lie.
+    starts: whether those that are only a start count as well: they may be far off, and matter where a run fails.
     """
     control = inputs.control.take(inputs.control.use.all(axis=1) & ~inputs.control.check)
-    for given in _given_centers(inputs):
+    for given in _given_centers(inputs, starts=starts):
         if not given.photos:
             continue
         try:
@@ -84,13 +90,13 @@ def centers(
             yield from _of_strip(strip, plan, observations)
 
 
-def _given_centers(inputs: Inputs) -> Iterator[GivenCenters]:
+def _given_centers(inputs: Inputs, *, starts: bool) -> Iterator[GivenCenters]:
     positions, orientations = inputs.positions, inputs.orientations
     if positions is not None:
         whole = np.flatnonzero(positions.use.all(axis=1))
         photos = tuple(positions.photos[row] for row in whole)
         yield GivenCenters(key="camera_positions", frame=positions.frame, photos=photos, enu=positions.enu[whole])
-    if orientations is not None:
+    if orientations is not None and (orientations.observed or starts):
         whole = np.flatnonzero(np.isfinite(orientations.enu).all(axis=1))
         photos = tuple(orientations.photos[row] for row in whole)
         yield GivenCenters(key="orientations", frame=orientations.frame, photos=photos, enu=orientations.enu[whole])

@@ -58,6 +58,7 @@ class HeightComparison:
     columns: Floats  # (n, c): tilt and, where it is needed, bending
     whole: list[Floats]  # (n,): all columns of tilt and bending
     deviation: Floats  # (n,): heights in the strip, against their mean
+    relief: Floats  # (n,): heights given, against their mean: a strip that bends has heights where the ground has none
     scaled: RobustFit  # fit with the scale of the heights free; its last coefficient is that scale minus one
 
 
@@ -78,8 +79,16 @@ def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: F
     base, _ = fit_simplest([deviation, *whole], 4, value, in_fit, fitted.floor[1])
     base = base[:, 1:]
     scaled = fit_robustly(np.column_stack([base, deviation]), value, in_fit, fitted.floor[1])
+    relief = value + height
     return HeightComparison(
-        usable=usable, in_fit=in_fit, value=value, columns=base, whole=whole, deviation=deviation, scaled=scaled
+        usable=usable,
+        in_fit=in_fit,
+        value=value,
+        columns=base,
+        whole=whole,
+        deviation=deviation,
+        relief=relief - relief[in_fit].mean(),
+        scaled=scaled,
     )
 
 
@@ -88,8 +97,7 @@ class HeightStretch(NamedTuple):
 
     ratio: float  # heights given over heights in the strip
     misfit: float  # what is left of the heights as they are, in units of what makes sense
-    # rms of the heights that no tilt and no bend explains, in the same units: what a stretch would show in
-    relief: float
+    in_relief: float  # the same of what is left when the strip may bend
 
 
 def height_stretch(given: GivenPoints, on_strip: StripPoints) -> HeightStretch | None:
@@ -111,13 +119,16 @@ def height_stretch(given: GivenPoints, on_strip: StripPoints) -> HeightStretch |
     tilt = np.column_stack(heights.whole[:LEAST_POINTS])
     plain = fit_robustly(tilt, heights.value, heights.in_fit, fitted.floor[1])
     free = fit_robustly(np.column_stack([tilt, heights.deviation]), heights.value, heights.in_fit, fitted.floor[1])
-    size = np.abs(plain.residual[heights.in_fit])
-    freedom = max(int(heights.in_fit.sum()) - LEAST_POINTS, 1)
-    misfit = float(np.sqrt((np.minimum(size, KEPT_SIGMAS * np.median(size)) ** 2).sum() / freedom)) / fitted.floor[1]
-    whole, deviation = np.column_stack(heights.whole)[heights.in_fit], heights.deviation[heights.in_fit]
-    left = deviation - whole @ np.linalg.lstsq(whole, deviation, rcond=None)[0]
-    relief = float(np.sqrt((left**2).mean())) / fitted.floor[1]
-    return HeightStretch(1.0 + float(free.coefficient[-1]), max(misfit, 1.0), relief)
+    bent = fit_robustly(np.column_stack(heights.whole), heights.value, heights.in_fit, fitted.floor[1])
+    misfit, in_relief = (_misfit(fit, heights.in_fit) / fitted.floor[1] for fit in (plain, bent))
+    return HeightStretch(1.0 + float(free.coefficient[-1]), max(misfit, 1.0), max(in_relief, 1.0))
+
+
+def _misfit(fit: RobustFit, in_fit: Flags) -> float:
+    """Rms of what a fit leaves, metres; what is far off counts less."""
+    size = np.abs(fit.residual[in_fit])
+    freedom = max(len(size) - len(fit.coefficient), 1)
+    return float(np.sqrt((np.minimum(size, KEPT_SIGMAS * np.median(size)) ** 2).sum() / freedom))
 
 
 def find_wrong_heights(
@@ -133,7 +144,8 @@ def find_wrong_heights(
     ratio, sigma = 1.0 + float(heights.scaled.coefficient[-1]), float(heights.scaled.sigma[-1])
     feet = min(abs(ratio * each - 1.0) for each in (FOOT, 1 / FOOT)) < FEET_TOLERANCE
     explains = heights.scaled.sigma0 < (EXPLAINED_SHARE_IN_FEET if feet else EXPLAINED_SHARE) * fit.sigma0
-    if explains and _significant(ratio - 1.0, sigma, heights.scaled.freedom, LEAST_SCALE_ERROR):
+    stretched = explains and _significant(ratio - 1.0, sigma, heights.scaled.freedom, LEAST_SCALE_ERROR)
+    if stretched and _shows_in_relief(heights, floor):
         yield _other_scale(on_strip, ratio, sigma, in_fit)
         return
     for names, inside, key in _groups(given, in_fit):
@@ -146,6 +158,13 @@ def find_wrong_heights(
         if explains and _significant(size, sigma, offset.freedom, LEAST_OFFSET_SIGMAS * floor):
             yield _other_heights(given, on_strip, names, key, size, sigma, inside & in_fit)
             return
+
+
+def _shows_in_relief(heights: HeightComparison, floor: float) -> bool:
+    """Whether the heights given show the stretch beside any bend, in which they have no part."""
+    columns = np.column_stack([*heights.whole, heights.relief])
+    fit = fit_robustly(columns, heights.value, heights.in_fit & heights.scaled.used, floor)
+    return _significant(float(fit.coefficient[-1]), float(fit.sigma[-1]), fit.freedom, LEAST_SCALE_ERROR)
 
 
 def _significant(value: float, sigma: float, freedom: int, least: float) -> bool:

@@ -1,0 +1,456 @@
+"""How often the gate finds a mistake where there is none, in every layout that the program can simulate or plan.
+
+Run it as ``python benchmarks/false_alarms.py [--count N] [--first SEED] [-v] [words]``; words choose among the layouts,
+``-v`` names every finding. Each row examines sound strips or blocks of one kind, ``check`` and ``run`` together, and
+counts those with any finding. Where control itself is laid weakly (at one end, on one line), that may be told.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
+
+import numpy as np
+
+from benchmarks import plausibility
+from photostrip.errors import InputError, PhotostripError
+from photostrip.formats.output.simulation import inputs_of, settings_of
+from photostrip.geometry.rotation import angles, from_angles
+from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
+from photostrip.points import locate
+from photostrip.simulate import DIGITAL, FILM, Control, Film, Flight, Gnss, Ground, Image, Models, Points, Spec, Terrain
+from photostrip.simulate.simulation import simulate
+from photostrip.triangulation.bundle.settings import BundleSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from photostrip.pipeline import Inputs, Settings
+    from photostrip.simulate.simulation import Simulation
+
+    Rng = np.random.Generator
+
+WIDE = plausibility.WIDE
+WEAK = {"P501", "P502", "P503"}  # told of control that is weak indeed
+ATTEMPTS = 20
+METHODS = ("polynomial", "covariance", "bundle")
+FREE = ("principal_distance", "principal_point", "k1", "k2")
+OBLIQUE_DEG = (15.0, 35.0)
+SYSTEMATIC = 0.005  # mm, largest
+
+
+@dataclass(frozen=True, eq=False)
+class Sound:
+    """A project without a mistake."""
+
+    inputs: Inputs
+    settings: Settings
+    spec: Spec
+    allowed: frozenset[str] = frozenset()
+
+
+def made(rng: Rng, seed: int, draw: Callable[[Rng], Spec]) -> Simulation:
+    """Simulate what is drawn; drawn again where so few points do not suffice."""
+    for attempt in range(ATTEMPTS):
+        spec = replace(draw(rng), seed=seed * ATTEMPTS + attempt)
+        try:
+            return simulate(spec)
+        except InputError:
+            continue
+    raise SystemExit(f"nothing can be made of seed {seed}")
+
+
+def base_spec(rng: Rng, photos: int, *, lap: tuple[float, float] = (57.0, 68.0)) -> Spec:
+    """Draw camera, ground, terrain and measurement."""
+    camera = plausibility.CAMERAS[rng.integers(len(plausibility.CAMERAS))]
+    scale = float(np.exp(rng.uniform(np.log(3000), np.log(30000))))
+    tilt, sigma = float(rng.choice([0.5, 1.0, 2.0])), float(rng.choice([3.0, 5.0, 8.0]))
+    ground_sigma = float(rng.choice([0.5, 1.0, 2.0])) * sigma * 1e-6 * scale
+    height = scale * camera.principal_distance / 1000.0
+    return Spec(
+        camera=camera,
+        ground=plausibility.GROUNDS[rng.integers(4)],
+        flight=Flight(
+            photos=photos,
+            end_lap_percent=float(rng.uniform(*lap)),
+            scale=scale,
+            heading_deg=float(rng.uniform(0, 360)),
+            attitude_sigma_deg=(tilt, tilt, tilt),
+        ),
+        terrain=Terrain(relief=float(rng.choice([0.0, 0.03, 0.08])) * height),
+        points=Points(rows=int(rng.choice([3, 5])), extra_per_model=int(rng.integers(4, 15))),
+        control=Control(sigma=(ground_sigma, ground_sigma, 1.5 * ground_sigma)),
+        image=Image(sigma_um=sigma),
+    )
+
+
+def sound_of(simulation: Simulation, adjustment: str, *, weak: bool = False) -> Sound:
+    """Make the project of a simulation."""
+    settings = replace(settings_of(simulation), adjustment=adjustment)
+    return Sound(inputs_of(simulation), settings, simulation.spec, frozenset(WEAK if weak else ()))
+
+
+def short(seed: int) -> Sound:
+    """Strips of 4 to 8 photos of all kinds, some with two wrong image coordinates."""
+    case = plausibility.sound(seed + 700_000)
+    return Sound(case.inputs, case.settings, case.spec)
+
+
+def bands(low: int, high: int, method: str) -> Callable[[int], Sound]:
+    """Strips with bands every 3 to 20 models."""
+
+    def make(seed: int) -> Sound:
+        rng = np.random.default_rng([11, low, high, METHODS.index(method), seed])
+
+        def draw(rng: Rng) -> Spec:
+            photos = round(float(np.exp(rng.uniform(np.log(low), np.log(high + 0.4)))))
+            spec = base_spec(rng, photos)
+            control = replace(spec.control, every=int(rng.integers(3, 21)), per_band=int(rng.integers(2, 4)))
+            return replace(spec, control=control)
+
+        return sound_of(made(rng, seed, draw), method)
+
+    return make
+
+
+def layouts(seed: int) -> Sound:
+    """Strips of 6 to 40 photos with control in the corners or anywhere."""
+    rng = np.random.default_rng([12, seed])
+
+    def draw(rng: Rng) -> Spec:
+        spec = base_spec(rng, int(rng.integers(6, 41)))
+        layout = str(rng.choice(["corners", "corners+centre", "random"]))
+        return replace(spec, control=replace(spec.control, layout=layout, count=int(rng.integers(8, 20))))
+
+    return sound_of(made(rng, seed, draw), str(rng.choice(METHODS)), weak=True)
+
+
+def overlap(seed: int) -> Sound:
+    """Strips of 8 to 40 photos with an end lap of 75 to 85 %."""
+    rng = np.random.default_rng([13, seed])
+
+    def draw(rng: Rng) -> Spec:
+        spec = base_spec(rng, int(rng.integers(8, 41)), lap=(75.0, 85.0))
+        return replace(spec, control=replace(spec.control, every=int(rng.integers(6, 21))))
+
+    return sound_of(made(rng, seed, draw), str(rng.choice(METHODS)))
+
+
+def in_block(rng: Rng) -> Spec:
+    """Draw a block."""
+    spec = base_spec(rng, int(rng.integers(5, 13)))
+    flight = replace(
+        spec.flight,
+        strips=int(rng.integers(2, 6)),
+        side_lap_percent=float(rng.choice([25.0, 60.0])),
+        alternate=bool(rng.random() < 0.5),
+    )
+    return replace(spec, flight=flight, points=replace(spec.points, rows=5), gnss=Gnss(use=True))
+
+
+def with_gnss(simulation: Simulation) -> Inputs:
+    """Give the inputs with the measured positions of the cameras."""
+    inputs, enu = inputs_of(simulation), simulation.gnss
+    if enu is None or simulation.spec.gnss is None:
+        raise TypeError
+    n = len(enu)
+    positions = CameraPositions(
+        photos=simulation.truth.photo_ids,
+        frame=inputs.frames[0],
+        enu=enu,
+        use=np.ones((n, 3), bool),
+        sigma=np.tile(simulation.spec.gnss.sigma, (n, 1)),
+        time=np.full(n, np.nan),
+    )
+    return replace(inputs, positions=positions)
+
+
+def at_corners(simulation: Simulation, inputs: Inputs) -> Inputs:
+    """Keep control at the corners of the block only."""
+    truth, control = simulation.truth, inputs.control
+    xyz = truth.points.xyz[locate(control.ids, truth.points.ids)]
+    d = truth.centers - truth.centers.mean(axis=0)
+    axes = np.linalg.svd(d, full_matrices=False)[2][:2]
+    uv = (xyz - truth.centers.mean(axis=0)) @ axes.T
+    chosen = {int(np.argmin(uv @ [a, b] + 1e12 * control.check)) for a in (-1, 1) for b in (-1, 1)}
+    keep = control.check.copy()
+    keep[sorted(chosen)] = True
+    return replace(inputs, control=control.take(keep))
+
+
+def gnss_block(seed: int) -> Sound:
+    """Blocks held by camera positions, with control at the corners, in each strip, in one strip only, or none."""
+    rng = np.random.default_rng([14, seed])
+    simulation = made(rng, seed, in_block)
+    inputs = with_gnss(simulation)
+    kind = int(rng.integers(4))
+    if kind == 1:
+        inputs = at_corners(simulation, inputs)
+    elif kind == 2:
+        first = set(simulation.strips[0][1])
+        shown = {
+            simulation.observations.point_ids[p]
+            for p, photo in zip(simulation.observations.point, simulation.observations.photo, strict=True)
+            if simulation.observations.photo_ids[photo] in first
+        }
+        keep = [bool(c) or name in shown for name, c in zip(inputs.control.ids, inputs.control.check, strict=True)]
+        inputs = replace(inputs, control=inputs.control.take(np.array(keep)))
+    elif kind == 3:
+        inputs = replace(inputs, control=inputs.control.take(inputs.control.check))
+    return Sound(inputs, replace(settings_of(simulation), adjustment="bundle"), simulation.spec)
+
+
+def gnss_strip(seed: int) -> Sound:
+    """Single strips of 8 to 60 photos held by camera positions and a control point or a band here and there."""
+    rng = np.random.default_rng([15, seed])
+
+    def draw(rng: Rng) -> Spec:
+        spec = base_spec(rng, int(rng.integers(8, 61)))
+        layout = str(rng.choice(["corners", "random", "bands"]))
+        control = replace(spec.control, layout=layout, bands=2, per_band=int(rng.integers(1, 4)), count=4)
+        return replace(spec, gnss=Gnss(use=True), control=control)
+
+    simulation = made(rng, seed, draw)
+    return Sound(
+        with_gnss(simulation), replace(settings_of(simulation), adjustment="bundle"), simulation.spec
+    )
+
+
+def plain_block(seed: int) -> Sound:
+    """Blocks without camera positions, control in each strip or in the corners and along the rim."""
+    rng = np.random.default_rng([16, seed])
+    simulation = made(rng, seed, lambda rng: replace(in_block(rng), gnss=None))
+    method = str(rng.choice(METHODS))
+    inputs = inputs_of(simulation)
+    if method == "bundle" and rng.random() < 0.5:
+        inputs = at_corners(simulation, inputs)
+    return Sound(inputs, replace(settings_of(simulation), adjustment=method), simulation.spec)
+
+
+def models(seed: int) -> Sound:
+    """Strips of independent models of 4 to 60 photos."""
+    rng = np.random.default_rng([17, seed])
+
+    def draw(rng: Rng) -> Spec:
+        spec = base_spec(rng, int(rng.integers(4, 61)))
+        kind = Models(centers=bool(rng.random() < 0.8), axes=str(rng.choice(["level", "any"])))
+        return replace(spec, models=kind, control=replace(spec.control, every=int(rng.integers(3, 21))))
+
+    simulation = made(rng, seed, draw)
+    return sound_of(simulation, str(rng.choice(METHODS[:2])))
+
+
+def oblique(seed: int) -> Sound:
+    """Cameras on a mount that looks 15 to 35 degrees aside, ahead or back."""
+    rng = np.random.default_rng([18, seed])
+
+    def draw(rng: Rng) -> Spec:
+        spec = base_spec(rng, int(rng.integers(5, 21)), lap=(62.0, 75.0))
+        control = replace(spec.control, every=int(rng.integers(3, 11)))
+        return replace(spec, camera=WIDE, points=Points(rows=5, extra_per_model=25), control=control)
+
+    simulation = made(rng, seed, draw)
+    inputs = inputs_of(simulation)
+    tilt = np.radians(rng.uniform(*OBLIQUE_DEG)) * rng.choice([-1.0, 1.0])
+    turn = from_angles(np.array([[tilt, 0.0, 0.0] if rng.random() < 0.6 else [0.0, tilt, 0.0]]), "omega-phi-kappa")[0]
+    focal = float(rng.choice([88.0, 120.0]))
+    o = inputs.observations
+    ray = np.column_stack([o.xy, np.full(len(o.xy), -inputs.strips[0].camera.principal_distance)]) @ turn
+    xy = -focal * ray[:, :2] / ray[:, 2:]
+    inside = (np.abs(xy) < 112.0).all(axis=1) & (ray[:, 2] < 0)
+    rows = np.flatnonzero(inside)
+    scale = np.abs(xy).max() / 112.0 if not len(rows) else 1.0
+    kept = replace(o, photo=o.photo[rows], point=o.point[rows], xy=scale * xy[rows], sigma=o.sigma[rows])
+    camera = replace(inputs.strips[0].camera, principal_distance=focal)
+    strips = tuple(replace(each, camera=camera) for each in inputs.strips)
+    inputs = replace(inputs, observations=kept, strips=strips)
+    return Sound(inputs, replace(settings_of(simulation), adjustment=str(rng.choice(METHODS))), simulation.spec)
+
+
+def calibrating(seed: int) -> Sound:
+    """Blocks held by camera positions and control whose camera is calibrated in the adjustment."""
+    rng = np.random.default_rng([19, seed])
+    simulation = made(rng, seed, in_block)
+    inputs = with_gnss(simulation)
+    off = replace(simulation.camera, principal_distance=simulation.camera.principal_distance + float(rng.normal(0, 0.05)))
+    inputs = replace(inputs, strips=tuple(replace(each, camera=off) for each in inputs.strips))
+    settings = replace(
+        settings_of(simulation), adjustment="bundle", bundle=BundleSettings(self_calibration=FREE)
+    )
+    return Sound(inputs, settings, simulation.spec)
+
+
+def systematic(seed: int) -> Sound:
+    """Strips and blocks whose images are deformed by up to 5 µm, the same on all photos, that no model describes."""
+    rng = np.random.default_rng([20, seed])
+
+    def draw(rng: Rng) -> Spec:
+        if rng.random() < 0.3:
+            return in_block(rng)
+        spec = base_spec(rng, round(float(np.exp(rng.uniform(np.log(6), np.log(150))))))
+        return replace(spec, control=replace(spec.control, every=int(rng.integers(3, 21))))
+
+    simulation = made(rng, seed, draw)
+    inputs = inputs_of(simulation) if simulation.gnss is None else with_gnss(simulation)
+    o = inputs.observations
+    wave, phase = rng.normal(0.0, 1.0, (2, 4, 2)) * np.pi / 115.0, rng.uniform(0, 2 * np.pi, (2, 4))
+    shift = np.column_stack([np.sin(o.xy @ wave[axis].T + phase[axis]).sum(axis=1) for axis in (0, 1)])
+    shift *= SYSTEMATIC / np.abs(shift).max()
+    inputs = replace(inputs, observations=replace(o, xy=o.xy + shift))
+    method = "bundle" if simulation.gnss is not None else str(rng.choice(METHODS))
+    return Sound(inputs, replace(settings_of(simulation), adjustment=method), simulation.spec)
+
+
+def film(seed: int) -> Sound:
+    """Strips of film with fiducial marks, irregular shrinkage, refraction."""
+    rng = np.random.default_rng([21, seed])
+
+    def draw(rng: Rng) -> Spec:
+        spec = base_spec(rng, int(rng.integers(5, 31)))
+        return replace(
+            spec,
+            camera=FILM,
+            film=Film(irregular_um=float(rng.choice([0.0, 3.0, 6.0]))),
+            refraction=bool(rng.random() < 0.5),
+            control=replace(spec.control, every=int(rng.integers(3, 16))),
+        )
+
+    return sound_of(made(rng, seed, draw), str(rng.choice(METHODS)))
+
+
+def two_lists(seed: int) -> Sound:
+    """Strips over the border of two zones, with a list of control on either side."""
+    rng = np.random.default_rng([22, seed])
+    zones = (("EPSG:32633", "EPSG:32634", 18.0, 49.0), ("EPSG:28404", "EPSG:28405", 24.0, 42.5),
+             ("EPSG:31467", "EPSG:31468", 10.5, 51.0), ("EPSG:25832", "EPSG:25833", 12.0, 53.0))  # fmt: skip
+    crs, second, border, north = zones[rng.integers(len(zones))]
+
+    def draw(rng: Rng) -> Spec:
+        spec = base_spec(rng, int(rng.integers(8, 31)))
+        return replace(
+            spec,
+            ground=Ground(crs, center_deg=(border, north)),
+            flight=replace(spec.flight, heading_deg=90.0),
+            control=replace(spec.control, every=int(rng.integers(3, 8)), second_crs=second, boundary_longitude_deg=border),
+        )
+
+    sound = sound_of(made(rng, seed, draw), str(rng.choice(METHODS)))
+    # the Gauss-Kruger zones are not made for Bulgaria, where they are used
+    return replace(sound, allowed=frozenset({"P402"} if crs == "EPSG:28404" else ()))
+
+
+def given_orientations(seed: int) -> Sound:
+    """Strips whose orientations are given, as observations or as a start that is off by up to 500 m."""
+    rng = np.random.default_rng([23, seed])
+
+    def draw(rng: Rng) -> Spec:
+        spec = base_spec(rng, int(rng.integers(5, 25)))
+        return replace(spec, control=replace(spec.control, every=int(rng.integers(3, 11))))
+
+    simulation = made(rng, seed, draw)
+    inputs, truth = inputs_of(simulation), simulation.truth
+    values = angles(truth.rotations_local, "omega-phi-kappa")
+    observed = bool(rng.random() < 0.5)
+    n, off = len(values), 0.3 if observed else float(rng.choice([20.0, 100.0, 500.0]))
+    enu = truth.centers_ground + rng.normal(0.0, off, (n, 3))
+    noise = 1e-4 if observed else float(rng.choice([0.01, 0.05]))
+    values = values + rng.normal(0.0, noise, (n, 3))
+    known = (np.full((n, 3), off), np.full((n, 3), noise)) if observed else (np.full((n, 3), np.nan),) * 2
+    given = GivenOrientations(
+        photos=truth.photo_ids, frame=inputs.frames[0], enu=enu, angles=values, system="omega-phi-kappa",
+        sigma=known[0], sigma_angles=known[1], observed=observed,
+    )  # fmt: skip
+    settings = replace(settings_of(simulation), adjustment="bundle")
+    return Sound(replace(inputs, orientations=given), settings, simulation.spec)
+
+
+def dense(seed: int) -> Sound:
+    """Strips and blocks with hundreds of points on a photo, as matching gives them."""
+    rng = np.random.default_rng([24, seed])
+
+    def draw(rng: Rng) -> Spec:
+        spec = in_block(rng)
+        flight = replace(spec.flight, strips=int(rng.integers(1, 4)), end_lap_percent=float(rng.uniform(60, 82)))
+        points = Points(rows=5, extra_per_model=int(rng.integers(100, 400)))
+        return replace(spec, camera=DIGITAL, flight=flight, points=points)
+
+    return replace(sound_of(made(rng, seed, draw), str(rng.choice(METHODS[1:]))))
+
+
+LAYOUTS: dict[str, Callable[[int], Sound]] = {
+    "strips of 4-8 photos": short,
+    "6-60 photos, bands every 3-20, polynomial": bands(6, 60, "polynomial"),
+    "6-60 photos, bands every 3-20, covariance": bands(6, 60, "covariance"),
+    "6-60 photos, bands every 3-20, bundle": bands(6, 60, "bundle"),
+    "60-300 photos, bands every 3-20, polynomial": bands(60, 300, "polynomial"),
+    "60-300 photos, bands every 3-20, covariance": bands(60, 300, "covariance"),
+    "60-300 photos, bands every 3-20, bundle": bands(60, 300, "bundle"),
+    "corners, centre, random": layouts,
+    "end lap of 75-85 %": overlap,
+    "blocks held by GNSS": gnss_block,
+    "strips held by GNSS": gnss_strip,
+    "blocks by their control": plain_block,
+    "independent models": models,
+    "oblique mounts": oblique,
+    "self-calibration": calibrating,
+    "systematic errors of 5 µm": systematic,
+    "film with fiducial marks": film,
+    "two lists in two zones": two_lists,
+    "given orientations": given_orientations,
+    "dense points": dense,
+}
+
+
+def examine(name: str, seed: int) -> tuple[dict[str, set[str]], Sound]:
+    """Find codes with the ids that they name."""
+    sound = LAYOUTS[name](seed)
+    before, after = plausibility.told(sound.inputs, sound.settings)
+    return {
+        code: before.get(code, set()) | after.get(code, set())
+        for code in (before | after)
+        if code not in sound.allowed
+    }, sound
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=10)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("-v", action="store_true", dest="verbose")
+    parser.add_argument("words", nargs="*")
+    asked = parser.parse_args()
+    done = wrong = 0
+    print(f"{'layout':<46} {'sound':>5} {'alarms':>6}  codes")
+    for name in LAYOUTS:
+        if asked.words and not any(word in name for word in asked.words):
+            continue
+        codes: Counter[str] = Counter()
+        alarms = 0
+        for seed in range(asked.first, asked.first + asked.count):
+            try:
+                named, sound = examine(name, seed)
+            except PhotostripError as error:
+                print(f"  seed {seed} cannot be run: {error}")
+                continue
+            alarms += bool(named)
+            codes.update(list(named))
+            if named and asked.verbose:
+                print(f"  alarm {name}, seed {seed}: {named}\n    {sound.settings.adjustment} {sound.spec}")
+        done, wrong = done + asked.count, wrong + alarms
+        told = ", ".join(f"{code} {count}" for code, count in sorted(codes.items()))
+        print(f"{name:<46} {asked.count:>5} {alarms:>6}  {told}", flush=True)
+    print(f"{'all':<46} {done:>5} {wrong:>6}  {100 * wrong / max(done, 1):.2f} %")
+
+
+if __name__ == "__main__":
+    main()
