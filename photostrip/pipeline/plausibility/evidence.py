@@ -266,15 +266,23 @@ def places_in_photos(strip: Strip, observations: PhotoPoints, steps: Mapping[str
 
 
 def half_breadth(
-    strip: Strip, observations: PhotoPoints, ids: Sequence[str], plan: Floats, steps: Mapping[str, complex]
+    strip: Strip,
+    observations: PhotoPoints,
+    ids: Sequence[str],
+    plan: Floats,
+    place: Floats,
+    steps: Mapping[str, complex],
 ) -> float:
-    """Half the breadth of a strip, metres; infinite when no photo shows two given points.
+    """Half the breadth of a strip, metres; 0 where two given points do not tell its scale.
 
-    The scale is that of photos that show two given points or more, whose plan coordinates are `plan` (n, 2), metres.
+    The scale is that of photos that show two given points or more, or else that of the bases between given points.
+
+    ids, plan, place: given points, their plan coordinates (n, 2), metres, and their places along the strip (n,), bases.
     """
     inside = strip.positions(observations) >= 0
     angle = _base_angle(strip.photos, steps)
     across = observations.xy[inside] @ [-np.sin(angle), np.cos(angle)]
+    half = float(np.quantile(np.abs(across), BREADTH_SHARE))
     given = locate(observations.point_ids, ids)[observations.point]
     rows = np.flatnonzero(inside & (given >= 0))
     rows = rows[np.argsort(observations.photo[rows], kind="stable")]
@@ -283,7 +291,10 @@ def half_breadth(
     one, other = one[same], other[same]
     image = np.linalg.norm(observations.xy[one] - observations.xy[other], axis=1)
     ground = np.linalg.norm(plan[given[one]] - plan[given[other]], axis=1)
+    if not (image > 0).any():
+        order = np.argsort(place, kind="stable")
+        base = np.median([abs(step) for photo in strip.photos if (step := steps.get(photo, 0.0))] or [np.nan])
+        image = np.diff(place[order]) * float(base)
+        ground = np.linalg.norm(np.diff(plan[order], axis=0), axis=1)
     good = image > 0
-    if not good.any():
-        return float("inf")
-    return float(np.median(ground[good] / image[good]) * np.quantile(np.abs(across), BREADTH_SHARE))
+    return half * float(np.median(ground[good] / image[good])) if good.any() else 0.0

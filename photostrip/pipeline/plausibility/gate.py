@@ -15,7 +15,7 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
-from photostrip.pipeline.plausibility import evidence, given_cameras, given_control
+from photostrip.pipeline.plausibility import control_layout, evidence, given_cameras, given_control
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images
 from photostrip.points import locate
@@ -47,7 +47,9 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     findings = [*images.findings, *_of_ids(images.strips, images)]
     findings += given_cameras.centers(inputs, images.observations, images.strips, directory)
     unformed = [None] * len(images.strips)
-    findings += _of_control(_given_control(inputs, directory), images, images.strips, unformed, trials=False)
+    control = _given_control(inputs, directory)
+    findings += _of_control(control, images, images.strips, unformed, trials=False)
+    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     return accepted(findings, settings.accept)
 
 
@@ -66,6 +68,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     ]
     strips = tuple(each.strip for each in formed)  # a photo that is a strip of its own forms nothing
     findings = [*images.findings, *_of_control(control, images, strips, formed)]
+    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each in formed:
         findings += _of_formed(each, points)
     findings += _of_ties(stages, points)
@@ -99,6 +102,7 @@ def of_failure(
         frames = () if ground is None else _plain_frames(settings, ground.control)
         control = _given_control(inputs, directory, frames)
         findings = [*images.findings, *_of_control(control, images, images.strips, formed)]
+        findings += control_layout.weak_layout(inputs, settings, images, control, directory)
         whole = [each for each in formed if each is not None]
         for each in whole:
             findings += _of_formed(each, points)
@@ -138,13 +142,10 @@ def _of_control(
     *,
     trials: bool = True,
 ) -> list[Finding]:
-    """Look at given coordinates: where they lie, how they go with each strip, how they hold it."""
+    """Look at given coordinates: where they lie, how they go with each strip."""
     if control is None:
         return []
-    findings = [*control.findings, *given_control.by_strip(control, images, strips, formed, trials=trials)]
-    for strip in images.strips:
-        findings += given_control.weak_layout(strip, images, control) if len(strip.photos) > 1 else []
-    return findings
+    return [*control.findings, *given_control.by_strip(control, images, strips, formed, trials=trials)]
 
 
 def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, directory: Path | None) -> list[Finding]:
@@ -158,7 +159,7 @@ def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, direc
     for held in model_evidence.model_strips(models, control.points, settings):
         findings += control.compared(held.rows, held.on_strip)
         findings += flight.find_odd_centers(held.centers, held.depth, model_evidence.UP, held.photos, held.strip.id)
-        findings += given_control.weak_layout_of_models(held, control)
+        findings += control_layout.weak_layout_of_models(held, control)
     return [finding for finding in findings if finding.code not in OF_CAMERAS]
 
 

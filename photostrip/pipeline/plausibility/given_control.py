@@ -1,12 +1,10 @@
-"""Given coordinates: where they lie on the Earth, how they go with each strip, how they hold it."""
+"""Given coordinates: where they lie on the Earth, and how they go with each strip."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Self
-
-import numpy as np
 
 from photostrip.geodesy.crs import area_of_use
 from photostrip.pipeline.plausibility import distance_trial, evidence
@@ -15,20 +13,18 @@ from photostrip.triangulation.plausibility.control import (
     control_place,
     control_reading,
     given_points,
-    layout,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Inputs, ModelStrip, Strip
+    from photostrip.pipeline.inputs import Inputs, Strip
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
-    from photostrip.pipeline.plausibility.model_evidence import ModelStripEvidence
     from photostrip.points import ControlPoints
     from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, StripPoints
 
@@ -61,7 +57,7 @@ class GivenControl:
             control,
             frames,
             findings=tuple(finding for place in places for finding in place.findings),
-            as_written=not all(place.inside for place in places),
+            as_written=not any(place.inside for place in places),
             axes_are_right=sure.pop() if len(sure) == 1 else None,
         )
 
@@ -132,39 +128,3 @@ def _compared_in_height(
     rows, on_strip = evidence.strip_points(formed, images.observations, control.points, images.steps)
     given = given_points.level(control.points.take(rows), control.frames)
     return None if given is None else control_heights.height_stretch(given, on_strip)
-
-
-def weak_layout(strip: Strip, images: ImageEvidence, control: GivenControl) -> list[Finding]:
-    """Look where the control of a strip lies along it and across."""
-    rows, place = evidence.places_along_strip(strip, images.observations, control.points, images.steps)
-
-    def half_breadth(ids: Sequence[str], plan: Floats) -> float:
-        return evidence.half_breadth(strip, images.observations, ids, plan, images.steps)
-
-    return _weak_layout(strip, control, rows, place, half_breadth)
-
-
-def weak_layout_of_models(held: ModelStripEvidence, control: GivenControl) -> list[Finding]:
-    """Look where the control of a strip of models lies along it and across."""
-
-    def half_breadth(_ids: Sequence[str], plan: Floats) -> float:
-        return float(held.breadth * np.linalg.norm(np.ptp(plan, axis=0)))
-
-    return _weak_layout(held.strip, control, held.rows, held.place, half_breadth)
-
-
-def _weak_layout(
-    strip: Strip | ModelStrip,
-    control: GivenControl,
-    rows: Numbers,
-    place: Floats,
-    half_breadth: Callable[[Sequence[str], Floats], float],
-) -> list[Finding]:
-    counts = control.points.use[rows, 0] & ~control.points.check[rows]
-    points = control.points.take(rows[counts])
-    given = given_points.level(points, control.frames)
-    if given is None:
-        return []
-    plan = given.xyz[:, :2]
-    breadth = half_breadth(points.ids, plan)
-    return list(layout.find_weak_control(place[counts], plan, breadth, strip.photos, strip.id, points.ids))

@@ -133,7 +133,8 @@ def laid_out(along: list[float], across: list[float], photos: int = 8) -> list[s
     plan = np.column_stack([100.0 * np.array(along), 150.0 * np.array(across)])
     names = [f"G{number}" for number in range(len(along))]
     listed = [f"{number}" for number in range(photos)]
-    return [each.code for each in layout.find_weak_control(np.array(along), plan, 150.0, listed, "A", names)]
+    on_a_line = layout.find_line(plan, 150.0, names, "strip A", ["A"])
+    return [each.code for each in (*on_a_line, *layout.find_weak_ends(np.array(along), listed, "A", names))]
 
 
 def test_where_control_lies() -> None:
@@ -146,10 +147,9 @@ def test_where_control_lies() -> None:
 
 
 def test_findings_on_the_layout_count_photos_from_one() -> None:
-    plan = np.array([[100.0, -120.0], [100.0, 0.0], [100.0, 120.0], [300.0, -120.0], [300.0, 0.0], [300.0, 120.0]])
     names, photos = ["a", "b", "c", "d", "e", "f"], [f"{number}" for number in range(8)]
     place = np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0])
-    (found,) = layout.find_weak_control(place, plan, 150.0, photos, "A", names)
+    (found,) = layout.find_weak_ends(place, photos, "A", names)
     assert found.evidence == {"first_control_at_photo": 2.0, "last_control_at_photo": 4.0, "photos": 8}
 
 
@@ -256,7 +256,6 @@ def test_the_spread_of_a_fit_is_that_of_another_measurement() -> None:
 
 def test_a_finding_says_between_which_photos_control_lies() -> None:
     photos = [f"{number}" for number in range(1, 12)]
-    plan = np.array([[0.0, 500.0], [100.0, -500.0], [900.0, 500.0], [1000.0, -500.0]])
-    (found,) = layout.find_weak_control(np.array([2.0, 2.1, 2.9, 3.0]), plan, 500.0, photos, "A", list("abcd"))
+    (found,) = layout.find_weak_ends(np.array([2.0, 2.1, 2.9, 3.0]), photos, "A", list("abcd"))
     assert found.code == "P501"
     assert found.evidence == {"first_control_at_photo": 3.0, "last_control_at_photo": 4.0, "photos": 11}

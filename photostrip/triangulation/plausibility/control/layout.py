@@ -24,18 +24,14 @@ LEAST_PHOTOS = 4  # photos of a strip that has ends
 LEAST_POINTS = 2
 
 
-def find_weak_control(
-    place: Floats, plan: Floats, half_breadth: float, photos: Sequence[str], strip: str, ids: Sequence[str]
-) -> Iterator[Finding]:
-    """Find control of a strip that lies at one end, on one line or far from an end.
+def find_weak_ends(place: Floats, photos: Sequence[str], strip: str, ids: Sequence[str]) -> Iterator[Finding]:
+    """Find control of a strip that lies at one end, or far from an end.
 
-    Yields P501, P502, P503.
+    place: (n,), where control points lie along the strip, bases.
+    Yields P501, P503.
     """
-    if len(ids) < LEAST_POINTS:
-        return
-    yield from _on_a_line(plan, half_breadth, ids, strip)
     last = len(photos) - 1
-    if len(photos) < LEAST_PHOTOS:
+    if len(ids) < LEAST_POINTS or len(photos) < LEAST_PHOTOS:
         return
     low, high = float(np.clip(place, 0, last).min()), float(np.clip(place, 0, last).max())
     evidence: Evidence = {
@@ -63,17 +59,26 @@ def find_weak_control(
             yield found("P503", message, fix, evidence, photos=(end,), strips=(strip,))
 
 
-def _on_a_line(plan: Floats, half_breadth: float, ids: Sequence[str], strip: str) -> Iterator[Finding]:
-    """Tell control that stands on one line: nothing holds the rotation about it."""
+def find_line(
+    plan: Floats, half_breadth: float, ids: Sequence[str], what: str, strips: Sequence[str]
+) -> Iterator[Finding]:
+    """Tell control that stands on one line: nothing holds the rotation about it.
+
+    plan: (n, 2), control points, and with them cameras that hold as well, metres.
+    ids: control points.
+    what: what they hold, a strip or a block.
+    Yields P502.
+    """
     if len(ids) <= LEAST_POINTS or half_breadth <= 0:  # points measured along one line only have no breadth
         return
     values = np.linalg.svd(plan - plan.mean(axis=0), compute_uv=False)
-    breadth = float(values[-1] / np.sqrt(len(ids) - LEAST_POINTS) / half_breadth)
+    breadth = float(values[-1] / np.sqrt(len(plan) - LEAST_POINTS) / half_breadth)
     if breadth > LEAST_BREADTH:
         return
     message = (
-        f"strip {strip}: its control stands on one line, {100 * breadth:.2g} % of half the breadth of the strip to "
-        "either side: an error of a height turns the strip about it"
+        f"{what}: its control stands on one line, {100 * breadth:.2g} % of half the breadth of "
+        f"{'a' if len(strips) > 1 else 'the'} strip to either side: an error of a height turns the "
+        f"{'block' if len(strips) > 1 else 'strip'} about it"
     )
     fix = "add a control point at some distance from that line"
-    yield found("P502", message, fix, {"rms_distance_over_half_breadth": breadth}, points=ids, strips=(strip,))
+    yield found("P502", message, fix, {"rms_distance_over_half_breadth": breadth}, points=ids, strips=strips)

@@ -1,0 +1,75 @@
+"""Sound projects of all layouts, of which nothing must be told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from photostrip.formats.output.simulation import inputs_of, settings_of
+from photostrip.pipeline import Inputs, Settings, triangulate
+from photostrip.pipeline.plausibility import gate
+from photostrip.simulate import Control, Flight, Gnss, Ground, Image, Spec, Terrain, simulate
+from tests.pipeline.blocks import orientations, positions, with_control
+
+BLOCK = Spec(
+    seed=4, flight=Flight(photos=6, strips=4, side_lap_percent=40.0), control=Control(per_band=1, check=4), gnss=Gnss()
+)
+BUNDLE = Settings(adjustment="bundle")
+
+
+def told(inputs: Inputs, settings: Settings) -> list[str]:
+    """Collect codes of `check` and of `run`."""
+    findings = (*gate.of_inputs(inputs, settings), *triangulate(inputs, settings).findings)
+    return sorted({each.code for each in findings})
+
+
+@pytest.mark.parametrize(("photos", "camera_height"), [(40, 1500.0), (110, 4000.0)])
+def test_the_bend_of_a_long_strip_is_no_stretch_of_its_heights(photos: int, camera_height: float) -> None:
+    """Level ground says nothing of the principal distance, however the strip bends."""
+    spec = Spec(
+        seed=80,
+        flight=Flight(photos=photos, flying_height=camera_height),
+        terrain=Terrain(relief=0.0),
+        control=Control(every=6, per_band=2),
+        image=Image(sigma_um=8.0),
+    )
+    made = simulate(spec)
+    assert told(inputs_of(made), settings_of(made)) == []
+
+
+def test_strips_of_a_bundle_hold_each_other() -> None:
+    """One line of control is weak for a strip by itself, and for a block that nothing else holds."""
+    made = simulate(BLOCK)
+    inputs = inputs_of(made)
+    assert told(inputs, Settings()) == ["P502"]
+    assert told(inputs, BUNDLE) == []
+    one_strip = with_control(made, [name for name in made.control.ids if name in {"G01", "G02", "G03"}])
+    assert told(one_strip, BUNDLE) == ["P502"]
+    assert told(replace(one_strip, positions=positions(made)), BUNDLE) == []
+
+
+def test_one_control_list_outside_its_area_is_told_alone() -> None:
+    """Gauss-Kruger zones are used beyond the countries for which they were registered."""
+    spec = Spec(
+        seed=3,
+        ground=Ground("EPSG:28404", center_deg=(24.0, 42.5)),
+        flight=Flight(photos=9, scale=20000.0),
+        control=Control(bands=4, second_crs="EPSG:28405", boundary_longitude_deg=24.0),
+    )
+    made = simulate(spec)
+    assert told(inputs_of(made), settings_of(made)) == ["P402"]
+
+
+def test_a_start_may_be_far_off() -> None:
+    """Orientations without influence are no observations: what they say of themselves matters where a run fails."""
+    made = simulate(BLOCK)
+    given = orientations(made, observed=False)
+    rng = np.random.default_rng(5)
+    far = replace(given, enu=given.enu + rng.normal(0.0, 500.0, given.enu.shape) - [0.0, 0.0, 1500.0])
+    assert told(replace(inputs_of(made), orientations=far), BUNDLE) == []
+    observed = replace(
+        far, observed=True, sigma=np.full(far.enu.shape, 500.0), sigma_angles=np.full(far.enu.shape, 1.0)
+    )
+    assert "P204" in told(replace(inputs_of(made), orientations=observed), BUNDLE)
