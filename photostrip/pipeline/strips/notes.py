@@ -11,7 +11,6 @@ from photostrip.notes import Note
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
 from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING, Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
-from photostrip.triangulation.strip_formation.scale_transfer import FEWEST
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -88,17 +87,14 @@ def junction_notes(strip: Strip, formed: FormedStrip) -> Iterator[Note]:
     """Say which models are joined doubtfully or weakly."""
     junctions = formed.junctions
     count = np.bincount(junctions.junction, junctions.used, len(junctions.factor))
-    beyond = np.abs(np.log(junctions.ratio / junctions.factor[junctions.junction])) > junctions.limit
-    beyond &= junctions.used & (count < FEWEST)[junctions.junction]
-    doubtful = np.unique(junctions.junction[beyond])
-    for number in doubtful.tolist():
+    for number in np.flatnonzero(junctions.doubt).tolist():
         photo = strip.photos[number + 1]
         text = (
-            f"photo {photo}: its pass points contradict each other in the scale of the models, and which is wrong "
-            "cannot be told; measure a third pass point"
+            f"photo {photo}: its pass points contradict each other in the scale of the models by "
+            f"{junctions.doubt[number]:.2%}, and which is wrong cannot be told; measure another pass point"
         )
         yield Note("contradicting-joint", text, strip=strip.id, photos=(photo,))
-    for number in np.flatnonzero(count == 1):
+    for number in np.flatnonzero(count == 1).tolist():
         photo = strip.photos[number + 1]
         text = (
             f"photo {photo}: the models on either side are joined by a single pass point: its error goes into the "

@@ -96,7 +96,8 @@ class FormedPhotos:
         found = oriented.misclosures.take(some)
         # image coordinates are taken as good as stated, or as bad as the pairs have proved
         factor = max(1.0, float(np.median(self.screened.scatter.by_pair)) ** 2 / (2 * self.sigma**2))
-        strip = covariances.sums_of(oriented.errors, found.rows, np.eye(len(found.point)))
+        errors = oriented.errors.with_doubt(self.formed.junctions.doubt / np.sqrt(factor))
+        strip = covariances.sums_of(errors, found.rows, np.eye(len(found.point)))
         return strip * factor + np.diag(found.variance)
 
     def control_rays(self, oriented: Oriented) -> list[ControlRay]:

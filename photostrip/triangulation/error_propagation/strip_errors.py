@@ -15,7 +15,7 @@ Source: derived; see docs/precision.md, eq. 2 and 3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,6 +59,12 @@ class StripErrors:
     def models(self) -> int:
         """Number of models."""
         return len(self.steps)
+
+    def with_doubt(self, scale: Floats) -> StripErrors:
+        """Add standard deviations (j,) to the logarithms of the scales handed on, beside the image coordinates'."""
+        found = self.component_covariances.copy()
+        found[: len(scale), 0, SCALE, SCALE] += scale**2
+        return replace(self, component_covariances=found)
 
 
 def differentiate_strip(

@@ -54,6 +54,8 @@ class Junctions:
     weight: Floats  # (t,): weight of each ratio in the factor; 0 where it was not used
     factor: Floats  # (j,): ratio of the scales of the models, after over before
     spread: Floats  # (j,): relative standard deviation of a single ratio; NaN with one point
+    # (j,): relative deviation of the farthest pass point where no majority agrees on the factor, else 0
+    doubt: Floats
 
 
 class PassPoints(NamedTuple):
@@ -86,13 +88,14 @@ def transfer_scale(
     Raises GeometryError when no point is common to three photos in a row.
     """
     junctions = orientation.pairs.size - 1
-    joined = _pass_points(orientation, vectors, doubtful)
-    junction, before, after = joined
-    count = np.bincount(junction, minlength=junctions)
-    _require_pass_points(count, photos)
+    every = _pass_points(orientation, vectors)
+    _require_pass_points(np.bincount(every.junction, minlength=junctions), photos)
     base, _ = orientation.relative
     # eq. 139-141: distances from the common centre, before over after
-    ratio = np.linalg.norm(vectors[before] - base[junction], axis=1) / np.linalg.norm(vectors[after], axis=1)
+    ratios = np.linalg.norm(vectors[every.before] - base[every.junction], axis=1)
+    ratios /= np.linalg.norm(vectors[every.after], axis=1)
+    joining = _joining(every, junctions, doubtful)
+    (junction, before, after), ratio = (each[joining] for each in every), ratios[joining]
     depth = depths(vectors[before], base[junction]), depths(vectors[after], base[junction + 1])
     quality = np.minimum(orientation.pairs.weight[before], orientation.pairs.weight[after])
     weight = np.ones(len(junction))
@@ -106,6 +109,9 @@ def transfer_scale(
     far, limit = contradictions(ratio, weight, size, junction, junctions)
     used = np.ones(len(ratio), bool) if searched else ~far
     factor, spread = mean_ratios(ratio, weight * used, junction, junctions)
+    off = np.abs(np.log(ratios / factor[every.junction]))
+    agrees = joining.copy()
+    agrees[joining] = used & (off[joining] <= limit)
     return Junctions(
         junction=junction,
         before=before,
@@ -117,6 +123,7 @@ def transfer_scale(
         weight=weight * used,
         factor=factor,
         spread=spread,
+        doubt=_doubt(off, agrees, every.junction, junctions),
     )
 
 
@@ -154,21 +161,32 @@ def _scatter(orientation: Orientation) -> Floats:
     return np.full(orientation.pairs.size, max(value, SMALLEST_SIGMA))
 
 
-def _pass_points(orientation: Orientation, vectors: Floats, doubtful: Flags | None) -> PassPoints:
+def _pass_points(orientation: Orientation, vectors: Floats) -> PassPoints:
     """Points that stand in both models of a junction."""
     rows = np.flatnonzero(orientation.used & np.isfinite(vectors[:, 0]))
     # the table is ordered by pair
     rows = rows[np.argsort(orientation.point[rows], kind="stable")]
     pair, point = orientation.pairs.pair[rows], orientation.point[rows]
     first = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] == pair[:-1] + 1))
-    before, after, junction = rows[first], rows[first + 1], pair[first]
-    if doubtful is not None:
-        good = ~(doubtful[before] | doubtful[after])
-        # a junction with nothing better keeps what it has
-        good |= (np.bincount(junction, good, orientation.pairs.size) == 0)[junction]
-        before, after, junction = before[good], after[good], junction[good]
-    order = np.argsort(junction, kind="stable")
-    return PassPoints(junction[order], before[order], after[order])
+    first = first[np.argsort(pair[first], kind="stable")]
+    return PassPoints(pair[first], rows[first], rows[first + 1])
+
+
+def _joining(points: PassPoints, junctions: int, doubtful: Flags | None) -> Flags:
+    """Pass points that are not doubtful; a junction with nothing better keeps what it has."""
+    if doubtful is None:
+        return np.ones(len(points.junction), bool)
+    good = ~(doubtful[points.before] | doubtful[points.after])
+    good |= (np.bincount(points.junction, good, junctions) == 0)[points.junction]
+    return np.asarray(good, bool)
+
+
+def _doubt(off: Floats, agrees: Flags, junction: Numbers, junctions: int) -> Floats:
+    """Largest deviation of a pass point where those that disagree are as many as those that agree."""
+    doubtful = np.bincount(junction, agrees, junctions) <= np.bincount(junction, ~agrees, junctions)
+    largest = np.zeros(junctions)
+    np.maximum.at(largest, junction, np.where(agrees, 0.0, off))
+    return np.where(doubtful, largest, 0.0)
 
 
 def _require_pass_points(counts: Numbers, photos: Sequence[str]) -> None:

@@ -167,11 +167,25 @@ class JointAdjustment:
 
     def shrunk(self, out: Columns) -> Columns:
         """Take back what the others predict after all, the least significant part first."""
-        tests = [self.test(out, part) for part in self.parts if set(part) <= set(out)]
-        best = max(tests, key=lambda each: each.probability, default=None)
+        best = max(self.tests(out), key=lambda each: each.probability, default=None)
         if best is None or best.probability < self.level:
             return out
         return self.shrunk(tuple(column for column in out if column not in best.columns))
+
+    def tests(self, out: Columns) -> list[Deletion]:
+        """Test every part that was deleted, beside the other deleted ones, against what stays."""
+        rows = np.array(out, np.intp)
+        cofactor = self.cofactor(out)
+        told = np.abs(np.diagonal(cofactor @ self.matrix[np.ix_(rows, rows)]) - 1) < ROUNDING
+        error = cofactor @ self.pull[rows]
+        left, found = self.squares - float(self.pull[rows] @ error), []
+        for part in [part for part in self.parts if set(part) <= set(out)]:
+            place = [out.index(column) for column in part]
+            gain = float(error[place] @ np.linalg.pinv(cofactor[np.ix_(place, place)], hermitian=True) @ error[place])
+            gain = gain if told[place].all() else -np.inf
+            freedom = self.freedom - len(out) + len(part)
+            found.append(Deletion(columns=part, gain=gain, squares=left + gain, freedom=freedom))
+        return found
 
     def test(self, out: Columns, part: Columns) -> Deletion:
         """Test a part against what stays, whether it was deleted or not."""

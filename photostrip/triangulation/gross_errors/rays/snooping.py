@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.errors import GeometryError
 from photostrip.rejection import Rejection
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle import robust
@@ -173,15 +174,11 @@ class _Search:
         done = self.adjust(selection)
         while (worst := self._worst(done)) or reliability.sigma0_test(done.solution).too_large:
             if (not worst or worst[0].kind != reliability.IMAGE) and self._take_up_common(done, *worst):
-                done = self.adjust(supported(self.problem, selection))
+                done = self.adjust(done.selection)
                 continue
             if not worst:
                 break
-            for each in worst:
-                axis = 0 if each.kind == reliability.IMAGE else each.axes[0]
-                self.out[each.kind, each.row, axis] = each
-                selection = selection.without(each.kind, each.row, axis)
-            done = self.adjust(supported(self.problem, selection))
+            done = self._without(done, worst)
         return done
 
     def _take_up_common(self, done: ScreenedBundle, worst: Rejection | None = None) -> bool:
@@ -195,6 +192,29 @@ class _Search:
         self.common.append(found)
         self.problem = taken_up(self.problem, found)
         return True
+
+    def _without(self, done: ScreenedBundle, worst: list[Rejection]) -> ScreenedBundle:
+        """Take observations out; points without which nothing would hold some photos stay, whatever the tests say."""
+        selection = done.selection
+        axes = [0 if each.kind == reliability.IMAGE else each.axes[0] for each in worst]
+        for each, axis in zip(worst, axes, strict=True):
+            selection = selection.without(each.kind, each.row, axis)
+        try:
+            found = self.adjust(supported(self.problem, selection))
+        except GeometryError:
+            if any(each.kind != reliability.IMAGE for each in worst):
+                raise
+            points = self.problem.images.point[[each.row for each in worst]]
+            first = points <= np.sort(points)[(len(points) - 1) // 2]
+            if first.all():
+                self.spared[points] = True
+                return done
+            halves = ([each for each, take in zip(worst, some, strict=True) if take] for some in (first, ~first))
+            for half in halves:
+                done = self._without(done, half)
+            return done
+        self.out |= {(each.kind, each.row, axis): each for each, axis in zip(worst, axes, strict=True)}
+        return found
 
     def _worst(self, done: ScreenedBundle) -> list[Rejection]:
         """Return the worst rays of every neighbourhood, or the worst given coordinate where that is worse."""

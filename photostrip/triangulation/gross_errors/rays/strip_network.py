@@ -16,6 +16,7 @@ from photostrip.triangulation.bundle.observations.problem import (
 )
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
+from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT
 from photostrip.triangulation.gross_errors.rays.snooping import screen_bundle
 from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 from photostrip.triangulation.strip_formation.strip import mean_points
@@ -52,7 +53,8 @@ def _free_network(
 ) -> tuple[BundleProblem, Flags]:
     """Rays as a bundle without control, from the formed strip; and which of them are far from it.
 
-    All rays of a point are far when one of them is.
+    All rays of a point are far when one of them is. Inside are the nearest pass point of every junction, and all
+    points of a pair that would have too few.
     """
     o = rays.observations
     photo = rays.position[rows]
@@ -71,6 +73,14 @@ def _free_network(
     limit = FAR * max(1.0, float(np.nanmedian(size)))
     far = np.zeros(len(point), bool)
     far[at[~(size <= limit)]] = True
+    joined, worst = formed.junctions, np.zeros(len(point))
+    np.maximum.at(worst, at, np.nan_to_num(size, nan=np.inf))
+    joining = np.searchsorted(point, joined.point)
+    nearest = np.lexsort((worst[joining], joined.junction))
+    far[joining[nearest[np.unique(joined.junction[nearest], return_index=True)[1]]]] = False  # they carry the scale
+    pair, of_pairs = oriented.pairs.pair, np.searchsorted(point, oriented.point)
+    few = oriented.pairs.sums((oriented.used & ~far[of_pairs]).astype(float)) < MINIMUM_LEFT
+    far[of_pairs[oriented.used & few[pair]]] = False
     far[at[np.isin(rows, rays.kept)]] = False
     problem = BundleProblem(
         images=ImageObservations(photo=photo, point=at.astype(np.intp), xy=o.xy[rows], sigma=sigma),

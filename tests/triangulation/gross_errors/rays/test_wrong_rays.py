@@ -203,3 +203,12 @@ def test_neither_order_nor_names_decide(seed: int) -> None:
     assert again == out
     assert set(there) == set(xyz)
     assert max(float(np.abs(there[name] - xyz[name]).max()) for name in xyz) < 1e-6
+
+
+def test_a_pair_that_would_not_be_held_keeps_its_points_and_the_others_are_searched_all_the_same() -> None:
+    """Six points a pair: without three of them, wrong along the base, the photos on either side hang free."""
+    near = {("106", "p5_1"): (0.3, 0.0), ("107", "p6_-1"): (0.3, 0.0), ("107", "p6_0"): (-0.2, 0.0)}
+    strip = spoiled(flown(extra=0), near | {("103", "p2_1"): (0.3, 0.0)})
+    found = {point for _, point in found_in(strip, adjusted(strip))}
+    assert "p2_1" in found
+    assert found < {"p2_1", "p5_1", "p6_-1", "p6_0"}
