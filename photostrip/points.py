@@ -1,12 +1,8 @@
-"""Points and what is measured of them: frozen columns over read-only arrays, keyed by id.
-
-A point is a thing; its coordinates exist only in a frame. Mixing frames raises.
-"""
+"""Points and what is measured of them: frozen columns over read-only arrays, keyed by id."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
@@ -21,16 +17,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
 T = TypeVar("T", bound="DataclassInstance")
-
-
-class Frame(StrEnum):
-    """Frames in which ground coordinates of a strip exist."""
-
-    MODEL = "model"  # one stereo model, free scale
-    STRIP = "strip"  # the formed strip, frame and scale of its first model
-    INTERMEDIATE = "intermediate"  # at the control's centre of gravity, X along the strip, metres
-    CARTESIAN = "cartesian"  # geocentric, or the project's own local Cartesian frame, metres
-    GROUND = "ground"  # east, north, height in the units of a CRS
 
 
 def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None = None) -> NDArray[Any]:
@@ -65,11 +51,10 @@ def locate(wanted: Iterable[str], ids: Iterable[str]) -> Numbers:
 
 @dataclass(frozen=True, eq=False)
 class PointTable:
-    """Coordinates of points in one named frame."""
+    """Coordinates of points in one frame."""
 
     ids: tuple[str, ...]  # point ids, unique
     xyz: Floats  # (n, 3): coordinates in the unit of the frame
-    frame: Frame  # the frame in which they exist
 
     def __post_init__(self) -> None:
         """Freeze the array."""
@@ -83,16 +68,6 @@ class PointTable:
     def __len__(self) -> int:
         """Return the number of points."""
         return len(self.ids)
-
-    def shared(self, other: PointTable) -> tuple[Numbers, Numbers]:
-        """Rows, in either table, of the points that both hold, in this table's order."""
-        if self.frame is not other.frame:
-            msg = f"points in the {self.frame} frame cannot be joined with points in the {other.frame} frame"
-            raise ValueError(msg)
-        index = other.index
-        pairs = [(row, index[name]) for row, name in enumerate(self.ids) if name in index]
-        rows = np.array(pairs, dtype=np.intp).reshape(-1, 2)
-        return rows[:, 0], rows[:, 1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.points import ControlPoints, Frame, PhotoPoints, PointTable, frozen
-
-IDS = st.lists(st.text(min_size=1, max_size=3), unique=True, max_size=12)
+from photostrip.points import ControlPoints, PhotoPoints, PointTable, frozen
 
 
-def table(ids: list[str] | tuple[str, ...], frame: Frame = Frame.STRIP) -> PointTable:
-    return PointTable(tuple(ids), np.arange(3 * len(ids), dtype=float), frame)
+def table(ids: list[str] | tuple[str, ...]) -> PointTable:
+    return PointTable(tuple(ids), np.arange(3 * len(ids), dtype=float))
 
 
 def control(n: int = 4) -> ControlPoints:
@@ -55,21 +53,6 @@ def test_frozen_brings_any_layout_into_shape() -> None:
 # ------------------------------------------------------------------------------------------- PointTable
 
 
-@given(IDS, IDS)
-def test_the_join_is_that_of_sets(first: list[str], second: list[str]) -> None:
-    a, b = table(first), table(second)
-    rows_a, rows_b = a.shared(b)
-    common = [name for name in first if name in set(second)]
-    assert [first[row] for row in rows_a] == common  # in the order of the first table
-    assert [second[row] for row in rows_b] == common
-    assert len(a) == len(first)
-
-
-def test_the_join_of_different_frames_is_refused() -> None:
-    with pytest.raises(ValueError, match="strip frame cannot be joined with points in the ground frame"):
-        table(["1", "2"]).shared(table(["1", "2"], Frame.GROUND))
-
-
 def test_rows_are_found_by_id() -> None:
     points = table(["0123", "123", "NO"])
     assert points.index == {"0123": 0, "123": 1, "NO": 2}  # ids are text: 0123 is not 123
@@ -80,7 +63,7 @@ def test_rows_are_found_by_id() -> None:
 
 def test_coordinates_must_fit_the_ids() -> None:
     with pytest.raises(ValueError, match="reshape"):
-        PointTable(("1", "2"), np.zeros((3, 3)), Frame.MODEL)
+        PointTable(("1", "2"), np.zeros((3, 3)))
 
 
 # ------------------------------------------------------------------------------------------ PhotoPoints

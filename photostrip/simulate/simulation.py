@@ -11,7 +11,7 @@ import numpy as np
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
-from photostrip.points import ControlPoints, Frame, ModelPoints, PhotoPoints, PointTable
+from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, PointTable
 from photostrip.simulate.control import Roles, given_coordinates, roles
 from photostrip.simulate.draws import Draws, Purpose
 from photostrip.simulate.film import Sheets, sheets
@@ -99,8 +99,8 @@ def simulate(spec: Spec) -> Simulation:
     observations, keep = _observations(spec, photos, names, photo, point, image)
     observations, image_errors = spoil_images(named, observations)
     offset, control_errors = spoil_control(named, tuple(names[i] for i in chosen.control.tolist()), chosen.use)
-    every = PointTable(names, placed.xyz, Frame.CARTESIAN)
-    points = PointTable(observations.point_ids, placed.xyz[keep], Frame.CARTESIAN)
+    every = PointTable(names, placed.xyz)
+    points = PointTable(observations.point_ids, placed.xyz[keep])
     truth = _truth(output, points, photos, image, image_errors + control_errors)
     places = TruePlaces(photo_ids=photos.ids, points=points.xyz, centers=photos.centers, rotations=truth.rotations)
     return Simulation(
@@ -279,7 +279,7 @@ def _truth(
 ) -> Truth:
     return Truth(
         points=points,
-        ground=PointTable(points.ids, output.ground_from_cartesian(points.xyz), Frame.GROUND),
+        ground=PointTable(points.ids, output.ground_from_cartesian(points.xyz)),
         photo_ids=photos.ids,
         centers=photos.centers,
         centers_ground=output.ground_from_cartesian(photos.centers),

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.formats.output.result_json import to_json
 from photostrip.result import columns as tables
-from photostrip.result.numbers import PER_RADIAN
+from photostrip.result.numbers import PER_RADIAN, Document
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from photostrip.result.columns import Column
     from photostrip.result.description import Quantity
-    from photostrip.result.numbers import Document
 
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
 BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.angles import UNITS
+from photostrip.report.page.angles import UNITS, AngleUnit
 from photostrip.report.page.numbers import counted, listed, short
 from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-
-    from photostrip.report.page.angles import AngleUnit
 
 CONTROL_SHOWN = 24  # rows of the table of control; --verbose prints all
 IDS_SHOWN = 8

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from photostrip.report.page.numbers import fixed
+from photostrip.report.page.numbers import Number, fixed
 
 if TYPE_CHECKING:
-    from photostrip.report.page.numbers import Number
     from photostrip.report.page.parts import Document
 
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.points.given import Differences
 
-
 UPPER = np.triu_indices(6)
 OUTSIDE = 0.05  # share of sound differences that lie outside their ellipse or interval
 INSIDE = {"plan": float(np.sqrt(chi2_quantile(1 - OUTSIDE, 2))), "height": normal_quantile(1 - OUTSIDE / 2)}
