@@ -19,6 +19,7 @@ from photostrip.pipeline.results import Result
 from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control
 from photostrip.pipeline.strips.adjusting import adjust
 from photostrip.pipeline.strips.forming import form_strips
+from photostrip.pipeline.unchecked_control import unchecked_control_notes
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -99,6 +100,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
             *(photo.interior.notes if photo.interior is not None else ()),
             *adjusted.notes,
             *curvature_notes(inputs, settings),
+            *unchecked_control_notes(adjusted, settings.bundle.power),
         ),
         precision=adjusted.precision,
         bundle=adjusted.bundle,
