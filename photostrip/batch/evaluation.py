@@ -10,7 +10,7 @@ from photostrip.batch.outcomes import BROKEN, FAULTY, WEAK, failure, out_of_memo
 from photostrip.batch.parcel import Parcel, unpack_grids
 from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.formats.output.result_files import result_files
+from photostrip.formats.output.result_files import refined_csv, result_files
 from photostrip.formats.text.source import Source, digest, reading_from
 from photostrip.project.loading import Project, adjust_project, load_project
 from photostrip.report.page.messages import result_findings
@@ -45,8 +45,9 @@ def _from_parcel(task: Task, parcel: Parcel) -> Answer:
 def _computed(task: Task, source: Source) -> Answer:
     with reading_from(source):
         project = load_project(Path(task.project), task.overrides)
-        document = document_of(adjust_project(project), project.remarks)
-        files = result_files(document, project.resolved)
+        result = adjust_project(project)
+        document = document_of(result, project.remarks)
+        files = result_files(document, project.resolved, refined_csv(result))
     outcome = outcome_of(document, result_findings(document))
     return Answer(number=task.number, outcome=outcome, files=files, inputs=_inputs(project, source))
 

@@ -38,6 +38,7 @@ rejected_csv = partial(
     "rejected",
     "strip photo other_photo point stage test value limit unit reason zone size size_unit readmitted blamed",
 )
+refined_csv = partial(columns, "refined", "photo point x_mm y_mm sigma_x_um sigma_y_um")
 residuals_csv = partial(columns, "residuals", "photo point=points vx_um vy_um used")
 parallaxes_csv = partial(columns, "parallaxes", "left right point=points q_um used")
 links_csv = partial(columns, "link_residuals", "before after point=points vx_um vy_um vz_um test used")

@@ -8,7 +8,7 @@ from photostrip import __version__
 from photostrip.result import conventions, summary
 from photostrip.result.adjustment import bundle, covariance, deformation, junctions, links, pairs, rejected, strips
 from photostrip.result.numbers import Document, natural_rank
-from photostrip.result.points import given, ground, photos, precision
+from photostrip.result.points import given, ground, image_coordinates, photos, precision
 from photostrip.result.verdict import verdict_of
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "settings": conventions.settings_of(result),
         "corrections": conventions.corrections_of(result),
         "cameras": conventions.cameras_of(result),
+        **image_coordinates.fiducials_of(result),
         "strips": strips.strips_of(result),
         "absolute": strips.absolute_of(result),
         **strips.polynomials_of(result),

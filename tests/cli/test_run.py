@@ -21,7 +21,7 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from tests.results import Document
 
-TABLES = ("points", "photos", "residuals", "parallaxes", "rejected")
+TABLES = ("points", "photos", "residuals", "parallaxes", "rejected", "refined")
 FILES = {*(f"{name}.csv" for name in TABLES), "project.resolved.yaml", "result.json"}
 
 

@@ -40,14 +40,14 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """Adjust the strips of a project and report the accuracy.
 
     The report goes to stdout, in at most 120 lines; --verbose prints all of it, --section a part. With -o, DIR gets
-    result.json with everything, the tables points.csv, photos.csv, residuals.csv, parallaxes.csv and rejected.csv, and
-    project.resolved.yaml. The exit code is 1 when a tolerance of the project is not kept, with --strict also when the
-    verdict is LOOK or UNVERIFIED. A bundle adjustment adds reliability.csv. With --compare-methods and -o, each method
-    gets a folder of its own in DIR.
+    result.json with everything, the tables points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv and
+    refined.csv, and project.resolved.yaml. The exit code is 1 when a tolerance of the project is not kept, with
+    --strict also when the verdict is LOOK or UNVERIFIED. A bundle adjustment adds reliability.csv. With
+    --compare-methods and -o, each method gets a folder of its own in DIR.
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.stderr import Messages
-    from photostrip.formats.output.result_files import result_files
+    from photostrip.formats.output.result_files import refined_csv, result_files
     from photostrip.formats.text.writing import make_rule, write_files, write_text
     from photostrip.project.loading import adjust_project, load_project
     from photostrip.report.page.progress import progress
@@ -80,7 +80,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             write_text(depfile, make_rule(output / "result.json", loaded.files_read(result)))
         if output is not None:
             pages = {"report.html": to_html(document, everything=verbose)} if html else {}
-            files = pages | result_files(document, loaded.resolved)
+            files = pages | result_files(document, loaded.resolved, refined_csv(result))
             write_files(output, files)
             messages.say(f"wrote {len(files)} files to {output}")
     print_result(document, form, width, Parts(quiet, verbose, section or ()))

@@ -24,7 +24,7 @@ FORMATS = {
         "phototheodolite projects and tables (YAML, .csv): photostrip terrestrial",
     ],
     "written": [
-        "result.json, points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv: photostrip run -o, batch -o",
+        "result.json and points, photos, residuals, parallaxes, rejected, refined (CSV): photostrip run -o, batch -o",
         "summary of a batch (text, CSV, JSON, JUnit, Markdown, annotations): photostrip batch",
         "accuracy report (text, Markdown, JSON, annotations; HTML with pictures): photostrip run, report",
         "comparison (text, Markdown, JSON, JUnit, annotations), baseline.json: photostrip compare",

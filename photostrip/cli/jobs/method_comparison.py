@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from photostrip.cli.failures import failures_as
 from photostrip.cli.stdout import Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
-from photostrip.formats.output.result_files import result_files
+from photostrip.formats.output.result_files import refined_csv, result_files
 from photostrip.formats.text.writing import write_files, write_text
 from photostrip.pipeline import ADJUSTMENTS
 from photostrip.project.loading import adjust_project, load_project
@@ -60,7 +60,7 @@ def compare_methods(
             found[adjustment] = document = document_of(result, loaded.remarks)
             if output is not None:
                 pages = {"report.html": to_html(document, everything=messages.verbose)} if html else {}
-                write_files(output / adjustment, pages | result_files(document, loaded.resolved))
+                write_files(output / adjustment, pages | result_files(document, loaded.resolved, refined_csv(result)))
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
         failures = [each for each in found.values() if not isinstance(each, dict)]
         if len(failures) == len(found):

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 from photostrip.formats.output.result_json import to_json
 from photostrip.result import columns as tables
 from photostrip.result.numbers import PER_RADIAN, Document
+from photostrip.result.points.image_coordinates import refined_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from photostrip.pipeline import Result
     from photostrip.result.columns import Column
     from photostrip.result.description import Quantity
 
@@ -19,11 +21,11 @@ NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
 BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column
 
 
-def result_files(document: Document, resolved: str = "") -> dict[str, str]:
+def result_files(document: Document, resolved: str = "", refined: str = "") -> dict[str, str]:
     """Return all files of a result: content by file name.
 
-    result.json comes last: when it is there, all are. `resolved` is the text of project.resolved.yaml; none is written
-    when it is empty.
+    result.json comes last: when it is there, all are. `resolved` is the text of project.resolved.yaml, `refined` that
+    of refined.csv, which is not rendered from the document; they are not written when they are empty.
     """
     frame, photos = document["frame"], document["photos"]
     angles = photos[0]["angles"] if photos else {"system": "alpha-omega-kappa", "unit": "deg"}
@@ -39,9 +41,24 @@ def result_files(document: Document, resolved: str = "") -> dict[str, str]:
         files["reliability.csv"] = _table(tables.reliability_csv(), _checked_rays(document["residuals"]))
     if "link_residuals" in document:
         files["links.csv"] = _grouped(tables.links_csv(), document["link_residuals"])
+    if refined:
+        files["refined.csv"] = refined
     if resolved:
         files["project.resolved.yaml"] = resolved
     return {**files, "result.json": to_json(document)}
+
+
+def refined_csv(result: Result) -> str:
+    """Return refined.csv: the ideal image coordinates of all points; empty for independent models."""
+    found = refined_rows(result)
+    if not found["photo"]:
+        return ""
+    listed = tables.refined_csv()
+    form = ",".join("%s" if each.quantity.decimals is None else f"%.{each.quantity.decimals}f" for each in listed)
+    ids = {name: _cell(name) for name in (*found["photo"], *found["point"])}
+    cells = [[ids[name] for name in found["photo"]], [ids[name] for name in found["point"]]]
+    rows = zip(*cells, *(found[column.key] for column in listed[2:]), strict=True)
+    return "\n".join([_header(listed), *(form % row for row in rows)]) + "\n"
 
 
 def rejected_csv(document: Document) -> str:

@@ -23,7 +23,7 @@ from photostrip.report.sections.points import (
     ties_section,
 )
 from photostrip.report.sections.precision import precision_section
-from photostrip.report.sections.project import counts_section, project_section
+from photostrip.report.sections.project import counts_section, fiducials_section, project_section
 from photostrip.report.sections.strip import (
     absolute_section,
     junction_section,
@@ -44,6 +44,7 @@ class SectionName(StrEnum):
     PROJECT = "project"
     DECISIONS = "decisions"
     COUNTS = "counts"
+    FIDUCIALS = "fiducials"
     RELATIVE = "relative"
     JUNCTIONS = "junctions"
     LINKS = "links"
@@ -77,6 +78,8 @@ def _named(document: Document, *, everything: bool) -> Iterator[tuple[SectionNam
     yield name.PROJECT, project_section(document)
     yield name.DECISIONS, decisions_section(document)
     yield name.COUNTS, counts_section(document)
+    if document.get("fiducials"):
+        yield name.FIDUCIALS, fiducials_section(document, everything=everything)
     yield from _of_the_strips(document, everything=everything)
     yield from _of_the_accuracy(document, everything=everything)
     yield from _of_the_points(document, everything=everything)

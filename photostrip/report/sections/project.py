@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
+from math import hypot
 from typing import TYPE_CHECKING
 
 from photostrip.report.page.angles import angle_unit
-from photostrip.report.page.numbers import counted, fixed, metres, micrometres
+from photostrip.report.page.numbers import counted, fixed, joined, metres, micrometres, short
 from photostrip.report.page.parts import Document, Facts, Section
 from photostrip.report.page.tables import angle, number, tabulated, words
 from photostrip.report.sections.models import measured, of_models, project_rows, scale_word
+from photostrip.report.sections.strip import worst_first
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from photostrip.report.page.angles import AngleUnit
     from photostrip.report.page.tables import Shown
@@ -37,6 +40,64 @@ def project_section(document: Document) -> Section:
 def _of_photos(settings: Document) -> list[tuple[str, str]]:
     transfer = settings["formation"]["scale_transfer"].replace("_", " ")
     return [("screening", _screening(settings["relative"])), ("scale transfer", transfer)]
+
+
+def fiducials_section(document: Document, *, everything: bool) -> Section:
+    """Interior orientation: the transformation of each photo, and what is left at its marks."""
+    rows, unit = document["fiducials"], angle_unit(document)
+    marks = [
+        {"photo": row["photo"], "mark": mark, "vx": vx, "vy": vy}
+        for row in rows
+        for mark, vx, vy in zip(row["marks"], row["vx_um"], row["vy_um"], strict=True)
+    ]
+    photos, note = worst_first(rows, _largest, ("photos", "fiducials", "fiducials"), everything=everything)
+    shown, rest = worst_first(marks, _length, ("marks", "fiducials", "fiducials"), everything=everything)
+    shapes = (
+        words("photo", "photo"),
+        words("transformation", "transform"),
+        number("marks", lambda row: len(row["marks"])),
+        number("σ0", "sigma0_um", 1, "µm"),
+        number("largest", _largest, 1, "µm"),
+        number("scale x", "scale_x", 6),
+        number("scale y", "scale_y", 6),
+        angle("turn", "rotation_deg", 4, unit, rank=1),
+        angle("shear", "shear_deg", 4, unit, rank=1),
+        words("", lambda row: "mirrored" if row["mirrored"] else "", rank=2),
+    )
+    coefficients = (
+        words("photo", lambda pair: pair[0]["photo"]),
+        words("of", lambda pair: COORDINATES[pair[1]]),
+        *(number(term, _coefficient(n), partial(short, digits=10)) for n, term in enumerate(("x", "y", "xy", "1"))),
+    )
+    denominator = any(row["transform"] == "projective" for row in rows)
+    lines = [(row, axis) for row in photos for axis in range(3 if denominator else 2)]
+    residuals = (
+        words("photo", "photo"),
+        words("mark", "mark"),
+        number("v x", "vx", 1, "µm"),
+        number("v y", "vy", 1, "µm"),
+    )
+    tables = (
+        tabulated(photos, shapes, note=joined(note, "scale: photo over measured; turn, shear: counter-clockwise")),
+        tabulated(lines, coefficients, note="photo coordinates, mm, from the measured ones"),
+        tabulated(shown, residuals, note=joined(rest, "transformed minus calibrated")),
+    )
+    return Section("Interior orientation", tables)
+
+
+COORDINATES = ("x", "y", "divided by")
+
+
+def _coefficient(term: int) -> Callable[[tuple[Document, int]], float]:
+    return lambda pair: float(pair[0]["coefficients"][pair[1]][term])
+
+
+def _largest(row: Document) -> float:
+    return max((hypot(vx, vy) for vx, vy in zip(row["vx_um"], row["vy_um"], strict=True)), default=0.0)
+
+
+def _length(mark: Document) -> float:
+    return hypot(mark["vx"], mark["vy"])
 
 
 def adjustment_of(document: Document) -> str:

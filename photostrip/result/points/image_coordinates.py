@@ -1,0 +1,61 @@
+"""Image coordinates in a result: the interior orientation of each photo, and the refined coordinates of all points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.result.numbers import EXACT, MICROMETRES, Document, natural_rank, significant
+from photostrip.result.quantities import grouped
+
+if TYPE_CHECKING:
+    from photostrip.arrays import Floats
+    from photostrip.pipeline import Result
+
+
+def fiducials_of(result: Result) -> Document:
+    """Return the list ``fiducials`` under its key: the interior orientation of each photo; nothing without marks."""
+    found = result.interior
+    if found is None or not found.photo_ids:
+        return {}
+    heads = {
+        "photo": list(found.photo_ids),
+        "transform": list(found.transforms),
+        "coefficients": significant(found.photo_from_measured.coefficients, EXACT),
+        "sigma0_um": found.sigma0 * MICROMETRES,
+        "redundancy": found.redundancy,
+        "scale_x": found.scale_x,
+        "scale_y": found.scale_y,
+        "rotation_deg": np.degrees(found.rotation),
+        "shear_deg": np.degrees(found.shear),
+        "mirrored": found.mirrored,
+    }
+    residuals = np.concatenate(found.residuals) * MICROMETRES
+    of_marks = {
+        "marks": [mark for marks in found.marks for mark in marks],
+        "vx_um": residuals[:, 0],
+        "vy_um": residuals[:, 1],
+    }
+    ends = np.cumsum([0, *map(len, found.marks)]).tolist()
+    return {"fiducials": grouped("fiducials", heads, of_marks, ends)}
+
+
+def refined_rows(result: Result) -> Document:
+    """Return the columns of refined.csv, photos in flight order and points in natural order; of models there are none.
+
+    The coordinates are those that the adjustment takes, corrected by a calibration where a bundle has found one.
+    """
+    found = result.refined.observations
+    place = {photo: number for number, photo in enumerate(p for strip in result.inputs.strips for p in strip.photos)}
+    order = np.array([place.get(photo, len(place)) for photo in found.photo_ids], np.intp)
+    rows = np.lexsort((natural_rank(found.point_ids)[found.point], order[found.photo]))
+    sigma: Floats = found.sigma[rows] * MICROMETRES
+    return {
+        "photo": [found.photo_ids[number] for number in found.photo[rows].tolist()],
+        "point": [found.point_ids[number] for number in found.point[rows].tolist()],
+        "x_mm": found.xy[rows, 0].tolist(),
+        "y_mm": found.xy[rows, 1].tolist(),
+        "sigma_x_um": sigma[:, 0].tolist(),
+        "sigma_y_um": sigma[:, 1].tolist(),
+    }
