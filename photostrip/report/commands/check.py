@@ -12,7 +12,9 @@ from photostrip.report.page.tables import number, tabulated, words
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-CONTROL_SHOWN = 24  # rows of the table of control; --verbose prints all
+# What is printed without --verbose: points with a row each in the table of control, kinds of them when there are more,
+# frames that are decoded, tables of which all rows are used.
+POINTS_SHOWN, KINDS_SHOWN, FRAMES_SHOWN, TABLES_SHOWN = 12, 6, 2, 4
 IDS_SHOWN = 8
 
 
@@ -20,7 +22,7 @@ def check_sections(document: Document, *, everything: bool = False) -> tuple[Sec
     """Return the sections for one project that could be read, from what was decoded."""
     return (
         _contents(document),
-        _frames(document["frames"], UNITS[document["angle_unit"]]),
+        _frames(document["frames"], UNITS[document["angle_unit"]], everything=everything),
         _sigmas(document["control"], everything=everything),
         _rows(document["rows"], everything=everything),
     )
@@ -68,13 +70,16 @@ def _image_sigma(sigma: Document) -> str:
     return f"{size}; {', '.join(parts)}"
 
 
-def _frames(frames: Sequence[Document], unit: AngleUnit) -> Section:
+def _frames(frames: Sequence[Document], unit: AngleUnit, *, everything: bool) -> Section:
     parts: list[Words | Facts] = []
-    for frame in frames:
+    shown = frames if everything else frames[:FRAMES_SHOWN]
+    for frame in shown:
         name = frame["file"] or "output"
         also = " (also of the results)" if frame["is_output"] and frame["file"] else ""
         parts.append(Words(f"{name}{also}: {frame['frame']}", "head"))
         parts.append(Facts(tuple(_decoded(frame, unit))))
+    if len(frames) > len(shown):
+        parts.append(Words(f"{counted(len(frames) - len(shown), 'more frame')}; --verbose decodes all"))
     return Section("Ground frames, decoded at one point", tuple(part for part in parts if part != Facts(())))
 
 
@@ -108,42 +113,72 @@ def _decoded(frame: Document, unit: AngleUnit) -> Iterator[tuple[str, str]]:
 
 def _sigmas(control: Sequence[Document], *, everything: bool) -> Section:
     """Table of the standard deviation that each control coordinate gets, and where it stands."""
-    shown = control if everything else control[:CONTROL_SHOWN]
     axes = control[0]["axes"] if control and all(each["axes"] == control[0]["axes"] for each in control) else "xyz"
+    if everything or len(control) <= POINTS_SHOWN:
+        kinds, note = [[each] for each in control], ""
+    else:
+        kinds, note = _kinds(control)
 
-    def sigma(place: int) -> Callable[[Document], str]:
-        return lambda each: DASH if each["sigma"][place] is None else short(each["sigma"][place])
+    def sigma(place: int) -> Callable[[Sequence[Document]], str]:
+        return lambda kind: DASH if kind[0]["sigma"][place] is None else short(kind[0]["sigma"][place])
 
     columns = (
-        words("point", "id"),
-        words("role", lambda each: each["role"] if any(each["counts"]) else "off"),
+        words("point", lambda kind: kind[0]["id"] + (", …" if len(kind) > 1 else "")),
+        *([] if len(kinds) == len(control) else [number("points", len)]),
+        words("role", lambda kind: _role(kind[0])),
         *(number(f"σ {axis}", sigma(n), unit="m") for n, axis in enumerate(axes)),
-        number("photos", "photos"),
-        words("from", _sources),
+        number("photos", _photos),
+        words("from", lambda kind: _sources(kind[0], line=len(kind) == 1)),
     )
-    rest = len(control) - len(shown)
-    note = f"{rest} more; --verbose prints all" if rest else ""
-    return Section("Standard deviations of the control", (tabulated(shown, columns, note=note),))
+    return Section("Standard deviations of the control", (tabulated(kinds, columns, note=note),))
 
 
-def _sources(each: Document) -> str:
-    return "; ".join(dict.fromkeys(_source(source) for source in each["sigma_from"] if source)) or DASH
+def _kinds(control: Sequence[Document]) -> tuple[list[list[Document]], str]:
+    """Put points together that have the same role and standard deviations from the same place, the most first."""
+    found: dict[tuple[str, ...], list[Document]] = {}
+    for each in control:
+        found.setdefault((_role(each), str(each["sigma"]), _sources(each, line=False)), []).append(each)
+    kinds = sorted(found.values(), key=len, reverse=True)
+    rest = sum(map(len, kinds[KINDS_SHOWN:]))
+    return kinds[:KINDS_SHOWN], f"{f'{rest} more points; ' if rest else ''}--verbose prints every point"
 
 
-def _source(place: Document) -> str:
-    """Say where a standard deviation stands: its own row, or a key of the project; the file without its folder."""
-    name = place["file"].rpartition("/")[2]
-    where = f"{name}:{place['line']}" if place["line"] else name
-    return f"its row, {where}" if place["source"] == "row" else f"{place['key']}, {where}"
+def _role(each: Document) -> str:
+    return str(each["role"]) if any(each["counts"]) else "off"
+
+
+def _photos(kind: Sequence[Document]) -> str:
+    low, high = (function(each["photos"] for each in kind) for function in (min, max))
+    return str(low) if low == high else f"{low} to {high}"
+
+
+def _sources(each: Document, *, line: bool) -> str:
+    return "; ".join(dict.fromkeys(_source(source, line=line) for source in each["sigma_from"] if source)) or DASH
+
+
+def _source(place: Document, *, line: bool = True) -> str:
+    """Say where a standard deviation stands: its own row, or a key of the project; the file without its folder.
+
+    The line of a row is left out where many rows are spoken of.
+    """
+    name, row = place["file"].rpartition("/")[2], place["source"] == "row"
+    where = f"{name}:{place['line']}" if place["line"] and (line or not row) else name
+    return f"its row, {where}" if row else f"{place['key']}, {where}"
 
 
 def _rows(rows: Sequence[Document], *, everything: bool) -> Section:
     parts: list[Words] = []
+    whole = [table for table in rows if not table["unused"]]
+    silent = [] if everything else whole[TABLES_SHOWN:]
     for table in rows:
+        if table in silent:
+            continue
         head = f"{table['file']}: {table['used']} of {counted(table['rows'], 'row')} used"
         parts.append(Words(head, "head" if table["unused"] else ""))
         for each in table["unused"]:
             ids = listed(each["ids"], len(each["ids"]) if everything else IDS_SHOWN)
             first = f"first in line {each['first_line']}"
             parts.append(Words(f"{counted(each['rows'], 'row')}: {each['why']} ({first}): {ids}", mark="  -"))
+    if silent:
+        parts.append(Words(f"{counted(len(silent), 'more table')}: all rows used"))
     return Section("Rows of the tables", tuple(parts))

@@ -12,6 +12,9 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
+from photostrip.report.commands.check import check_sections
+from photostrip.report.page.parts import Table
+from photostrip.report.page.text import to_text
 from tests.loops import nonempty
 from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample
 from tests.results import spec, write_project
@@ -19,6 +22,8 @@ from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from tests.results import Document
 
 MILLIMETRE = 1e-3
 SAMPLES = sorted((ROOT / "sample_data").glob("*/project.yaml"))
@@ -192,6 +197,49 @@ def test_every_control_coordinate_says_its_sigma_and_where_it_stands(tmp_path: P
     ]
     assert second["sigma"] == [0.05, 0.06, None]
     assert second["sigma_from"][2] is None
+
+
+def crowded(path: Path) -> Document:
+    """Give what a check decodes of a project with too much of everything: lists in many frames, sigmas of all kinds."""
+    document = check_project(path).document
+    frame, control, table = document["frames"][0], document["control"][0], document["rows"][0]
+    unused = [
+        {"why": f"reason {n}", "rows": 50, "first_line": 2, "ids": [f"P{n}" for n in range(50)]} for n in range(5)
+    ]
+    return document | {
+        "frames": [{**frame, "file": f"control-{n}.csv"} for n in range(40)],
+        "control": [{**control, "id": f"G{n}", "sigma": [0.01 * (n % 20), 0.0, 0.0]} for n in range(500)],
+        "rows": [{**table, "file": f"t{n}.csv", "unused": unused if n == 7 else []} for n in range(80)],
+    }
+
+
+def test_a_check_is_short_with_too_much_of_everything(project: Path) -> None:
+    document = crowded(project)
+    printed = to_text("", check_sections(document), 100).splitlines()
+    assert len(printed) <= 60
+    for text in ("38 more frames; --verbose decodes all", "350 more points; --verbose prints every point"):
+        assert text in printed
+    assert "75 more tables: all rows used" in printed
+    everything = to_text("", check_sections(document, everything=True), 100).splitlines()
+    assert sum("control-" in line for line in everything) == 40
+    assert sum(line.startswith("G") for line in everything) == 500
+    assert sum("rows used" in line for line in everything) == 80
+
+
+def test_points_with_the_same_standard_deviations_share_a_line(project: Path) -> None:
+    document = check_project(project).document
+    control, check = (
+        {**document["control"][0], "role": role, "photos": photos} for role, photos in (("control", 2), ("check", 5))
+    )
+    document["control"] = [
+        {**row, "id": f"{n}"} for n in range(10) for row in (control, {**control, "photos": 3}, check)
+    ]
+    section = next(each for each in check_sections(document) if each.title.startswith("Standard"))
+    (table,) = (part for part in section.parts if isinstance(part, Table))
+    assert [(row[0], row[1], row[2], row[6]) for row in table.rows] == [
+        ("0, …", "20", "control", "2 to 3"),
+        ("0, …", "10", "check", "5"),
+    ]
 
 
 def test_a_sigma_from_the_command_line_says_so(tmp_path: Path) -> None:
