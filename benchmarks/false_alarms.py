@@ -41,7 +41,7 @@ WEAK = {"P501", "P502", "P503"}  # told of control that is weak indeed
 ATTEMPTS = 20
 METHODS = ("polynomial", "covariance", "bundle")
 FREE = ("principal_distance", "principal_point", "k1", "k2")
-OBLIQUE_DEG = (15.0, 35.0)
+OBLIQUE_DEG = (15.0, 42.0)
 SOME, HALF, MOST = 0.3, 0.5, 0.7
 EDGE = 112.0  # mm from the centre of a photo
 SYSTEMATIC = 0.005  # mm, largest
@@ -247,7 +247,7 @@ def models(seed: int) -> Sound:
 
 
 def oblique(seed: int) -> Sound:
-    """Put cameras on a mount that looks 15 to 35 degrees aside, ahead or back."""
+    """Put cameras on a mount that looks 15 to 42 degrees aside, ahead or back."""
     rng = np.random.default_rng([18, seed])
 
     def draw(rng: Rng) -> Spec:

@@ -51,9 +51,9 @@ def exit_code_of(error: BaseException, *, debug: bool) -> int:
     for message in messages:
         sys.stderr.write(f"error: {visible(message)}\n")
     if isinstance(error, InputError | GeometryError) and error.findings:
-        from photostrip.report.page.messages import finding_of, line_of
+        from photostrip.report.page.messages import finding_of, lines_of
 
-        sys.stderr.writelines(f"{line_of(finding_of(each))}\n" for each in error.findings)
+        sys.stderr.writelines(f"{line}\n" for line in lines_of([finding_of(each) for each in error.findings]))
     return code
 
 

@@ -60,7 +60,7 @@ def document_of(found: Sequence[Checked]) -> dict[str, Any]:
 def _print_one(checked: Checked, form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
     findings = findings_of(checked)
     head = verdict(checked.path, checked.wrong, checked.remarks)
-    lines = [messages.line_of(each) for each in findings]
+    lines = messages.lines_of(findings)
     sections = () if quiet or not checked.document else check_sections(checked.document, everything=verbose)
     if form is Format.MD:
         marked = "".join(f"- {line}\n" for line in lines)

@@ -37,7 +37,10 @@ MOSAIC_PHOTOS = 10  # of a mosaic that is laid on control: a longer one curls
 LONG_STRIP = 40  # photos: a longer one is looked at in stretches
 STRETCH_PHOTOS, STRETCHES = 30, 4
 BREADTH_SHARE = 0.95  # of the image points lie within the half breadth of a strip
+LEAST_OF_PLANE = 4
 LEAST_RAYS = 2  # photos that must show a given point
+OBLIQUE_DEG = 20.0  # between the cameras and the normal of the ground: more than a tilt, or a slope
+FLAT_SHARE = 0.3  # third over second extent of the points of a strip whose ground has a normal
 MOSAIC_SIGMA = 0.02  # of the flying height: what relief and tilts leave in a mosaic
 
 
@@ -49,11 +52,26 @@ class EvidenceStrip:
     orientation: Orientation
     formed: FormedStrip
 
-    @property
+    @cached_property
     def up(self) -> Floats:
-        """Direction from the ground to the cameras, of length one."""
+        """Upwards, of length one: where the cameras look from, or the normal of the ground below an oblique mount."""
         axis = self.formed.rotations[:, :, 2].mean(axis=0)
-        return np.asarray(axis / max(float(np.linalg.norm(axis)), 1e-12), float)
+        axis = np.asarray(axis / max(float(np.linalg.norm(axis)), 1e-12), float)
+        points = self.formed.xyz[np.isfinite(self.formed.xyz).all(axis=1)]
+        if len(points) < LEAST_OF_PLANE:
+            return axis
+        _, extent, directions = np.linalg.svd(points - np.median(points, axis=0), full_matrices=False)
+        normal = directions[2] * np.sign(directions[2] @ axis)
+        is_oblique = normal @ axis < np.cos(np.radians(OBLIQUE_DEG)) and extent[2] < FLAT_SHARE * extent[1]
+        return np.asarray(normal, float) if is_oblique else axis
+
+    @property
+    def axes(self) -> Floats:
+        """Third axes of the photos (n, 3); under an oblique mount what is upwards for all."""
+        axes = self.formed.rotations[:, :, 2]
+        mean = axes.mean(axis=0)
+        straight = self.up @ mean / max(float(np.linalg.norm(mean)), 1e-12) > np.cos(np.radians(OBLIQUE_DEG))
+        return axes if straight else np.broadcast_to(self.up, axes.shape)
 
     @property
     def depth(self) -> Floats:
@@ -139,7 +157,7 @@ def strip_points(
     return rows, StripPoints(
         formed.strip.id,
         xyz=strip.xyz[row[rows]],
-        axes=strip.rotations[:, :, 2],
+        axes=formed.axes,
         centers=strip.centers,
         floor=(2.0 * share, 2.0 * np.sqrt(2.0) * share * depth / max(base, 1e-12)),
         depth=depth,

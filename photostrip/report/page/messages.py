@@ -5,6 +5,7 @@ Whatever the form, the same findings come out with the same file, line, column, 
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, GeometryError, InputError
@@ -22,6 +23,7 @@ ACCEPTED = "accepted: "
 EMPTY: Document = {
     "file": "", "line": 0, "column": 0, "key": "", "expected": "", "fix": "", "photos": [], "points": []
 }  # fmt: skip
+MOST_OF_A_KIND = 5  # findings, or notes, of one kind that are told to people
 
 
 def finding_of(source: Fault | Note | Finding) -> Document:
@@ -98,6 +100,31 @@ def line_of(finding: Document) -> str:
     if "evidence" in finding:  # the codes of the gate are for people, too: they can be accepted
         values["message"] = f"{finding['code']} {finding['message']}"
     return visible(f"{finding['severity']}: {Fault(**values)}")
+
+
+def lines_of(findings: Sequence[Document]) -> list[str]:
+    """Return findings one a line; of many of one kind that are no faults, five and how many more there are."""
+    count = Counter(_kind(each) for each in findings)
+    told: Counter[tuple[str, str]] = Counter()
+    lines = []
+    for each in findings:
+        kind = _kind(each)
+        told[kind] += 1
+        if told[kind] <= MOST_OF_A_KIND or _is_fault(each):
+            lines.append(line_of(each))
+        elif told[kind] == count[kind]:
+            more = count[kind] - MOST_OF_A_KIND
+            lines.append(f"{kind[0]}: {kind[1]} {more} more like these; --format json names all")
+    return lines
+
+
+def _kind(finding: Document) -> tuple[str, str]:
+    return finding["severity"], finding["code"]
+
+
+def _is_fault(finding: Document) -> bool:
+    """Whether it has to be put right, each at its place: neither a finding of the gate nor a note."""
+    return finding["severity"] == "error" and "evidence" not in finding
 
 
 def annotated(findings: Iterable[Document]) -> str:

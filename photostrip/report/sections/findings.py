@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import groupby, islice
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from photostrip.notes import before
+from photostrip.report.page.messages import MOST_OF_A_KIND
 from photostrip.report.page.parts import Document, Part, Section, Words
 from photostrip.report.sections.strip import elsewhere
 
@@ -17,19 +20,32 @@ def findings_sections(document: Document) -> tuple[Section, ...]:
     findings = document.get("findings", [])
     if not findings:
         return ()
-    parts = tuple(part for each in findings for part in _paragraphs(each))
-    return (Section("Plausibility of the data", parts),)
+    parts: list[Part] = []
+    for _, group in groupby(findings, key=itemgetter("code")):
+        kind = list(group)
+        parts += [part for each in kind[:MOST_OF_A_KIND] for part in _paragraphs(each)]
+        parts += _rest(len(kind) - MOST_OF_A_KIND, kind[0])
+    return (Section("Plausibility of the data", tuple(parts)),)
+
+
+def _rest(number: int, one: Document) -> list[Part]:
+    """Count the findings of a kind that are not shown."""
+    text = f"{one['code']} {one['title']}: {number} more in `findings` of result.json."
+    return [Words(text, _colour(one), "-")] if number > 0 else []
 
 
 def cures_section(document: Document, most: int) -> Section:
     """Say what would put the findings right, and which of them are accepted; what they say stands in the verdict."""
     findings = document.get("findings", [])
+    kinds = len({each["code"] for each in findings})
+    of_a_kind = min(max(most // max(kinds, 1), 1), MOST_OF_A_KIND)
+    shown = [each for _, kind in groupby(findings, key=itemgetter("code")) for each in islice(kind, of_a_kind)][:most]
     parts = [
         Words(f"{each['code']} {each['title']} ({_word(each)}). {_cure(each)}".strip(), _colour(each), "-")
-        for each in findings[:most]
+        for each in shown
     ]
-    if len(findings) > most:
-        parts.append(Words(elsewhere(len(findings) - most, "findings", "findings", "findings")))
+    if len(findings) > len(shown):
+        parts.append(Words(elsewhere(len(findings) - len(shown), "findings", "findings", "findings")))
     return Section("Plausibility of the data", tuple(parts))
 
 

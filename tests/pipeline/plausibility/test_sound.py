@@ -55,8 +55,8 @@ def test_one_control_list_outside_its_area_is_told_alone() -> None:
     spec = Spec(
         seed=3,
         ground=Ground("EPSG:28404", center_deg=(24.0, 42.5)),
-        flight=Flight(photos=9, scale=20000.0),
-        control=Control(bands=4, second_crs="EPSG:28405", boundary_longitude_deg=24.0),
+        flight=Flight(photos=23, scale=10000.0),
+        control=Control(every=3, second_crs="EPSG:28405", boundary_longitude_deg=24.0),
     )
     made = simulate(spec)
     assert told(inputs_of(made), settings_of(made)) == ["P402"]

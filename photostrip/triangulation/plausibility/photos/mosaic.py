@@ -32,7 +32,7 @@ LEAST_COMMON_OF_MIRROR = 5  # common points that tell a mirror image
 MIRROR_MISFIT_SHARE = 0.25  # of the mirrored to the plain misfit
 MOST_MIRROR_MISFIT = 0.12  # of the spread of the points; relief and tilts leave less
 LEAST_BREADTH = 0.15  # breadth over length of the common points: mirror images of a line fit as well
-SCALE_JUMP = 2.5  # ratio of the scales of two photos that no change of the flying height explains
+SCALE_JUMP = 4.0  # ratio of the scales of two photos that neither height nor an oblique mount explains
 TINY = 1e-12
 
 
