@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
 from photostrip.report.page.messages import findings_of, line_of
-from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms
+from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, seen_at
 
 if TYPE_CHECKING:
     from photostrip.report.page.parts import Document
@@ -29,12 +29,12 @@ EXIT_CODES = {
 def outcome_of(document: Document, findings: list[Document]) -> Document:
     """Return the line of the summary for a result with its findings.
 
-    The rms are those at check points, at control points where there are none; ``rms_at`` says which. Points that stand
-    out are left out. ``messages`` are
+    The rms are those at check points, at control left out in turn, or at control points; ``rms_at`` says which. Points
+    that stand out are left out. ``messages`` are
     sentences, worst first.
     """
     summary, status = document["summary"], document["status"]
-    role = "check" if any(summary["check"][part]["count"] for part in ("plan", "height")) else "control"
+    role = seen_at(document)
     return {
         "status": status,
         "exit_code": EXIT_CODES[status],
@@ -44,7 +44,7 @@ def outcome_of(document: Document, findings: list[Document]) -> Document:
         "points": len(document["points"]),
         "rejected": len(document["rejected"]),
         "sigma0_um": summary["sigma0_um"],
-        "rms_at": role,
+        "rms_at": "left-out" if role == "cross_validation" else role,
         "rms_plan_m": headline_rms(document, role, "plan")["rms"],
         "rms_height_m": headline_rms(document, role, "height")["rms"],
         "messages": [document["verdict"]["verification"]] if status == UNVERIFIED else document["verdict"]["look_at"],

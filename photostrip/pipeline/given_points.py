@@ -12,9 +12,9 @@ from photostrip.points import ControlPoints, PhotoPoints, locate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.results import Adjusted
+    from photostrip.pipeline.results import Adjusted, Result
 
 
 def measured_control(control: ControlPoints, observations: PhotoPoints) -> ControlPoints:
@@ -66,3 +66,18 @@ def compare_with_given(
             given = np.where(np.isnan(control.enu[inside]), adjusted, control.enu[inside])
             differences[inside] = frame.difference(adjusted, given)
     return AtGivenPoints(rows, np.where(control.use, differences, np.nan))
+
+
+def rejected_control(result: Result) -> Flags:
+    """Return which control coordinates (c, 3) were given for use and that nothing used, having been found wrong."""
+    control = result.inputs.control
+    held, used = np.zeros((len(control), 1), bool), np.zeros(control.use.shape, bool)
+    if result.bundle is not None:
+        problem, selection = result.bundle.screened.problem, result.bundle.screened.selection
+        rows = locate(map(problem.point_name, problem.control.point.tolist()), control.ids)
+        held[rows], used[rows] = True, selection.control
+    for strip in result.photo_strips if result.bundle is None else ():
+        rows = locate(strip.control.ids, control.ids)
+        held[rows] = True
+        used[rows] |= strip.control.use
+    return np.asarray(control.use & held & ~used & ~control.check[:, None], bool)

@@ -71,14 +71,14 @@ def correct(photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground:
 def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, ground: GroundFrames) -> Heights:
     """Mean heights of cameras and ground from the strips, adjusted as they will be, in the frames of the run."""
     control = measured_control(inputs.control, observations)
+    formed = form_photos(inputs, observations, settings)
     if settings.adjustment == "bundle":
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
-        adjusted = adjust_block(inputs, settings, observations, control, ground)
+        adjusted = adjust_block(inputs, settings, observations, control, ground, formed)
         strips, points = adjusted.strips, adjusted.points.cartesian
         singles = () if adjusted.bundle is None else adjusted.bundle.singles
     else:
-        formed = form_photos(inputs, observations, settings)
         strips = tuple(adjust_formed(stage, control, ground.control, settings) for stage in formed)
         points, singles = mean_points(strips).xyz, ()
     of_strips = [strip.intermediate.cartesian_from_intermediate(strip.centers) for strip in strips]

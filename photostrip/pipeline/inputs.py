@@ -142,6 +142,7 @@ class Settings:
     interior: InteriorSettings = field(default_factory=InteriorSettings)
     refinement: ImageCorrectionSettings = field(default_factory=ImageCorrectionSettings)
     precision: bool = True  # whether standard deviations and covariances of points and photos are computed
+    cross_validation: bool = False  # whether control is left out in turn
     # angle_system, angle_unit: system (``geometry.rotation.SYSTEMS``) and unit (``"deg"``, ``"gon"``, ``"rad"``) of
     # exported angles
     angle_system: str = "alpha-omega-kappa"

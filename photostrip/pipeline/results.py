@@ -315,6 +315,7 @@ class Result:
     precision: Precision | None = None  # how precise points and photos are; None when it was not computed
     bundle: Bundle | None = None  # the bundle adjustment; ``strips`` then carry its orientations and points
     findings: tuple[Finding, ...] = ()  # what the data say against themselves
+    folds: tuple[Fold, ...] = ()  # the cross-validation, when it was asked for
 
     @property
     def photo_strips(self) -> tuple[StripResult, ...]:
@@ -334,3 +335,12 @@ class Result:
             if row >= 0:
                 roles[row] = CHECK if check else CONTROL
         return tuple(roles)
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """One adjustment of a cross-validation."""
+
+    left_out: tuple[str, ...]  # control points that were check points in it; no others were
+    result: Result | None  # None where it could not be made
+    reason: str = ""  # why not

@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.pipeline.common_points import join_strips
+from photostrip.pipeline.cross_validation import cross_validate
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
 from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
 from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
-from photostrip.pipeline.results import Result
-from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control
+from photostrip.pipeline.results import AdjustedStrips, Result
+from photostrip.pipeline.strips.absolute import StripStage, orient_on_control, reject_wrong_control
 from photostrip.pipeline.strips.adjusting import adjust
 from photostrip.pipeline.strips.forming import form_strips
 from photostrip.pipeline.unchecked_control import unchecked_control_notes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from photostrip.pipeline.inputs import Inputs, Settings
+    from photostrip.pipeline.strips.photos import FormedPhotos
+    from photostrip.points import PhotoPoints
 
 
 def triangulate(
@@ -62,46 +66,58 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     """Every stage takes what the stages before it found."""
     # 1 lens distortion, refraction
     refined = correct(photo, inputs, settings, ground)
-    control = measured_control(inputs.control, refined.observations)
+    # 2-5 relative orientation, base direction and orientation chain, space intersection, strip formation
+    formed = form_strips(inputs, refined.observations, settings)
 
+    def on_the_ground(inputs: Inputs) -> Result:
+        adjusted = _adjusted(inputs, settings, ground, refined.observations, formed)
+        # 9 residuals, check points
+        at_given = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
+        return Result(
+            inputs=inputs,
+            settings=settings,
+            frames=ground.control,
+            output=ground.output,
+            measured=photo.observations,
+            interior=photo.interior,
+            refined=replace(refined, observations=adjusted.observations),
+            strips=adjusted.strips,
+            points=adjusted.points,
+            control_rows=at_given.rows,
+            control_differences=at_given.differences,
+            ties=adjusted.ties,
+            not_determined=not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips),
+            notes=(
+                *(photo.interior.notes if photo.interior is not None else ()),
+                *adjusted.notes,
+                *curvature_notes(inputs, settings),
+                *unchecked_control_notes(adjusted, settings.bundle.power),
+            ),
+            precision=adjusted.precision,
+            bundle=adjusted.bundle,
+        )
+
+    result = on_the_ground(inputs)
+    # 10 what the result says of control that it has not seen
+    return replace(result, folds=cross_validate(result, on_the_ground)) if settings.cross_validation else result
+
+
+def _adjusted(
+    inputs: Inputs,
+    settings: Settings,
+    ground: GroundFrames,
+    observations: PhotoPoints,
+    formed: Sequence[StripStage[Any]],
+) -> AdjustedStrips:
+    """Bring formed strips to the ground and adjust them, each by itself or all in a bundle."""
+    control = measured_control(inputs.control, observations)
     if settings.adjustment == "bundle" and inputs.models is None:
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
-        adjusted = adjust_block(inputs, settings, refined.observations, control, ground)
-    else:
-        # 2-5 relative orientation, base direction and orientation chain, space intersection, strip formation
-        formed = form_strips(inputs, refined.observations, settings)
-
-        # 6-7 intermediate frame, absolute orientation
-        oriented = [orient_on_control(strip, control, ground.control) for strip in formed]
-        screened = [reject_wrong_control(strip, settings) for strip in oriented]
-
-        # 8 polynomials, or the strip's own covariance
-        strips = tuple(adjust(strip, settings) for strip in screened)
-        adjusted = join_strips(strips, screened, refined.observations, inputs.control, ground.output, settings)
-
-    # 9 residuals, check points
-    at_given = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
-    return Result(
-        inputs=inputs,
-        settings=settings,
-        frames=ground.control,
-        output=ground.output,
-        measured=photo.observations,
-        interior=photo.interior,
-        refined=replace(refined, observations=adjusted.observations),
-        strips=adjusted.strips,
-        points=adjusted.points,
-        control_rows=at_given.rows,
-        control_differences=at_given.differences,
-        ties=adjusted.ties,
-        not_determined=not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips),
-        notes=(
-            *(photo.interior.notes if photo.interior is not None else ()),
-            *adjusted.notes,
-            *curvature_notes(inputs, settings),
-            *unchecked_control_notes(adjusted, settings.bundle.power),
-        ),
-        precision=adjusted.precision,
-        bundle=adjusted.bundle,
-    )
+        return adjust_block(inputs, settings, observations, control, ground, cast("Sequence[FormedPhotos]", formed))
+    # 6-7 intermediate frame, absolute orientation
+    oriented = [orient_on_control(strip, control, ground.control) for strip in formed]
+    screened = [reject_wrong_control(strip, settings) for strip in oriented]
+    # 8 polynomials, or the strip's own covariance
+    strips = tuple(adjust(strip, settings) for strip in screened)
+    return join_strips(strips, screened, observations, inputs.control, ground.output, settings)

@@ -302,6 +302,7 @@ def settings(project: ProjectFile) -> Settings:
     return Settings(
         adjustment=wanted.adjustment,
         precision=wanted.precision,
+        cross_validation=wanted.cross_validation,
         relative=_laid_over(usual.relative, wanted.relative),
         links=_laid_over(usual.links, wanted.links),
         formation=replace(usual.formation, scale_transfer=wanted.scale_transfer),

@@ -8,7 +8,7 @@ from photostrip import __version__
 from photostrip.result import conventions, summary
 from photostrip.result.adjustment import bundle, covariance, deformation, junctions, links, pairs, rejected, strips
 from photostrip.result.numbers import Document, natural_rank
-from photostrip.result.points import given, ground, image_coordinates, photos, precision
+from photostrip.result.points import cross_validation, given, ground, image_coordinates, photos, precision
 from photostrip.result.verdict import verdict_of
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         **strips.polynomials_of(result),
         **covariance.covariances_of(result),
         **precision.precision_of(result, found),
+        **cross_validation.cross_validation_of(result),
         **bundle.bundle_of(result),
         "control": given.control_of(result, found),
         "misclosures": given.misclosures_of(result),

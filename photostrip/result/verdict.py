@@ -45,6 +45,8 @@ def verdict_of(document: Document) -> Document:
         *_odd(document, "control"),
         *_odd(document, "check"),
         *_checks(document),
+        *_odd(document, "cross_validation"),
+        *_cross_validation(document),
         *_sigma0(document),
         *_pairs(document),
         *_photos(document),
@@ -67,38 +69,63 @@ def accuracy(document: Document) -> str:
     Check points that stand out are told apart: one wrong given point says nothing about the others.
     """
     scale = "model" if document["summary"].get("model_scale") else "photo"
-    for role, words in (("check", "check points, which took no part"), ("control", "control points")):
-        whole = document["summary"][role]
-        sound = {name: headline_rms(document, role, name) for name in PARTS}
-        parts = [
-            f"{part['rms']:.3f} m in {name} ({part['rms_um']:.1f} µm at {scale} scale, {part['count']} points)"
-            for name, part in sound.items()
-            if part["count"]
-        ]
-        if parts:
-            out = [
-                f"{whole[name]['rms']:.3f} m in {name} with {listed(names)}"
-                for name in PARTS
-                if (names := _standing_out(document, role, name))
-            ]
-            return f"rms {' and '.join(parts)} at {words}" + (f"; {' and '.join(out)}" if out else "")
-    return "no given point was measured"
+    at = {
+        "check": "check points, which took no part",
+        "cross_validation": "control points left out in turn",
+        "control": "control points",
+    }
+    role = seen_at(document)
+    sound = {name: headline_rms(document, role, name) for name in PARTS}
+    parts = [
+        f"{part['rms']:.3f} m in {name} ({part['rms_um']:.1f} µm at {scale} scale, {part['count']} points)"
+        for name, part in sound.items()
+        if part["count"]
+    ]
+    if not parts:
+        return "no given point was measured"
+    out = [
+        f"{_whole(document, role)[name]['rms']:.3f} m in {name} with {listed(names)}"
+        for name in PARTS
+        if (names := _standing_out(document, role, name))
+    ]
+    return f"rms {' and '.join(parts)} at {at[role]}" + (f"; {' and '.join(out)}" if out else "")
+
+
+def seen_at(document: Document) -> str:
+    """Return what says most about the points: ``check``, ``cross_validation`` or ``control``."""
+    found = (role for role in ("check", "cross_validation") if any(_counts(document, role)))
+    return next(found, "control")
+
+
+def _counts(document: Document, role: str) -> list[int]:
+    return [_whole(document, role).get(part, {}).get("count") or 0 for part in PARTS]
+
+
+def _whole(document: Document, role: str) -> Document:
+    found: Document = document.get(role, {}) if role == "cross_validation" else document["summary"][role]
+    return found
+
+
+def _rows(document: Document, role: str) -> list[Document]:
+    if role == "cross_validation":
+        found: list[Document] = document.get(role, {}).get("points", [])
+        return found
+    return [row for row in document["control"] if row["role"] == role]
 
 
 def headline_rms(document: Document, role: str, part: str) -> Document:
     """Return count and rms of the differences in plan or height without those that stand out, metres and µm."""
-    whole: Document = document["summary"][role][part]
     out = _standing_out(document, role, part)
     if not out:
+        whole: Document = _whole(document, role)[part]
         return whole
-    rows = [row for row in document["control"] if row["role"] == role and row[part] is not None]
-    kept = [_without_rejected(row) for row in rows if row["id"] not in out]
+    kept = [_without_rejected(row) for row in _rows(document, role) if row["id"] not in out]
     kept = [row for row in kept if row[part] is not None]
     return {"count": len(kept), "rms": _rms(kept, part), "rms_um": _rms(kept, f"{part}_um")}
 
 
 def _standing_out(document: Document, role: str, part: str) -> list[str]:
-    return [row["id"] for row in document["control"] if row["role"] == role and part in row["stands_out"]]
+    return [row["id"] for row in _rows(document, role) if part in row["stands_out"]]
 
 
 def _rms(rows: list[Document], key: str) -> float:
@@ -134,13 +161,13 @@ def _without_rejected(row: Document) -> Document:
 def _odd(document: Document, role: str) -> Iterator[str]:
     """Name the points that do not go with the others, in plan and in height, and that no finding has named."""
     named = {point for each in _open_findings(document) for point in each["points"]}
+    what = "control point {}, left out," if role == "cross_validation" else f"{role} point {{}}"
     for name in PARTS:
-        others = headline_rms(document, role, name)["rms"]
-        for row in document["control"]:
-            if row["role"] == role and name in row["stands_out"] and row["id"] not in named:
+        for row in _rows(document, role):
+            if name in row["stands_out"] and row["id"] not in named:
                 yield (
-                    f"{role} point {row['id']} stands out: {abs(row[name]):.3f} m in {name}, "
-                    f"the others have an rms of {others:.3f} m"
+                    f"{what.format(row['id'])} stands out: {abs(row[name]):.3f} m in {name}, "
+                    f"the others have an rms of {headline_rms(document, role, name)['rms']:.3f} m"
                 )
 
 
@@ -162,6 +189,21 @@ def _checks(document: Document) -> Iterator[str]:
         yield (
             f"the check points are farther off than the standard deviations of the points let expect: {'; '.join(said)}"
             f"; probability {_percent(min(chances) * len(chances))} by chance"
+        )
+
+
+def _cross_validation(document: Document) -> Iterator[str]:
+    """Say when control that was left out contradicts the standard deviations of the points."""
+    found = document.get("cross_validation")
+    if found and found["p"] is not None and found["p"] < CHECK_LEVEL:
+        said = [
+            f"in {name} {part['ratio']:.1f} times, {part['inside_95']} of {part['count']} inside the 95 % {AREAS[name]}"
+            for name in PARTS
+            if (part := found[name])["count"]
+        ]
+        yield (
+            "control points left out in turn are farther off than the standard deviations of the points let expect: "
+            f"{'; '.join(said)}; probability {_percent(found['p'])} by chance"
         )
 
 

@@ -75,6 +75,7 @@ processing:
   earth_curvature: auto
   earth_radius: 6371000.0
   precision: true
+  cross_validation: false
   principal_point: true
   distortion: true
   refraction: false

@@ -28,6 +28,9 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             metavar="FILE", help="Write every iteration with the symbols of the formulas: .txt, .md or .json."
         ),
     ] = None,
+    cross_validate: Annotated[
+        bool, typer.Option("--cross-validate", help="Leave the control out in turn, and compare there.")
+    ] = False,
     methods: Annotated[
         bool, typer.Option("--compare-methods", help="Adjust in every way there is, side by side at check points.")
     ] = False,
@@ -57,17 +60,18 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     _refuse_contradictions(output, depfile=depfile, trace=trace, methods=methods, html=html, strict=strict)
     refuse_sections(section, "a comparison of methods" if methods else form)
     messages = Messages(quiet=quiet, verbose=verbose)
+    assignments = [*(["processing.cross_validation=true"] if cross_validate else []), *(assignments or [])]
     if methods:
         from photostrip.cli.jobs.method_comparison import compare_methods
 
-        return compare_methods(project, assignments or [], output, form, width, messages, html=html)
+        return compare_methods(project, assignments, output, form, width, messages, html=html)
     with failures_as(form), progress(sys.stderr, quiet=quiet) as waiting:
         if html:
             from photostrip.report.html import check_html, to_html
 
             check_html()
         waiting.at(f"reading {project}")
-        loaded = load_project(project, assignments or [])
+        loaded = load_project(project, assignments)
         messages.step(f"read {len(loaded.files)} files, {len(loaded.inputs.observations)} image points")
         waiting.at(f"adjusting {sum(len(strip.photos) for strip in loaded.inputs.strips)} photos")
         result = loaded.result(adjust_project(loaded))

@@ -14,7 +14,6 @@ from photostrip.pipeline.block import start as block_start
 from photostrip.pipeline.block.check_points import check_errors
 from photostrip.pipeline.block.datum import known_of
 from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart, Bundle, SinglePhoto
-from photostrip.pipeline.strips.forming import form_photos
 from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.correlations import Correlation, correlations
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
+    from photostrip.pipeline.strips.photos import FormedPhotos
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
     from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
@@ -44,14 +44,15 @@ def adjust_block(
     observations: PhotoPoints,
     control: ControlPoints,
     ground: GroundFrames,
+    stages: Sequence[FormedPhotos],
 ) -> AdjustedStrips:
     """Adjust all strips of a project together.
 
+    stages: strips of two photos or more, which give the start.
     Raises GeometryError when a strip, a photo or the datum cannot be determined, by name.
     """
     known = known_of(inputs, control, ground)
-    formed = form_photos(inputs, observations, settings)
-    start = block_start.start(inputs, settings, formed, observations, known)
+    start = block_start.start(inputs, settings, stages, observations, known)
     block = block_problem.build(inputs, settings, observations, control, ground, start)
     try:
         block = _refilled(block, control, ground.control)

@@ -163,6 +163,10 @@ class Processing(Section):
         "Radius of the Earth for `earth_curvature: model` and `image`", DEFAULTS.absolute.earth_radius, unit="m"
     )
     precision: Flag = key("Compute standard deviations and covariances of points and photos", DEFAULTS.precision)
+    cross_validation: Flag = key(
+        "Adjust again without each point of the control, or each of ten groups of it, and compare there",
+        DEFAULTS.cross_validation,
+    )
     principal_point: Flag = key(
         "Reduce image coordinates to the principal point of the camera", DEFAULTS.refinement.principal_point
     )

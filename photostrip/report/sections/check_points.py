@@ -1,11 +1,11 @@
-"""The section on check points: their differences against the standard deviations of the adjusted and given points."""
+"""Sections on check points and on control left out in turn: differences against their standard deviations."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.numbers import fixed, joined, listed, metres, ratio, signed
-from photostrip.report.page.parts import Document, Section, Table, Words
+from photostrip.report.page.numbers import counted, fixed, joined, listed, metres, ratio, signed
+from photostrip.report.page.parts import Document, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.points import AXES, DIFFERENCES, IDS_NAMED, given_table, largest
 from photostrip.report.sections.strip import ALL_SHOWN, worst_first
@@ -13,15 +13,27 @@ from photostrip.report.sections.strip import ALL_SHOWN, worst_first
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from photostrip.report.page.tables import Shown
+
 PARTS = "plan", "height"
 UNKNOWN = dict.fromkeys(("plan", "height", "p_plan", "p_height", "sigma_x", "sigma_y", "sigma_z"))
+MEANING = (
+    "σ: of the adjusted point; z: difference over its standard deviation, that of the given point included (in plan "
+    "the length in the metric of the covariance: 2.45 for 95 %); p: probability of a larger one by chance"
+)
+FAILED_SHOWN = 3
 
 
 def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
     """Differences at the check points."""
     rows = [row for row in document["control"] if row["role"] == "check" and row["measured"]]
     if not rows:
-        text = "None. What lies between the control points is not proven by anything in this report."
+        proven = "cross_validation" in document
+        text = (
+            "None."
+            if proven
+            else "None. What lies between the control points is not proven by anything in this report."
+        )
         return Section("Check points", (Words(text),))
     text = "Adjusted minus given. These points took no part in anything: they say how good the new points are."
     check = document.get("precision", {}).get("check")
@@ -33,49 +45,100 @@ def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
 
 
 def _tested(document: Document, given: Sequence[Document], *, everything: bool, most: int) -> Table:
-    check, axes, summary = document["precision"]["check"], document["frame"]["axes"], document["summary"]
+    check = document["precision"]["check"]
     tested = {row["id"]: row for row in check["points"]}
     points = {row["id"]: row for row in document["points"]}
-    rows = [{**row, "point": points.get(row["id"], UNKNOWN), "z": tested.get(row["id"], UNKNOWN)} for row in given]
+    rows = []
+    for row in given:
+        point, z = points.get(row["id"], UNKNOWN), tested.get(row["id"], UNKNOWN)
+        sigma = {key: point[key] for key in ("sigma_x", "sigma_y", "sigma_z")}
+        likely = {"z_plan": z["plan"], "z_height": z["height"], "p_plan": z["p_plan"], "p_height": z["p_height"]}
+        rows.append({**row, **sigma, **likely})
+    more = (words("use", "use", rank=2), words("strips", lambda row: ", ".join(row["strips"]), rank=3))
+    over = [check[part]["rms"] for part in PARTS]
+    odd = [row["id"] for row in given if row.get("stands_out")]
+    without = f"rms of z without {listed(odd, IDS_NAMED)}" if odd else ""
     where = ("points", "check", "control")
     shown, note = worst_first(rows, _unlikely, where, everything=everything, most=most)
+    return _table(document, rows, shown, more, over, joined(note, MEANING, without))
+
+
+def cross_validation_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
+    """Differences at control that was left out in turn."""
+    block = document["cross_validation"]
+    rows, folds = block["points"], block["folds"]
+    made = [fold for fold in folds if not fold["reason"]]
+    chance = "" if block["p"] is None else f" Probability of larger errors by chance: {_percent(block['p'])} %."
+    text = (
+        f"The same adjustment without some of the control, {counted(len(made), 'time')}: adjusted minus given at the "
+        f"points that it did not see.{chance}"
+    )
+    parts: list[Part] = [Words(text)]
+    parts += [
+        Words(f"not without {listed(fold['left_out'], IDS_NAMED)}: {fold['reason']}", "look", "-")
+        for fold in [fold for fold in folds if fold["reason"]][:FAILED_SHOWN]
+    ]
+    if rows:
+        where = ("points", "cross-validation", "cross_validation")
+        shown, note = worst_first(rows, _unlikely, where, everything=everything, most=most)
+        over = [block[part]["ratio"] for part in PARTS]
+        parts.append(_table(document, rows, shown, (number("time", "fold", rank=2),), over, joined(note, MEANING)))
+    return Section("Cross-validation", tuple(parts))
+
+
+def _table(
+    document: Document,
+    rows: Sequence[Document],
+    shown: Sequence[Document],
+    more: Sequence[Shown],
+    over: Sequence[float | None],
+    note: str,
+) -> Table:
+    """Return the table of points that the adjustment has not seen.
+
+    more: further columns.
+    over: rms of the differences over their standard deviations in plan and in height.
+    """
+    axes = document["frame"]["axes"]
     columns = (
         words("point", "id"),
         *(number(f"d {axis}", key, signed, "m") for axis, key in zip(axes, DIFFERENCES, strict=True)),
-        *(number(f"σ {axis}", f"point.sigma_{key}", 3, "m", rank=1) for axis, key in zip(axes, AXES, strict=True)),
+        *(number(f"σ {axis}", f"sigma_{key}", 3, "m", rank=1) for axis, key in zip(axes, AXES, strict=True)),
         *(
             column
             for part in PARTS
-            for column in (number(f"z {part}", f"z.{part}", 2), number("p", f"z.p_{part}", _percent, "%"))
+            for column in (number(f"z {part}", f"z_{part}", 2), number("p", f"p_{part}", _percent, "%"))
         ),
-        words("use", "use", rank=2),
-        words("strips", lambda row: ", ".join(row["strips"]), rank=3),
+        *more,
     )
-    rms, mean = summary["check_rms"], summary["check_mean"]
-    blank, nothing = ("",) * 3, ("",) * 6
-    over = [cell for part in PARTS for cell in (ratio(check[part]["rms"]), "")]
+    found = [[row[key] for row in rows if row[key] is not None] for key in DIFFERENCES]
+    blank, nothing = ("",) * 3, ("",) * len(more)
+    z = [cell for part in over for cell in (ratio(part), "")]
     foot = (
-        ("rms", *(metres(rms[axis]) for axis in AXES), *blank, *over, "", ""),
-        ("mean", *(signed(mean[axis]) for axis in AXES), *blank, *nothing),
+        ("rms", *(metres(_rms(values)) for values in found), *blank, *z, *nothing),
+        ("mean", *(signed(_mean(values)) for values in found), *blank, *("",) * 4, *nothing),
         (
             "largest",
-            *(largest(given, key, axis) for key, axis in zip(DIFFERENCES, axes, strict=True)),
+            *(largest(rows, *each) for each in zip(DIFFERENCES, axes, strict=True)),
             *blank,
+            *("",) * 4,
             *nothing,
         ),
     )
-    below = (
-        "σ: of the adjusted point; z: difference over its standard deviation, that of the given point included (in "
-        "plan the length in the metric of the covariance: 2.45 for 95 %); p: probability of a larger one by chance"
-    )
-    odd = [row["id"] for row in given if row.get("stands_out")]
-    without = f"rms of z without {listed(odd, IDS_NAMED)}" if odd else ""
-    return tabulated(shown, columns, foot, joined(note, below, without))
+    return tabulated(shown, columns, foot, note)
+
+
+def _rms(values: Sequence[float]) -> float | None:
+    return (sum(value**2 for value in values) / len(values)) ** 0.5 if values else None
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return sum(values) / len(values) if values else None
 
 
 def _unlikely(row: Document) -> float:
     """How unlikely the difference of a point is, in plan or in height."""
-    known = [row["z"][f"p_{part}"] for part in PARTS if row["z"][f"p_{part}"] is not None]
+    known = [row[f"p_{part}"] for part in PARTS if row[f"p_{part}"] is not None]
     return -min(known, default=1.0)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from photostrip.errors import faults_instead
 from photostrip.report.page.parts import Document, Section, Words
 from photostrip.report.sections.bundle import bundle_sections
-from photostrip.report.sections.check_points import check_section
+from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.covariance import covariance_section
 from photostrip.report.sections.decisions import decisions_section, weights_section
 from photostrip.report.sections.findings import findings_sections
@@ -58,6 +58,7 @@ class SectionName(StrEnum):
     DEFORMATIONS = "deformations"
     CONTROL = "control"
     CHECK = "check"
+    CROSS_VALIDATION = "cross-validation"
     TIES = "ties"
     IMAGES = "images"
     REJECTED = "rejected"
@@ -116,6 +117,8 @@ def _of_the_points(document: Document, *, everything: bool) -> Iterator[tuple[Se
     """Give what is left at points and photos, what was rejected, what is not determined."""
     yield SectionName.CONTROL, control_section(document, everything=everything)
     yield SectionName.CHECK, check_section(document, everything=everything)
+    if "cross_validation" in document:
+        yield SectionName.CROSS_VALIDATION, cross_validation_section(document, everything=everything)
     if document["counts"]["strips"] > 1 and "bundle" not in document:
         yield SectionName.TIES, ties_section(document, everything=everything)
     if not of_models(document):

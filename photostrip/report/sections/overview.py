@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from photostrip.report.page.layout import USUAL, lay_out
 from photostrip.report.page.numbers import counted, fixed, listed, metres, micrometres, percent
 from photostrip.report.page.parts import Document, Facts, Section, Words
-from photostrip.report.sections.check_points import check_section
+from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.decisions import chosen_degrees
 from photostrip.report.sections.findings import cures_section
 from photostrip.report.sections.models import of_models
@@ -55,11 +55,17 @@ def _overview(document: Document, most: int) -> tuple[Section, ...]:
         Section("Stages", (Facts(tuple(_stages(document))),)),
         control_section(document, everything=False, most=most),
         check_section(document, everything=False, most=most),
+        *_left_out(document, most),
         Section("Worst", (Facts(tuple(_worst(document))),)),
         _notes(remarks, most),
         Section("", (Words("All sections: --verbose; some of them: --section NAME, names in --help."),)),
     )
     return tuple(section for section in found if section.parts)
+
+
+def _left_out(document: Document, most: int) -> Iterator[Section]:
+    if "cross_validation" in document:
+        yield cross_validation_section(document, everything=False, most=most)
 
 
 def _project(document: Document) -> Rows:

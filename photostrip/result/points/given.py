@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.pipeline.given_points import rejected_control
 from photostrip.points import locate
 from photostrip.result.numbers import Document, natural_rank
 from photostrip.result.points.standing_out import stand_out
@@ -72,7 +73,7 @@ def differences(result: Result) -> Differences:
     with np.errstate(invalid="ignore"):
         ratio = np.abs(result.control_differences) / sigma
     normalised = np.where(np.isnan(ratio).all(axis=1), np.nan, np.nan_to_num(ratio).max(axis=1, initial=0.0))
-    rejected = _rejected(result)
+    rejected = rejected_control(result)
     return Differences(
         axes=result.output.user_from_internal(axes),
         parts=parts,
@@ -108,21 +109,6 @@ def of_used(result: Result, found: Differences) -> Differences:
     of_axes = of_parts if result.output.kind != "geocentric" else whole
     axes = np.where(result.output.user_from_internal(of_axes) > 0, np.nan, found.axes)
     return replace(found, axes=axes, parts=np.where(of_parts, np.nan, found.parts))
-
-
-def _rejected(result: Result) -> Flags:
-    """Control coordinates that were given for use and that nothing used."""
-    control = result.inputs.control
-    held, used = np.zeros((len(control), 1), bool), np.zeros(control.use.shape, bool)
-    if result.bundle is not None:
-        problem, selection = result.bundle.screened.problem, result.bundle.screened.selection
-        rows = locate(map(problem.point_name, problem.control.point.tolist()), control.ids)
-        held[rows], used[rows] = True, selection.control
-    for strip in result.photo_strips if result.bundle is None else ():
-        rows = locate(strip.control.ids, control.ids)
-        held[rows] = True
-        used[rows] |= strip.control.use
-    return np.asarray(control.use & held & ~used & ~control.check[:, None], bool)
 
 
 def _turned(found: Floats, frame: GroundFrame, place: Floats, axes: Floats) -> Floats:

@@ -202,7 +202,7 @@ def _check(result: Result, found: Differences) -> Document:
     strip: the test of all of them is made with their joint covariance, and points that lie outside are counted as so
     many as are independent. Points that stand out take no part in these tests: they have been named.
     """
-    rows, values = _normalised(result)
+    rows, values = normalised(result)
     if result.precision is None or np.isnan(values).all():
         return {}
     ids = [result.inputs.control.ids[row] for row in rows]
@@ -213,12 +213,11 @@ def _check(result: Result, found: Differences) -> Document:
     coordinates = sum(errors.coordinates for errors in tests.values())
     share = sum(errors.independent for errors in tests.values()) / max(coordinates, 1)
     sound = values[[name not in left_out for name in ids]]
-    chance = np.column_stack([np.exp(-(values[:, 0] ** 2) / 2), [erfc(abs(z) / sqrt(2)) for z in values[:, 1]]])
-    points = {"id": ids, "plan": values[:, 0], "height": values[:, 1]}
+    points = {"id": ids, "plan": values[:, 0], "height": values[:, 1], **chances(values)}
     return {
         "plan": _inside(sound[:, 0], INSIDE["plan"], 2, share),
         "height": _inside(sound[:, 1], INSIDE["height"], 1, share),
-        "points": records("precision.check.points", {**points, "p_plan": chance[:, 0], "p_height": chance[:, 1]}),
+        "points": records("precision.check.points", points),
         "tests": [
             {
                 "strip": name,
@@ -233,6 +232,12 @@ def _check(result: Result, found: Differences) -> Document:
     }
 
 
+def chances(normalised: Floats) -> dict[str, Floats]:
+    """Return the probabilities of larger differences in plan and in height, from those (n, 2) of ``normalised``."""
+    height = np.array([erfc(abs(z) / sqrt(2)) for z in normalised[:, 1]])
+    return {"p_plan": np.exp(-(normalised[:, 0] ** 2) / 2), "p_height": height}
+
+
 def _inside(values: Floats, limit: float, coordinates: int, share: float) -> Document:
     """Count the differences within their 95 % ellipse or interval; their rms, of one coordinate."""
     known = values[~np.isnan(values)]
@@ -242,7 +247,7 @@ def _inside(values: Floats, limit: float, coordinates: int, share: float) -> Doc
     return {"count": len(known), "inside_95": inside, "rms": size, "p": chance}
 
 
-def _normalised(result: Result) -> tuple[Numbers, Floats]:
+def normalised(result: Result) -> tuple[Numbers, Floats]:
     """Check points with coordinates, and their differences in units of their standard deviations.
 
     In plan the length of the difference in the metric of its covariance, in height the difference with its sign.

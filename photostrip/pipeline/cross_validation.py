@@ -1,0 +1,59 @@
+"""Control left out in turn: how far off the same adjustment is where it does not know the ground.
+
+The strips are formed once; what is repeated is all that looks at the control: absolute orientation, search for wrong
+control, polynomials, covariance or bundle adjustment, precision.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError, InputError
+from photostrip.pipeline.given_points import rejected_control
+from photostrip.pipeline.results import Fold
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from photostrip.arrays import Numbers
+    from photostrip.pipeline.inputs import Inputs
+    from photostrip.pipeline.results import Result
+
+FOLDS = 10  # adjustments that are made at most
+
+
+def cross_validate(result: Result, adjust: Callable[[Inputs], Result]) -> tuple[Fold, ...]:
+    """Adjust again without each point of the control, or without each of so many groups, and compare with it there.
+
+    adjust: adjusts the formed strips with other control.
+    """
+    control = result.inputs.control
+    folds = []
+    for group in _groups(result):
+        left_out = np.isin(np.arange(len(control)), group)
+        given = replace(control, check=left_out).take(np.flatnonzero(~control.check))
+        ids = tuple(control.ids[row] for row in np.sort(group))
+        try:
+            folds.append(Fold(ids, adjust(replace(result.inputs, control=given))))
+        except (GeometryError, InputError, np.linalg.LinAlgError) as error:
+            folds.append(Fold(ids, None, str(error)))
+    return tuple(folds)
+
+
+def _groups(result: Result) -> list[Numbers]:
+    """Return rows of the control to be left out together: single points, or points as far apart as can be.
+
+    Control that was found wrong says nothing about the result and stays where it is.
+    """
+    control = result.inputs.control
+    used = control.use.any(axis=1) & ~control.check & ~rejected_control(result).any(axis=1)
+    rows = np.flatnonzero(used & (result.control_rows >= 0))
+    if len(rows) <= FOLDS:
+        return [rows[[number]] for number in range(len(rows))]
+    place = result.points.cartesian[result.control_rows[rows]]
+    _, _, axes = np.linalg.svd(place - place.mean(axis=0), full_matrices=False)
+    along = rows[np.argsort(place @ axes[0], kind="stable")]
+    return [along[number::FOLDS] for number in range(FOLDS)]

@@ -1,0 +1,127 @@
+"""Cross-validation: each point of the control is what it is to a run that has not seen it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from photostrip.formats.output.simulation import inputs_of
+from photostrip.pipeline import Inputs, Settings
+from photostrip.pipeline.cross_validation import FOLDS
+from photostrip.pipeline.strips import forming
+from photostrip.pipeline.strips.photos import form_strip
+from photostrip.result.verdict import GOOD, LOOK, UNVERIFIED
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Models
+from tests.loops import nonempty
+from tests.results import solved, spec
+
+ADJUSTMENTS = ("similarity", "polynomial", "covariance", "bundle")
+TURNED = Settings(cross_validation=True)
+
+
+@cache
+def without_checks(bands: int = 3) -> Inputs:
+    wanted = spec("projected", 1, 5.0, bands=bands)
+    return inputs_of(simulate(replace(wanted, seed=11, control=replace(wanted.control, check=0))))
+
+
+@pytest.mark.parametrize("adjustment", ADJUSTMENTS)
+def test_a_fold_is_the_run_without_its_point(adjustment: str) -> None:
+    inputs, settings = without_checks(), Settings(adjustment=adjustment)
+    document = solved(inputs, replace(settings, cross_validation=True)).document
+    rows = {row["id"]: row for row in document["cross_validation"]["points"]}
+    assert set(rows) == {row["id"] for row in document["control"] if row["measured"]}
+    for name in nonempty(sorted(rows)[::4]):
+        check = np.array([each == name for each in inputs.control.ids])
+        alone = solved(replace(inputs, control=replace(inputs.control, check=check)), settings).document
+        (given,) = (row for row in alone["control"] if row["id"] == name)
+        (tested,) = alone["precision"]["check"]["points"]
+        keys = ("dx", "dy", "dz", "plan", "height", "plan_um", "height_um")
+        assert {key: rows[name][key] for key in keys} == {key: given[key] for key in keys}
+        assert (rows[name]["z_plan"], rows[name]["z_height"]) == (tested["plan"], tested["height"])
+        (point,) = (row for row in alone["points"] if row["id"] == name)
+        assert [rows[name][f"sigma_{axis}"] for axis in "xyz"] == [point[f"sigma_{axis}"] for axis in "xyz"]
+
+
+def test_it_verifies_what_has_no_check_points() -> None:
+    plain = solved(without_checks()).document
+    assert plain["status"] == UNVERIFIED
+    assert "cross_validation" not in plain
+    document = solved(without_checks(), TURNED).document
+    assert document["status"] == GOOD, document["verdict"]["look_at"]
+    assert document["verdict"]["verification"] == "9 control points in plan and 9 in height, left out in turn"
+    assert document["verdict"]["accuracy"].endswith("at control points left out in turn")
+    # nothing else is another than without it
+    del document["cross_validation"]
+    assert {key: value for key, value in document.items() if key not in {"status", "verdict"}} == {
+        key: value for key, value in plain.items() if key not in {"status", "verdict"}
+    }
+
+
+def test_the_strips_are_formed_once_and_the_adjustments_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    formed = []
+
+    def counted(*given: object) -> object:
+        formed.append(given)
+        return form_strip(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(forming, "form_strip", counted)
+    document = solved(without_checks(bands=5), TURNED).document
+    folds = document["cross_validation"]["folds"]
+    assert len(formed) == 1
+    assert len(folds) == FOLDS
+    names = [name for fold in folds for name in fold["left_out"]]
+    assert sorted(names) == sorted(row["id"] for row in document["control"])
+    assert len(names) == 15
+    # points of one fold stand far apart: no band loses two of its three points at once
+    place = {row["id"]: row["x"] for row in document["points"]}
+    pairs = [fold["left_out"] for fold in folds if len(fold["left_out"]) == 2]
+    assert min(abs(place[first] - place[second]) for first, second in nonempty(pairs)) > 1000
+
+
+@pytest.mark.parametrize(("metres", "status"), [(0.0, GOOD), (3.0, LOOK)])
+def test_a_wrong_height_among_five_points_is_not_good(metres: float, status: str) -> None:
+    """Corners and middle: what control cannot check itself is seen where it is left out."""
+    inputs = without_checks()
+    enu = inputs.control.enu.copy()
+    enu[4, 2] += metres
+    control = replace(inputs.control, enu=enu).take(np.array([0, 2, 4, 6, 8]))
+    document = solved(replace(inputs, control=control), TURNED).document
+    assert document["status"] == status, document["verdict"]
+
+
+def test_control_that_contradicts_what_is_predicted_is_not_good() -> None:
+    inputs = without_checks()
+    # stated ten times better than it is: 0.5 m for 0.05 m
+    rng = np.random.default_rng(5)
+    control = replace(inputs.control, enu=inputs.control.enu + rng.normal(0, 1.0, inputs.control.enu.shape))
+    settings = replace(TURNED, adjustment="covariance", bundle=replace(TURNED.bundle, screening="none"))
+    document = solved(replace(inputs, control=control), settings).document
+    assert document["status"] == LOOK
+    assert any(
+        text.startswith("control points left out in turn are farther") for text in document["verdict"]["look_at"]
+    )
+
+
+def test_control_that_cannot_be_spared_verifies_nothing() -> None:
+    inputs = without_checks()
+    few = inputs.control.take(np.array([0, 2, 7]))
+    document = solved(replace(inputs, control=few), replace(TURNED, adjustment="similarity")).document
+    block = document["cross_validation"]
+    assert [fold["left_out"] for fold in block["folds"]] == [[name] for name in few.ids]
+    assert all(fold["reason"] for fold in nonempty(block["folds"]))
+    assert (block["points"], block["p"], block["plan"]["count"]) == ([], None, None)
+    assert document["verdict"]["verified"] is False
+    assert "the control left out in turn cannot (" in document["verdict"]["verification"]
+
+
+def test_independent_models_too() -> None:
+    wanted = spec("projected")
+    inputs = inputs_of(simulate(replace(wanted, models=Models(), control=replace(wanted.control, check=0))))
+    document = solved(inputs, TURNED).document
+    assert document["cross_validation"]["plan"]["count"] == 9
+    assert 0.4 < document["cross_validation"]["height"]["ratio"] < 2.0
