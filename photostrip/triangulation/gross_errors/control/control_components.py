@@ -2,8 +2,9 @@
 
 Errors that hide each other are found by no test of single points. So plan and height of every point, and every bend of
 the strip, get a variance of their own beside the covariance of the misclosures. All begin as large as the largest
-misclosure, and each is multiplied by the square of its own test value, (M w)_K^T (M w)_K / tr M_KK, again and again:
-those of wrong coordinates stay, the others fade away. What stays is a candidate; the tests decide.
+misclosure, and each is multiplied by its own test value, the root of (M w)_K^T (M w)_K / tr M_KK, again and again:
+those of wrong coordinates stay, the others fade away. What stays is a candidate; the tests decide. Multiplied by the
+square, as in the source, they fade faster and into worse sets.
 
 Source: [Förstner 1979].
 """
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
 
 
-ROUNDS = 10
+ROUNDS = 60
 
 
 def candidates(whole: JointAdjustment) -> Columns:
@@ -33,7 +34,8 @@ def candidates(whole: JointAdjustment) -> Columns:
         covariance = whole.covariance + (errors * variance[part]) @ errors.T
         projector = projected(covariance, whole.design)
         squares = np.bincount(part, (errors.T @ (projector @ whole.w)) ** 2)
-        variance *= squares / np.maximum(np.bincount(part, np.einsum("ij,ij->j", errors, projector @ errors)), 1e-300)
+        expected = np.bincount(part, np.einsum("ij,ij->j", errors, projector @ errors))
+        variance *= np.sqrt(squares / np.maximum(expected, 1e-300))
     predicted = np.bincount(part, (whole.matrix.diagonal() * whole.size**2)[columns]) / np.bincount(part)
     share = variance * predicted
     found: list[int] = []

@@ -160,10 +160,21 @@ class JointAdjustment:
             # F needs more than chi-square does
             if each.gain > chi2_quantile(1 - self.level, len(each.columns)) * each.spread
         ]
-        for each in sorted(found, key=lambda each: (each.probability, -each.ratio)):
-            if each.probability < self.level and self.allows((*out, *each.columns)):
-                return self.grown((*out, *each.columns))
-        return out
+        best = min(found, key=lambda each: (each.probability, -each.ratio), default=None)
+        if best is None or best.probability >= self.level:
+            return out
+        return self.grown((*out, *best.columns))
+
+    def completed(self, out: Columns) -> Columns:
+        """Add what else is wrong of a point: an error of its identity is one of plan and height.
+
+        Beside what is proven, these few tests share the level of all.
+        """
+        gone = set(out)
+        left = [tuple(column for column in point if column not in gone) for point in self.points if gone & set(point)]
+        tests = self.without(out).deletions(rest := [each for each in left if each])
+        more = [column for each in tests if each.probability < self.alpha / len(rest) for column in each.columns]
+        return (*out, *more) if self.allows((*out, *more)) else out
 
     def shrunk(self, out: Columns) -> Columns:
         """Take back what the others predict after all, the least significant part first."""

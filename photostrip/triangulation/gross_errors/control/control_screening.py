@@ -87,32 +87,32 @@ def _searched(strip: StripAtControl) -> Found | None:
     covariance = strip.covariance(np.arange(len(strip.coordinates.point)))
     if len(covariance) <= strip.design.shape[1]:
         return None
-    single = _laid(strip, covariance, lambda whole: whole.shrunk(whole.grown()))
-    if single.left.explained:
-        return single
-    several = [_laid(strip, covariance, _at_once, bends=bends) for bends in (True, False)]
-    explained = [each for each in several if each.left.explained]
+    found = [_laid(strip, covariance, lambda _: ())]
+    if not found[0].left.explained:  # much may be wrong
+        found += [_laid(strip, covariance, candidates, bends=bends) for bends in (True, False)]
+    told = [
+        each
+        for each in found
+        if each.whole.allows(each.out) and each.left.squares <= BENT**2 * max(each.left.freedom, 1)
+    ]
     # of two equally small explanations the one that blames less control
-    best = min(explained, key=lambda each: (len(each.out), len(each.coordinates)), default=single)
-    if best.left.squares > BENT**2 * best.left.freedom:
-        return Found(single.whole, ())
-    return best
-
-
-def _at_once(whole: JointAdjustment) -> Columns:
-    """Find what is wrong where much of the control is."""
-    out = whole.shrunk(candidates(whole))
-    return whole.shrunk(whole.grown(out)) if whole.allows(out) else ()
+    best = min(
+        told,
+        key=lambda each: (not each.left.explained, len(each.out), len(each.coordinates)),
+        default=Found(found[0].whole, ()),
+    )
+    return Found(best.whole, best.whole.completed(best.out))
 
 
 def _laid(
-    strip: StripAtControl, covariance: Floats, search: Callable[[JointAdjustment], Columns], *, bends: bool = False
+    strip: StripAtControl, covariance: Floats, start: Callable[[JointAdjustment], Columns], *, bends: bool = False
 ) -> Found:
-    """Search, lay the strip on what is kept, and search in all control anew, until the same is found."""
-    kept = strip.control.use
+    """Search, lay the strip on what is kept, and search from what was found, until the same is found."""
+    kept, out = strip.control.use, None
     for _ in range(ROUNDS):
         whole = adjust(strip, strip.misclosures(kept), covariance, bends=bends)
-        found = Found(whole, search(whole))
+        out = whole.shrunk(whole.grown(whole.shrunk(start(whole) if out is None else out)))
+        found = Found(whole, out)
         before, kept = kept, kept_of(strip, found)
         if np.array_equal(before, kept):
             break
