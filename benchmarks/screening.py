@@ -323,9 +323,11 @@ def stages(inputs: Inputs) -> Floats:
     form_from_pairs(screened.orientation, StripFormationSettings(), strip.photos, scatter)
     form = time.process_time() - begin
     position = strip.positions(observations)
-    rays = StripRays(observations=observations, position=position, sigma=scatter, stated=sigma, kept=nothing)
+    rays = StripRays(
+        observations=observations, position=position, sigma=scatter, weight=pairs.weight, stated=sigma, kept=nothing
+    )
     begin = time.process_time()
-    form_screened(screened.orientation, rays, pairs.weight, strip.photos, StripFormationSettings(), readmit=True)
+    form_screened(screened.orientation, rays, strip.photos, StripFormationSettings(), readmit=True)
     settle = time.process_time() - begin
     return np.array([orient, search, settle - form])
 

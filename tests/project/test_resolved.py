@@ -63,7 +63,7 @@ processing:
   bundle:
     screening: snooping
     test: tau
-    level: 0.05
+    level: 0.01
     power: 0.8
     variance_components: false
     self_calibration: []

@@ -250,13 +250,12 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
             observations=observations,
             position=strip.positions(observations),
             sigma=scatter,
+            weight=pairs.weight,
             stated=sigma,
             kept=overruling.rows(settings.relative.keep, observations),
         )
         readmit = settings.relative.screening in screening.SEARCHES
-        oriented, formed, wrong = form_screened(
-            oriented, rays, pairs.weight, strip.photos, settings.formation, readmit=readmit
-        )
+        oriented, formed, wrong = form_screened(oriented, rays, strip.photos, settings.formation, readmit=readmit)
         rejections = with_readmitted(screened.rejections, oriented.used)
         screened = replace(screened, orientation=oriented, rejections=rejections)
     return FormedPhotos(

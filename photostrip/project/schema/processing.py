@@ -110,10 +110,12 @@ class Bundle(Section):
         DEFAULTS.bundle.test,
     )
     level: Fraction = key(
-        "Probability of rejecting anything in an adjustment without gross errors", DEFAULTS.bundle.level
+        "Probability of rejecting anything in an adjustment without gross errors; of many rejections the part that is "
+        "false",
+        DEFAULTS.bundle.level,
     )
     alpha: Fraction | None = key(
-        "Probability of rejecting one good observation; by default `level` is shared out among all observations", None
+        "Probability of rejecting one good observation; by default `level` is shared out among all conditions", None
     )
     power: Fraction = key("Probability with which the minimal detectable errors are found", DEFAULTS.bundle.power)
     variance_components: Flag = key(

@@ -18,7 +18,9 @@ class BundleSettings:
     screening: str = "snooping"
     # ``"tau"``: residuals are compared with the sigma0 found; ``"baarda"``: with the stated standard deviations
     test: str = "tau"
-    level: float = 0.05  # probability that anything is rejected in an adjustment without gross errors
+    # probability that anything is rejected in an adjustment without gross errors; of many rejections the part that is
+    # false
+    level: float = 0.01
     # probability that the test of one good observation rejects it; None: the level, shared out among all of them
     alpha: float | None = None
     power: float = 0.80  # probability with which an error of the size of the minimal detectable one is found

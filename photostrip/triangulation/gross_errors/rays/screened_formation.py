@@ -17,7 +17,7 @@ from photostrip.triangulation.strip_formation.strip import form_from_pairs, with
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Flags, Floats
+    from photostrip.arrays import Flags
     from photostrip.rejection import Rejection
     from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
     from photostrip.triangulation.relative_orientation.orientation import Orientation
@@ -36,7 +36,6 @@ class ScreenedStrip(NamedTuple):
 def form_screened(
     of_pairs: Orientation,
     rays: StripRays,
-    weight: Floats,
     photos: Sequence[str],
     settings: StripFormationSettings,
     *,
@@ -46,7 +45,6 @@ def form_screened(
 
     Where pairs and junctions had nothing to reject, nothing is looked for.
 
-    weight: (m,), weights of the pairs' rows before anything was rejected.
     readmit: whether points that a pair rejected may be taken back.
     """
     formed = form_from_pairs(of_pairs, settings, photos, rays.sigma)
@@ -59,7 +57,7 @@ def form_screened(
         return ScreenedStrip(of_pairs, formed, ())
     used, aside = _uses(of_pairs, found, readmit=readmit)
     changed = np.unique(of_pairs.pairs.pair[used != of_pairs.used])
-    oriented = orient_again(of_pairs, np.where(used, weight, 0.0), changed) if len(changed) else of_pairs
+    oriented = orient_again(of_pairs, np.where(used, rays.weight, 0.0), changed) if len(changed) else of_pairs
     try:
         formed = form_from_pairs(oriented, settings, photos, rays.sigma, aside, searched=True)
     except GeometryError:

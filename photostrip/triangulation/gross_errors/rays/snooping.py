@@ -18,13 +18,12 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.rejection import Rejection
-from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
-from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
+from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.rays.common_errors import CommonError, find_common_error, taken_up
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
@@ -34,6 +33,7 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import (
     PointRays,
     cause_of_all,
     decide,
+    limit_of,
     undecided,
 )
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
@@ -49,18 +49,6 @@ if TYPE_CHECKING:
 
 
 MOST_COMMON_TRIALS = 5  # larger errors of single coordinates do not hide a common one from more
-
-
-def _limit(problem: BundleProblem, solution: BundleSolution, settings: BundleSettings) -> Limit:
-    """Limit of standardised residuals: never sharper than the stated standard deviations allow."""
-    parts = problem.images, problem.control, problem.positions, problem.attitudes
-    tests = sum(int(np.isfinite(part.sigma).sum()) for part in parts)
-    alpha = settings.level / max(tests, 1) if settings.alpha is None else settings.alpha
-    stated = Limit(normal_quantile(1 - alpha / 2), alpha, 1.0)
-    if settings.test != "tau" or solution.redundancy < 1:
-        return stated
-    found = Limit(reliability.limit("tau", alpha, solution.redundancy), alpha, solution.sigma0)
-    return found if found.value * found.unit > stated.value else stated
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,13 +76,18 @@ class ScreenedBundle:
             selection=selection,
             solution=solution,
             precision=cofactors_of(solution),
-            limit=_limit(chosen, solution, settings),
+            limit=limit_of(solution, settings, _established(problem, selection)),
         )
 
     @cached_property
     def joint(self) -> JointCofactors:
         """Joint cofactors of the photos."""
         return JointCofactors.of_solution(self.solution)
+
+
+def _established(problem: BundleProblem, selection: Selection) -> int:
+    """Count the points with a ray outside."""
+    return len(np.unique(problem.images.point[~selection.images]))
 
 
 def screen_bundle(
@@ -114,7 +107,7 @@ def screen_bundle(
     """
     if settings.screening == "none":
         return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)), settings)
-    search = _Search(problem, settings, np.zeros(len(problem.images), bool) if kept is None else kept, rough=rough)
+    search = _Search(problem, begin, settings, kept, rough=rough)
     chosen = supported(problem, begin)
     if settings.screening == "robust":
         chosen = search.robust(chosen)
@@ -128,13 +121,16 @@ def screen_bundle(
 class _Search:
     """What is remembered from round to round."""
 
-    def __init__(self, problem: BundleProblem, settings: BundleSettings, kept: Flags, *, rough: bool) -> None:
+    def __init__(
+        self, problem: BundleProblem, begin: Selection, settings: BundleSettings, kept: Flags | None, *, rough: bool
+    ) -> None:
         self.problem, self.settings, self.rough = problem, settings, rough
         images = problem.images
         self.by_point = np.lexsort((images.photo, images.point))
         self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
         self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
-        self.spared[images.point[kept]] = True
+        self.spared[images.point[[] if kept is None else kept]] = True
+        self.control = begin.control.copy()  # given coordinates that nothing has rejected
         self.out: dict[tuple[str, int, int], Rejection] = {}
         self.latest: dict[int, Rejection] = {}  # what was last said of rays outside
         self.back: set[int] = set()  # points that came back; what must go again stays out
@@ -213,7 +209,10 @@ class _Search:
             for half in halves:
                 done = self._without(done, half)
             return done
-        self.out |= {(each.kind, each.row, axis): each for each, axis in zip(worst, axes, strict=True)}
+        for each, axis in zip(worst, axes, strict=True):
+            self.out[each.kind, each.row, axis] = each
+            if each.kind == reliability.CONTROL:
+                self.control[each.row, axis] = False
         return found
 
     def _worst(self, done: ScreenedBundle) -> list[Rejection]:
@@ -294,7 +293,7 @@ class _Search:
         by_photos = np.zeros((r, 2, r, PHOTO))
         by_photos[np.arange(r), :, np.arange(r)] = by_photo / sigma[:, :, None]
         at = np.flatnonzero(control.point == images.point[rows[0]])
-        given, axis = np.nonzero(done.selection.control[at])
+        given, axis = np.nonzero(self.control[at])
         spread, axes = control.sigma[at[given], axis], control.axes[at[given], axis]
         inside = done.selection.images[rows]
         rays = PointRays(
@@ -303,7 +302,7 @@ class _Search:
             by_point=np.concatenate([(by_point / sigma[:, :, None]).reshape(-1, 3), axes / spread[:, None]]),
             by_photos=np.concatenate([by_photos.reshape(2 * r, -1), np.zeros((len(given), PHOTO * r))]),
             cofactors=done.joint.of(photo),
-            inside=np.append(np.repeat(inside, 2), np.full(len(given), inside.any())),
+            inside=np.append(np.repeat(inside, 2), done.selection.control[at[given], axis]),
         )
         return decide(rays, limit)
 
@@ -327,16 +326,19 @@ class _Search:
                 self.back.add(number)
                 xyz[number] = place
                 images[rows] = ~decision.out | (images[rows] & self.spared[number])
-        control = self._given(done, limit.value * limit.unit)
-        chosen = replace(done.selection, images=images, control=done.selection.control | control)
+        self.control |= self._given(done, limit.value * limit.unit)
         self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))
-        chosen = supported(self.problem, chosen)
-        return None if (chosen.images == done.selection.images).all() and not control.any() else chosen
+        chosen = supported(self.problem, replace(done.selection, images=images, control=self.control))
+        same = (chosen.images == done.selection.images).all() and (chosen.control == done.selection.control).all()
+        return None if same else chosen
 
     def _meeting(self, solution: BundleSolution, rows: Numbers) -> Floats:
-        """Place where two rays of a point meet, those with which most others agree; NaN where none meet."""
-        if len(rows) < 2:
-            return np.full(3, np.nan)
+        """Place where two rays of a point meet, those with which most others agree; NaN where none meet.
+
+        A point with one ray is where its control is, which places it.
+        """
+        if len(rows) < LEAST_RAYS:
+            return np.asarray(self.problem.start.points[self.problem.images.point[rows[0]]])
         photo, xy = self.problem.images.photo[rows], self._measured(solution, rows)
         ray = np.einsum("nij,nj->ni", solution.rotations[photo], np.column_stack([xy, -self._focal[photo]]))
         two = np.array(list(combinations(range(len(rows)), 2)), np.intp)
@@ -362,7 +364,7 @@ class _Search:
         for kind, row, axis in self.out:
             if kind == reliability.CONTROL:
                 tested[row, axis] = True
-        return fits & np.isfinite(control.sigma) & ~done.selection.control & ~tested
+        return fits & np.isfinite(control.sigma) & ~self.control & ~tested
 
     def log(self, done: ScreenedBundle, begin: Selection) -> Iterator[Rejection]:
         """Return every observation that was out at some time."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from photostrip.pipeline import Settings, triangulate
 from photostrip.result.document import document_of
-from photostrip.triangulation.gross_errors.rays import point_decisions, snooping
+from photostrip.triangulation.gross_errors.rays import point_decisions, snooping, strip_network
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation import non_neighbours
 from tests.strips import MICROMETRE, control_points, fly, project
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Result
     from photostrip.triangulation.gross_errors.rays.point_decisions import Decision, Limit, PointRays
+    from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
     from tests.strips import Flown
 
     Floats = NDArray[np.float64]
@@ -120,6 +122,24 @@ def test_a_point_within_rounding_of_the_limit_goes_with_a_reason(monkeypatch: py
     result = adjusted(strip)
     assert set(found_in(strip, result).values()) == {SEVERAL_RAYS}
     assert {each["point"] for each in document_of(result)["rejected"] if each["reason"]} == {"p4_1"}
+
+
+def test_a_photo_that_is_measured_worse_is_told_from_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five times the standard deviation on one photo: the others keep theirs."""
+    found: list[Floats] = []
+    spread_of = strip_network._spread_of_photos
+
+    def kept(oriented: Orientation, rays: StripRays) -> Floats:
+        found.append(spread_of(oriented, rays))
+        return found[-1]
+
+    monkeypatch.setattr(strip_network, "_spread_of_photos", kept)
+    strip = flown(extra=400)
+    xy, at = strip.observations.xy.copy(), strip.observations.photo == 6
+    xy[at] += np.random.default_rng(3).normal(0, np.sqrt(24) * SIGMA, (at.sum(), 2))
+    adjusted(replace(strip, observations=replace(strip.observations, xy=xy)))
+    assert found[0][6] == pytest.approx(5, rel=0.3)
+    assert np.delete(found[0], 6) == pytest.approx(1)
 
 
 def test_two_wrong_points_of_a_corner_do_not_cost_the_good_one() -> None:
