@@ -46,6 +46,7 @@ FOOT = 0.3048
 GROSS_SHARE = 0.2  # of the strips without a mistake have two gross errors of image coordinates, which are none of these
 THIRD, HALF, LINE = 0.3, 0.55, 0.03  # of the length of the strip; of its half breadth
 EVEN = 0.5
+PERCENTS_SEEN = 12.0  # standard deviations of the heights of the control together
 HARMLESS = np.radians(0.3)  # rms of given angles: start values need not be better
 BEYOND = 1 / 3  # of what the control spans, beyond which a sound strip does not reach at either end
 TOLD_APART = 5.0  # standard deviations of an image coordinate
@@ -283,8 +284,18 @@ def distance(case: Case) -> Planted | None:
     return with_camera(case, factor), NOBODY
 
 
-def seen_in_heights(case: Case, change: float) -> bool:
-    """Whether a stretch of the heights moves the control by more than three times what noise does in a fit of them."""
+def distance_by_percents(case: Case) -> Planted | None:
+    """Give a principal distance that is off by one to three percent; seen in the heights of the control only."""
+    factor = 1.0 + float(case.rng.choice([-1.0, 1.0])) * float(case.rng.uniform(0.01, 0.03))
+    seen = seen_in_heights(case, abs(factor - 1.0), PERCENTS_SEEN)
+    return (with_camera(case, factor), NOBODY) if seen else None
+
+
+def seen_in_heights(case: Case, change: float, sigmas: float | None = None) -> bool:
+    """Whether a stretch of the heights moves the control by more than three times what noise does in a fit of them.
+
+    sigmas: standard deviations by which it must, in place of that.
+    """
     control = case.inputs.control
     o = case.inputs.observations
     rows = control.use.all(axis=1) & ~control.check & np.isin(control.ids, o.point_ids)
@@ -299,7 +310,10 @@ def seen_in_heights(case: Case, change: float) -> bool:
     columns = np.column_stack([np.ones(len(d)), u, (along / np.abs(along).max()) ** 2, u[:, 0] * u[:, 1]])
     left = enu[:, 2] - columns @ np.linalg.lstsq(columns, enu[:, 2], rcond=None)[0]
     freedom = len(left) - columns.shape[1] - 1
-    return freedom >= 3 and change * float(np.linalg.norm(left)) > 3.0 * critical(freedom) * case.noise[1]
+    if freedom < 3:
+        return False
+    least = 3.0 * critical(freedom) if sigmas is None else sigmas
+    return change * float(np.linalg.norm(left)) > least * case.noise[1]
 
 
 def critical(freedom: int) -> float:
@@ -751,6 +765,7 @@ MISTAKES = (
     Mistake("fiducial marks in another unit", marks_in_micrometres, ("P106",)),
     Mistake("principal distance off by 10 or 1000", distance_by_ten, ("P105",)),
     Mistake("principal distance of another lens", distance, ("P105",)),
+    Mistake("principal distance off by 1 to 3 %", distance_by_percents, ("P107", "P105")),
     Mistake("two neighbours exchanged in the list", pair_exchanged, ("P201",)),
     Mistake("a photo listed elsewhere", moved, ("P201",)),
     Mistake("all photos out of order", shuffled, ("P201",)),

@@ -15,7 +15,7 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
-from photostrip.pipeline.plausibility import control_layout, evidence, given_cameras, given_control
+from photostrip.pipeline.plausibility import control_layout, distance_trial, evidence, given_cameras, given_control
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images
 from photostrip.points import locate
@@ -78,6 +78,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         from photostrip.pipeline.plausibility import shared_errors  # a strip needs nothing of a bundle
 
         findings += shared_errors.of_bundle(result.bundle, inputs)
+    findings += distance_trial.find_stretched(stages, findings)
     return accepted(findings, settings.accept)
 
 

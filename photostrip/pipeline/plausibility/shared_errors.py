@@ -9,6 +9,7 @@ import numpy as np
 from photostrip.triangulation.bundle.observations.given_orientations import drift_columns
 from photostrip.triangulation.gross_errors.rays.common_errors import ALL, DISTANCE, DRIFT
 from photostrip.triangulation.plausibility import found
+from photostrip.triangulation.plausibility.control.control_heights import LEAST_SCALE_ERROR
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,7 +26,7 @@ KEY = "camera_positions.correction"
 
 
 def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
-    """Name what a group of observations shares (P105, P208)."""
+    """Name what a group of observations shares (P105, P107, P208)."""
     shared = bundle.screened.common
     if any(each.kind == DISTANCE for each in shared):
         yield from (_distance(each, inputs) for each in bundle.parameters if _is_distance(each))
@@ -50,7 +51,8 @@ def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
     fix = "take it from the certificate; if that agrees with what is given, name it in `self_calibration`"
     key = f"cameras.{parameter.camera}.principal_distance"
     strips = tuple(each.id for each in inputs.strips if each.camera.name == parameter.camera)
-    return found("P105", message, fix, evidence, strips=strips, key=key)
+    code = "P107" if abs(parameter.value) < LEAST_SCALE_ERROR * given else "P105"
+    return found(code, message, fix, evidence, strips=strips, key=key)
 
 
 def _positions(bundle: Bundle, inputs: Inputs, error: CommonError) -> Iterator[Finding]:

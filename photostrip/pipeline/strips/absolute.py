@@ -5,7 +5,7 @@ Source: [001] eq. 142-149.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
@@ -15,8 +15,10 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.geometry.similarity import Similarity, similarity_derivatives
 from photostrip.pipeline.given_points import rows_of_given
+from photostrip.pipeline.inputs import Strip
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
+from photostrip.triangulation.gross_errors.control.height_stretch import find_stretch
 from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay, StripAtControl
 
 if TYPE_CHECKING:
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
+    from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.results import StripResult, StripShape
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
@@ -185,6 +187,9 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
         covariance=partial(stage.misclosure_covariance, oriented),
         share=1.0,
     )
+    stretch = find_stretch(place) if isinstance(stage.strip, Strip) else None
+    if stretch is not None:  # single points prove nothing then
+        return ScreenedStrip(oriented, replace(control_screening.not_screened(control), stretch=stretch))
     screened = control_screening.screen_control(place)
     if screened.rejections:
         oriented = to_ground(stage, screened.kept, oriented.control_rows, oriented.frames)

@@ -29,6 +29,7 @@ KINDS: dict[str, Kind] = {
     "P104": Kind("one photo mirrored against its neighbours", ERROR),
     "P105": Kind("principal distance off by a factor", ERROR),
     "P106": Kind("fiducial marks measured in another unit", WARNING),
+    "P107": Kind("another principal distance fits better", WARNING),
     "P201": Kind("photos out of flight order", ERROR),
     "P202": Kind("neighbouring photos that do not overlap", ERROR),
     "P203": Kind("the same photo twice", ERROR),

@@ -11,7 +11,7 @@ import pytest
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions
-from photostrip.simulate import Control, Flight, Spec
+from photostrip.simulate import Control, Flight, GrossError, Spec, Terrain
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Gnss
 
@@ -101,7 +101,7 @@ def test_a_principal_distance_off_by_a_percent_is_named() -> None:
     """Positions and control tell it from a common height."""
     simulation, result = adjusted(distance=1.01)
     (finding,) = result.findings
-    assert finding.code == "P105"
+    assert finding.code == "P107"
     assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=0.05)
     assert rms(simulation, result) < 0.4
 
@@ -122,3 +122,33 @@ def test_sound_positions_share_nothing() -> None:
     assert result.findings == ()
     assert result.bundle is not None
     assert result.bundle.screened.common == ()
+
+
+HILLS = Spec(seed=5, flight=Flight(photos=8), control=Control(bands=4), terrain=Terrain(relief=150.0))
+
+
+def on_hills(share: float, *errors: GrossError) -> Result:
+    """Adjust a strip over hills by the strip method."""
+    simulation = simulate(replace(HILLS, gross_errors=errors))
+    inputs = inputs_of(simulation)
+    (strip,) = inputs.strips
+    camera = replace(strip.camera, principal_distance=strip.camera.principal_distance * (1.0 + share))
+    return triangulate(replace(inputs, strips=(replace(strip, camera=camera),)), settings_of(simulation))
+
+
+@pytest.mark.parametrize("share", [-0.01, 0.01, 0.02])
+def test_the_strip_method_names_a_principal_distance_off_by_a_percent(share: float) -> None:
+    """Control was rejected one by one, or bent the strip, and heights were off by a metre."""
+    result = on_hills(share)
+    (finding,) = result.findings
+    assert finding.code == "P107"
+    assert finding.key == "cameras.film.principal_distance"
+    assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=0.4)
+    assert result.strips[0].wrong_control == ()
+
+
+def test_wrong_control_points_are_no_principal_distance() -> None:
+    """Two coordinates that are off stay two coordinates."""
+    result = on_hills(0.0, GrossError("control", count=2, size_m=3.0))
+    assert {each.code for each in result.findings} <= {"P406"}
+    assert len(result.strips[0].wrong_control) == 2
