@@ -21,7 +21,7 @@ def not_determined(
     done = np.zeros(len(observations.point_ids), bool)
     done[points.number] = True
     if inputs.models is not None:
-        why = "its coordinates in the models contradict each other, or were left out"
+        why = "coordinates in the models contradict each other, or were left out"
         return {observations.point_ids[number]: why for number in np.flatnonzero(~done).tolist()}
     placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
     contradicted = {int(observations.point[each.row]) for strip in strips for each in strip.of_photos.wrong_rays}
@@ -38,8 +38,8 @@ def not_determined(
 
 def _reason(places: list[tuple[int, int]], *, contradicted: bool) -> str:
     if len(places) == 1:
-        return "measured on one photo"
+        return "measured on one photo only"
     if contradicted:
-        return "its rays contradict each other"
+        return "rays contradict each other"
     neighbours = any((n, k + 1) in places for n, k in places)
-    return "rejected in every pair" if neighbours else "on no two neighbouring photos of one strip"
+    return "rejected in every pair" if neighbours else "not on two neighbouring photos of one strip"

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Result
 
 ROTATION = {
-    "projected": "grid east, grid north and the ellipsoid's normal at the perspective center",
-    "geographic": "true east, true north and the ellipsoid's normal at the perspective center",
+    "projected": "grid east, grid north and the ellipsoid's normal at the perspective centre",
+    "geographic": "true east, true north and the ellipsoid's normal at the perspective centre",
     "geocentric": "the geocentric axes X, Y, Z",
     "local": "the axes east, north, up of the local frame",
 }

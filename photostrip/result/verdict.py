@@ -139,15 +139,15 @@ def _tolerances(document: Document) -> Iterator[str]:
             yield f"{each['name']} cannot be tested against {each['limit']:g} {unit}: there is no such point"
         elif not each["passed"]:
             value = f"{each['value']:.{2 if each['unit'] == 'um' else 4}f}"
-            yield f"{each['name']} is {value} {unit}, allowed are {each['limit']:g} {unit}"
+            yield f"{each['name']} is {value} {unit}, the limit is {each['limit']:g} {unit}"
 
 
 def _control(document: Document) -> Iterator[str]:
     ratio = document["summary"]["control"]["normalised"]
     if ratio is not None and ratio > POOR_CONTROL:
         yield (
-            f"the control points fit {ratio:.1f} times worse than their standard deviations and the precision of one "
-            "model let expect: control that is not as good as stated, or a deformation of the strip that is left"
+            f"the control points fit {ratio:.1f} times worse than expected from their standard deviations and the "
+            "precision of one model: the control is not as good as stated, or the strip is still deformed"
         )
 
 
@@ -177,7 +177,7 @@ def _checks(document: Document) -> Iterator[str]:
     if not check:
         ratio = document["summary"]["check"]["normalised"]
         if ratio is not None and ratio > POOR_CONTROL:
-            yield f"the check points are {ratio:.1f} times farther off than their points of one model let expect"
+            yield f"the check points are {ratio:.1f} times farther off than expected from the precision of one model"
         return
     parts = [(name, check[name]) for name in PARTS if check[name]["count"]]
     chances = [part["p"] for _, part in parts] + [test["p"] for test in check["tests"]]
@@ -187,8 +187,8 @@ def _checks(document: Document) -> Iterator[str]:
             for name, part in parts
         ]
         yield (
-            f"the check points are farther off than the standard deviations of the points let expect: {'; '.join(said)}"
-            f"; probability {_percent(min(chances) * len(chances))} by chance"
+            "the check points are farther off than expected from the standard deviations of the points: "
+            f"{'; '.join(said)}; probability {_percent(min(chances) * len(chances))} by chance"
         )
 
 

@@ -65,7 +65,7 @@ def test_of_too_many_projects_the_worst_are_shown() -> None:
     many = lines(*[good() for _ in range(ROWS + 20)], *[FAULTY] * 3)
     text = to_text("", batch_sections(many))
     assert text.count(".yaml  good") + text.count(".yaml   good") == ROWS - 3
-    assert "23 more projects not shown, none worse" in text
+    assert "23 more projects not shown, none of them worse" in text
     assert len(to_text("", batch_sections(many, everything=True)).splitlines()) > ROWS + 23
     assert "strip 0.yaml" not in to_text("", batch_sections(many, quiet=True))
 

@@ -271,7 +271,7 @@ def test_the_probability_of_a_check_point_is_that_of_its_difference() -> None:
 
 
 def test_given_points_that_were_not_measured_are_named() -> None:
-    assert "given, but not in the strips: G4 bis" in words(section(saved(), "Control points"))
+    assert "given, but not measured: G4 bis" in words(section(saved(), "Control points"))
 
 
 def test_without_check_points_the_report_says_what_that_means() -> None:
@@ -294,9 +294,9 @@ def test_points_without_coordinates_are_grouped_by_reason() -> None:
     missing = [{"id": f"P{n}", "reason": "measured on one photo"} for n in range(15)]
     missing.append({"id": "Q", "reason": "rejected in every pair"})
     text = words(section(changed(not_determined=missing), "Points without coordinates"))
-    assert "15 points measured on one photo: P0, P1" in text
+    assert "15 points (measured on one photo): P0, P1" in text
     assert "P11 and 3 more" in text
-    assert "1 point rejected in every pair: Q" in text
+    assert "1 point (rejected in every pair): Q" in text
 
 
 def test_a_strip_without_joints() -> None:
@@ -325,7 +325,7 @@ def test_corrections_are_stated_with_their_size() -> None:
         ({"screening": "auto"}, "screening: auto"),
         ({"screening": "none"}, "screening: none"),
         ({"screening": "tau"}, "screening: tau, level 0.05"),
-        ({"screening": "parallax+grubbs"}, "level 0.05, y parallax up to 4 of its standard deviations"),
+        ({"screening": "parallax+grubbs"}, "level 0.05, y parallax up to 4 times its standard deviation"),
         ({"screening": "parallax+grubbs", "parallax_limit": 0.03}, "level 0.05, y parallax up to 30 µm"),
     ],
 )

@@ -583,7 +583,7 @@ def test_points_without_coordinates_are_named_with_the_reason() -> None:
         sigma=np.vstack([o.sigma, [0.005, 0.005]]),
     )
     document = solved(replace(inputs, observations=once)).document
-    assert {"id": "lonely", "reason": "measured on one photo"} in document["not_determined"]
+    assert {"id": "lonely", "reason": "measured on one photo only"} in document["not_determined"]
     assert "lonely" not in {row["id"] for row in document["points"]}
     group = document["residuals"][0]
     place = group["points"].index("lonely")

@@ -59,7 +59,11 @@ def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
     """Return the table of the projects; of too many, the worst."""
     shown = list(outcomes) if everything or len(outcomes) <= ROWS else _worst_first(outcomes)[:ROWS]
     missing = len(outcomes) - len(shown)
-    note = f"{counted(missing, 'more project')} not shown, none worse: --verbose, or summary.csv" if missing else ""
+    note = (
+        f"{counted(missing, 'more project')} not shown, none of them worse: see --verbose or summary.csv"
+        if missing
+        else ""
+    )
     return tabulated(shown, COLUMNS, note=note)
 
 

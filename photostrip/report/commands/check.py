@@ -53,7 +53,7 @@ def _measured(counts: Document) -> tuple[str, str]:
     points = f"of {counted(counts['points'], 'point')}, {counts['new']} new"
     if "models" not in counts:
         return "image points", f"{counts['image_points']} {points}"
-    models, centers = counted(counts["models"], "model"), counted(counts["model_centers"], "perspective center")
+    models, centers = counted(counts["models"], "model"), counted(counts["model_centers"], "perspective centre")
     return "model points", f"{counts['model_points']} {points}, in {models}; {centers}"
 
 
@@ -100,14 +100,14 @@ def _decoded(frame: Document, unit: AngleUnit) -> Iterator[tuple[str, str]]:
             "  geocentric",
             ", ".join(f"{axis} {value:.3f}" for axis, value in zip("XYZ", frame["cartesian"], strict=True)),
         )
-    yield "  and back", f"{frame['back_mm']:.6f} mm from what is given"
+    yield "  and back", f"{frame['back_mm']:.6f} mm from the given point"
     if "convergence_deg" in frame:
         low, high = (f"{value * unit.per_degree:+.{4 + unit.more}f}" for value in frame["convergence_deg"])
         size = low if low == high else f"{low} to {high}"
         yield "  grid convergence", f"{size} {unit.name} (grid north from true north, clockwise)"
     if frame["kind"] != "local" and frame["datum_accuracy"] != 0.0:
         accuracy = frame["datum_accuracy"]
-        yield "  datum shift", "accuracy not known" if accuracy is None else f"accuracy {accuracy:g} m"
+        yield "  datum shift", "accuracy unknown" if accuracy is None else f"accuracy {accuracy:g} m"
     yield "  extent", f"{frame['span_m'] / 1000:.3f} km"
 
 

@@ -52,7 +52,7 @@ def sentence(row: Document) -> str:
     quantity = what(row)
     if row["difference"] is None:
         before, now = (short(row[key], 9) if row[key] is not None else "nothing" for key in ("before", "now"))
-        return f"{quantity}: {now} where {before} was"
+        return f"{quantity}: {now} instead of {before}"
     size = f"differs by {short(row['difference'], 3)} {name}".rstrip()
     allowed = f"allowed {short(row['allowed'], 3)} {name}".rstrip()
     values = "" if row["before"] is None else f" ({short(row['before'], 9)} before, {short(row['now'], 9)} now)"

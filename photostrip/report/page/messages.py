@@ -77,7 +77,7 @@ def result_findings(document: Document) -> list[Document]:
             "severity": "error",
             "code": "tolerance",
             "key": f"tolerances.{each['name']}",
-            "message": f"{each['name']} is {each['value']} {each['unit']}, allowed are {each['limit']} {each['unit']}",
+            "message": f"{each['name']} is {each['value']} {each['unit']}, the limit is {each['limit']} {each['unit']}",
         }
         for each in document["tolerances"]
         if not each["passed"]

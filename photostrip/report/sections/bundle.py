@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     from photostrip.report.page.angles import AngleUnit
 
 NAMES = {"image": "image coordinates", "control": "control", "position": "camera positions", "attitude": "attitudes"}
+ONE = {
+    "image": "image coordinate",
+    "control": "control coordinate",
+    "position": "camera position coordinate",
+    "attitude": "attitude angle",
+}
 CORRELATIONS_SHOWN = 12
 NAMED = 6
 
@@ -35,7 +41,7 @@ def bundle_sections(document: Document) -> list[Section]:
 
 def _adjustment(block: Document, angles: AngleUnit) -> Section:
     test, screening, unknowns = block["sigma0_test"], block["screening"], block["unknowns"]
-    observed = ", ".join(f"{number} of {NAMES[kind]}" for kind, number in block["observations"].items())
+    observed = ", ".join(counted(number, ONE[kind]) for kind, number in block["observations"].items())
     parts = f"{sum(unknowns.values())}: {unknowns['photos']} of photos, {unknowns['points']} of points"
     parts += f", {unknowns['common']} common" if unknowns["common"] else ""
     facts = [
@@ -69,14 +75,14 @@ def _sigma0(test: Document) -> str:
     if test["passed"] is None:
         return "none: no redundancy"
     limits = f"{fixed(test['lower'], 3)} to {fixed(test['upper'], 3)}"
-    said = "passed" if test["passed"] else "NOT PASSED: the stated standard deviations are wrong on the whole"
+    said = "passed" if test["passed"] else "NOT PASSED: the stated standard deviations are wrong as a whole"
     return f"{short(test['sigma0'], 5)} against {limits} (chi-square, {100 * (1 - test['level']):g} %): {said}"
 
 
 def _screening(screening: Document) -> str:
     if screening["method"] == "none":
         return "not searched for"
-    out = ", ".join(f"{number} of {NAMES[kind]}" for kind, number in screening["rejected"].items() if number)
+    out = ", ".join(counted(number, ONE[kind]) for kind, number in screening["rejected"].items() if number)
     test = {"tau": "tau test", "baarda": "Baarda's test"}[screening["test"]]
     level = f"level {screening['alpha']:.2g} for one observation"
     text = f"{screening['method']}, {test}, {level}, limit {fixed(screening['limit'], 2)}: "
@@ -98,9 +104,9 @@ def _reliability(block: Document) -> Section:
         number("effect", "external", 1, "σ"),
     )
     note = (
-        "r: redundancy number, the share of an error that shows in its residual; detectable: the error found with a "
-        f"probability of {100 * reliable['power']:g} % (median, largest); effect: what an error just not found moves "
-        "at most, in standard deviations of what it moves (median)"
+        "r: redundancy number, the share of an error that shows in its residual; detectable: the error that is found "
+        f"with a probability of {100 * reliable['power']:g} % (median, largest); effect: what an error that just "
+        "escapes detection shifts at most, in standard deviations of what it shifts (median)"
     )
     parts: list[Part] = [tabulated(reliable["groups"], columns, note=note)]
     parts += _named("fit worst", reliable["worst"])
@@ -138,7 +144,7 @@ def _components(rows: Sequence[Document]) -> Section:
         number("±", lambda each: None if each["sigma"] is None else each["sigma"] * each["factor"], 3),
         words("", lambda each: "" if each["estimated"] else "not estimated: too little redundancy"),
     )
-    text = "Each group's stated standard deviations, multiplied with its factor, were used."
+    text = "The stated standard deviations of each group, multiplied by its factor, were used."
     return Section("Variance components", (Words(text), tabulated(rows, columns)))
 
 
@@ -167,10 +173,10 @@ def _parameters(block: Document) -> Section:
     """Calibration parameters, offsets and drifts, and what is hard to tell apart."""
     parts: list[Part] = []
     if block["calibration"]:
-        note = "corrections of the given calibration; p: of a value as large by chance"
+        note = "corrections to the given calibration; p: probability of a value this large by chance"
         parts.append(tabulated(block["calibration"], CALIBRATION, note=note))
     if block["corrections"]:
-        note = "what is added to the given positions of a strip; a drift: per unit of time"
+        note = "added to the given positions of a strip; a drift is per unit of time"
         parts.append(tabulated(block["corrections"], CORRECTIONS, note=note))
     if block["correlations"]:
         more = len(block["correlations"]) - CORRELATIONS_SHOWN

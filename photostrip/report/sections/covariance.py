@@ -19,9 +19,9 @@ def covariance_section(document: Document, *, everything: bool) -> Section:
     # a result that was written before the choice existed has none
     distances = document["settings"].get("covariance", {}).get("distances", True)
     text = (
-        f"The misclosures at the control {'and the distances of the pass points ' if distances else 'alone '}go to "
-        "every point by least-squares prediction with the covariance of the strip itself; there is no polynomial and "
-        "nothing to choose."
+        f"The misclosures at the control {'and the distances of the pass points ' if distances else 'alone '}are "
+        "distributed to every point by least-squares prediction with the covariance of the strip itself; there is no "
+        "polynomial and nothing to choose."
     )
     parts: list[Part] = [Words(text)]
     for block in blocks:
@@ -35,7 +35,7 @@ def _facts(block: Document, *, several: bool) -> Sequence[tuple[str, str]]:
         f"{counted(block['control_coordinates'], 'control coordinate')}, "
         f"{counted(block['distances'], 'distance')} of pass points, {counted(block['models'], 'model')}"
     )
-    test = f"σ0 {ratio(block['sigma0'])} (1 when all standard deviations are right), redundancy {block['redundancy']}"
+    test = f"σ0 {ratio(block['sigma0'])} (1 if all standard deviations are right), redundancy {block['redundancy']}"
     if block["p"] is not None:
         test += f", probability of a larger one by chance {fixed(100 * block['p'], 1)} %"
     if block.get("passes", 1) > 1:
@@ -59,5 +59,5 @@ def _control(block: Document, *, everything: bool) -> Table:
         number("error that would explain it", "size", signed, "m"),
         words("", lambda row: "WRONG?" if row["test"] is not None and abs(row["test"]) > block["limit"] else ""),
     )
-    below = f"test: standard normal for right control; beyond {ratio(block['limit'])} it is doubtful"
+    below = f"test: standard normal for correct control; beyond {ratio(block['limit'])} it is doubtful"
     return tabulated(shown, columns, note=joined(note, below))

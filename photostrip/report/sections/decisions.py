@@ -12,14 +12,14 @@ from photostrip.report.sections.strip import elsewhere
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-NO_DEGREE = "none: no degree brings more than chance, or serves control that took no part"
+NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
 
 
 def decisions_section(document: Document) -> Section:
     """Say what `auto` came to, and why."""
     rows = tuple(_decisions(document))
-    parts = (Facts(rows),) if rows else (Words("Nothing: every choice stands in the project file."),)
+    parts = (Facts(rows),) if rows else (Words("Nothing: every choice is made in the project file."),)
     return Section("Decided automatically", parts)
 
 
@@ -33,14 +33,20 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
         yield from _screening(document, settings["relative"])
     elif settings["links"]["screening"] == "auto":
         gone = counted(document["counts"]["rejected_in_links"], "point")
-        yield "screening", f"every common point of each link tested as a whole, the worst left out first; {gone} out"
+        yield (
+            "screening",
+            f"every common point of each link tested as a whole, the worst left out first; {gone} left out",
+        )
     interior = document["corrections"]["interior"]
     if interior and settings["interior"]["transform"] == "auto":
         what = " and ".join(interior["transforms"])
-        yield "fiducial marks", f"{what} transformation: affine where four marks or more determine it, else conformal"
+        yield (
+            "fiducial marks",
+            f"{what} transformation: affine where four or more marks determine it, otherwise conformal",
+        )
     curvature = document["corrections"]["earth_curvature"]
     if curvature["asked"] == "auto":
-        yield "Earth curvature", f"{curvature['treatment']}; that is what the frame of the control asks for"
+        yield "Earth curvature", f"{curvature['treatment']}, as the frame of the control requires"
     yield from _heights(document, settings.get("refinement", {}))
 
 
@@ -77,11 +83,11 @@ def _screening(document: Document, settings: Document) -> Iterator[tuple[str, st
         gone = counted(counts["rejected_in_pairs"], "point")
         yield (
             "screening",
-            f"robust start, then a global test of each pair, points left out singly and in sets; {gone} out",
+            f"robust start, then a global test of each pair, points left out singly and in sets; {gone} left out",
         )
     elif settings["screening"] == "parallax+grubbs" and settings["parallax_limit"] is None:
         sigma = micrometres(document["summary"]["sigma_given_um"])
-        text = f"four of its standard deviations, from {sigma} µm stated for an image coordinate"
+        text = f"four times its standard deviation, which follows from the {sigma} µm stated for an image coordinate"
         yield "limit of y parallax", text
 
 
@@ -116,7 +122,7 @@ def weights_section(document: Document, *, everything: bool) -> Section:
     )
     rest = len(control) - len(shown)
     more = f"{elsewhere(rest, 'points', 'weights', 'control')}; " if rest else ""
-    note = f"{more}in fit: together with a point of one model; a coordinate weighs 1 / σ² there"
+    note = f"{more}in fit: combined with that of a model point; the weight of a coordinate is 1 / σ²"
     if len({row["list"] for row in control}) > 1:
         note += "; columns in the order of the axes of each list"
     parts = tabulated(shown, columns, note=note) if shown else Words("No control point was measured.")

@@ -132,14 +132,15 @@ def chosen_sections(
     document: Document, *, quiet: bool = False, everything: bool = False, names: Collection[SectionName] = ()
 ) -> tuple[Section, ...]:
     """Return the sections that are wanted: the verdict alone, some by name as a whole, all, or the overview."""
-    end = Section("", (Words(headline(document), document["status"]),))
+    last = headline(document)
+    end = Section("", (Words(f"{last[:-1]}." if last.endswith(":") else last, document["status"]),))
     if names:
         named = list(_named(document, everything=True))
         missing = [each for each in SectionName if each in names and each not in {name for name, _ in named}]
         lacking = [Section("", (Words(f"This result has no section `{each}`."),)) for each in missing]
         return (*(section for name, section in named if name in names), *lacking)
     if quiet:
-        return (Section("", (*end.parts, accuracy(document))),)
+        return (Section("", (Words(last, document["status"]), accuracy(document))),)
     return (*(sections_of(document, everything=True) if everything else overview(document)), end)
 
 

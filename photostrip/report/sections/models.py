@@ -28,8 +28,8 @@ def links_section(document: Document, *, everything: bool) -> Section:
         links, lambda link: link["sigma0"] or 0.0, ("links", "links", "links"), everything=everything
     )
     sigma0 = (
-        f"{micrometres(summary['sigma0_um'])} µm, of a model coordinate, from a redundancy of {summary['redundancy']}"
-        f"; stated are {micrometres(summary['sigma_given_um'])} µm"
+        f"{micrometres(summary['sigma0_um'])} µm for a model coordinate (stated: "
+        f"{micrometres(summary['sigma_given_um'])} µm), redundancy {summary['redundancy']}"
     )
     worst = max(links, key=lambda link: (link["largest"] or 0.0) / (link["limit"] or 1.0))
     largest = (
@@ -41,8 +41,9 @@ def links_section(document: Document, *, everything: bool) -> Section:
     gone = f"{out} of {counted(total, 'common point')}, {percent(out, total)}"
     facts = Facts((("σ0", sigma0), ("largest test value", largest), ("rejected", gone)))
     below = (
-        "σ0: ratio to what the standard deviations of both models let expect; along, across, up: rms differences of "
-        "the common points; far end: uncertainty of the second model's far end, in standard deviations of a coordinate"
+        "σ0: ratio to what is expected from the standard deviations of both models; along, across, up: rms differences "
+        "of the common points; far end: uncertainty of the second model's far end, in standard deviations of a "
+        "coordinate"
     )
     return Section("Links of the models", (facts, tabulated(shown, LINKS, note=joined(note, below))))
 
@@ -83,9 +84,9 @@ def models_section(document: Document, *, everything: bool) -> Section:
         everything=everything,
     )
     text = (
-        "The models are independent: each has a scale, a rotation and an origin of its own, and takes its place from "
-        "the model before it. A point of several models is the mean of its positions. The rotations of the photos are "
-        "not known from model coordinates."
+        "The models are independent: each has its own scale, rotation and origin, and is linked to the model before "
+        "it. A point in several models gets the mean of its positions. The rotations of the photos are not known from "
+        "model coordinates."
     )
     counts: dict[int, int] = {}
     for point in document["points"]:
@@ -94,7 +95,7 @@ def models_section(document: Document, *, everything: bool) -> Section:
     missing = [photo["id"] for photo in document["photos"] if photo["x"] is None]
     facts = [("points by models", by_models)]
     if missing:
-        facts.append(("photos without a center", ", ".join(missing)))
+        facts.append(("photos without a centre", ", ".join(missing)))
     return Section("Models", (Words(text), Facts(tuple(facts)), tabulated(shown, MODELS, note=note)))
 
 
@@ -122,10 +123,10 @@ def deformation_section(document: Document) -> Section:
     """Twist and bending of the models that have the height control for it."""
     rows, unit = document["deformations"], angle_unit(document)
     bent = sum(row["significant"] for row in rows)
-    verdict = f"{bent} of them deformed" if bent else "none of them deformed"
+    enough = f"{counted(len(rows), 'model')} {'has' if len(rows) == 1 else 'have'} enough height control"
+    verdict = f"{bent or 'none'} of them {'are' if bent > 1 else 'is'} deformed"
     text = Words(
-        f"{counted(len(rows), 'model')} with height control enough to see twist (x y) and bending (x²), {verdict} by"
-        " the t test at 5 % of all together.",
+        f"{enough} to show twist (x y) and bending (x²); {verdict} (t test of all together at 5 %).",
         "look" if bent else "",
     )
     columns = (

@@ -58,7 +58,7 @@ def _overview(document: Document, most: int) -> tuple[Section, ...]:
         *_left_out(document, most),
         Section("Worst", (Facts(tuple(_worst(document))),)),
         _notes(remarks, most),
-        Section("", (Words("All sections: --verbose; some of them: --section NAME, names in --help."),)),
+        Section("", (Words("--verbose prints all sections, --section NAME a single one; --help lists the names."),)),
     )
     return tuple(section for section in found if section.parts)
 
@@ -199,7 +199,9 @@ def _worst(document: Document) -> Rows:
         yield "rejected", _and_more((_rejection(row) for row in rejected), len(rejected), "rejected")
     missing = missing_points(document)
     if missing:
-        text = _and_more((f"{counted(len(ids), 'point')} {why}" for why, ids in missing), len(missing), "undetermined")
+        text = _and_more(
+            (f"{counted(len(ids), 'point')} ({why})" for why, ids in missing), len(missing), "undetermined"
+        )
         yield "without coordinates", text
 
 
@@ -220,7 +222,7 @@ def _likewise(rest: Sequence[Document]) -> str:
         return ""
     strips = [note["strip"] for note in rest if note["strip"]]
     if len(strips) == len(rest):
-        return f" (likewise {'strip' if len(strips) == 1 else 'strips'} {listed(strips, STRIPS_NAMED)})"
+        return f" (and the same for {'strip' if len(strips) == 1 else 'strips'} {listed(strips, STRIPS_NAMED)})"
     return f" (and {len(rest)} more like this: --section notes)"
 
 

@@ -27,13 +27,12 @@ def control_section(document: Document, *, everything: bool, most: int = ALL_SHO
     """Residuals at the control."""
     rows = [row for row in document["control"] if row["role"] == "control" and row["measured"] and row["use"] != "off"]
     text = (
-        "Adjusted minus given. The adjustment has seen these points: what is left here is smaller than the errors "
+        "Adjusted minus given. These points took part in the adjustment: what is left here is smaller than the errors "
         "between them."
     )
     if any(row.get("rejected", "") for row in rows):
         text += (
-            " Coordinates with a minus in the column `use` were found wrong and took no part; the last lines leave "
-            "them out."
+            " Coordinates with a minus under `use` were found wrong and were not used; the last lines leave them out."
         )
     parts: list[Part] = [
         Words(text),
@@ -82,9 +81,11 @@ def given_table(document: Document, given: Sequence[Document], role: str, *, eve
             *blank,
         ),
     )
-    other = "the adjustment" if "bundle" in document else "a point of one model"
+    other = "the adjustment" if "bundle" in document else "a model point"
     scale = scale_word(document)
-    below = f"plan, height: at {scale} scale; ratio: to the standard deviation of the given point and of {other}"
+    below = (
+        f"plan, height: at {scale} scale; ratio: to the combined standard deviation of the given point and of {other}"
+    )
     return tabulated(shown, columns, foot, joined(note, below))
 
 
@@ -119,7 +120,7 @@ def _unused(document: Document) -> list[Part]:
     off = [row["id"] for row in rows if row["measured"] and row["role"] == "control" and row["use"] == "off"]
     facts = [
         (label, listed(names, IDS_NAMED))
-        for label, names in (("given, but not in the strips", lost), ("switched off", off))
+        for label, names in (("given, but not measured", lost), ("switched off", off))
         if names
     ]
     return [Facts(tuple(facts))] if facts else []
@@ -129,7 +130,7 @@ def ties_section(document: Document, *, everything: bool) -> Section:
     """Differences of points that two strips share."""
     ties, axes = document["ties"], document["frame"]["axes"]
     if not ties:
-        return Section("Ties between strips", (Words("The strips have no point in common."),))
+        return Section("Ties between strips", (Words("The strips have no points in common."),))
     shown, note = worst_first(
         ties, lambda t: max(t["plan_um"], abs(t["height_um"])), ("points", "ties", "ties"), everything=everything
     )
@@ -148,7 +149,7 @@ def ties_section(document: Document, *, everything: bool) -> Section:
             *(micrometres(_rms(ties, key)) for key in ("plan_um", "height_um")),
         ),
     )
-    below = "second strip minus first; the result has their mean"
+    below = "second strip minus first; the result is their mean"
     return Section("Ties between strips", (tabulated(shown, columns, foot, joined(note, below)),))
 
 
@@ -160,9 +161,9 @@ def image_section(document: Document) -> Section:
     """Photos and points with the largest image residuals under the final orientations."""
     summary = document["summary"]
     text = (
-        "Photos and points come out of one adjustment. "
+        "Photos and points come from one adjustment. "
         if "bundle" in document
-        else "Every photo is oriented anew on its adjusted points, so that orientations and points belong together. "
+        else "Every photo is oriented again on its adjusted points, so that orientations and points agree. "
     )
     text += f"rms of the image residuals {micrometres(summary['image_rms_um'])} µm."
     photos = sorted(document["photos"], key=lambda p: p["image_rms_um"] or 0.0, reverse=True)[:WORST_POINTS]
@@ -219,7 +220,7 @@ def not_determined_section(document: Document, *, everything: bool) -> Section:
     parts: list[Part] = []
     for reason, names in missing_points(document):
         named = listed(names, len(names) if everything else IDS_NAMED)
-        parts.append(Words(f"{counted(len(names), 'point')} {reason}: {named}", mark="-"))
+        parts.append(Words(f"{counted(len(names), 'point')} ({reason}): {named}", mark="-"))
     return Section("Points without coordinates", tuple(parts) or (Words("None."),))
 
 

@@ -24,9 +24,9 @@ def precision_section(document: Document, *, everything: bool) -> Section:
     block = document["precision"]
     measured = "model" if "links" in document else "image"
     text = (
-        f"Standard deviations carried from the {measured} coordinates and the control through every step of the "
-        "adjustment. They hold for random errors: what a lens, the film or the refraction does to a whole strip is "
-        "not in them."
+        f"Standard deviations propagated from the {measured} coordinates and the control through every step of the "
+        "adjustment. They cover random errors: what a lens, the film or refraction does to a whole strip is "
+        "not included."
     )
     facts = [(f"{measured} coordinates", _basis(block["basis"] if document["strips"] else block["basis"][:1]))]
     for name, meaning in PARTS:
@@ -60,7 +60,7 @@ def _check(check: Document | None) -> list[tuple[str, str]]:
     ]
     rows = [("check points", f"{'; '.join(parts)} in units of their standard deviations")]
     for test in check["tests"]:
-        name = "all of them together" if len(check["tests"]) == 1 else f"together, strip {test['strip']}"
+        name = "all together" if len(check["tests"]) == 1 else f"together, strip {test['strip']}"
         text = (
             f"sum of squares {fixed(test['squares'], 1)} of {counted(test['coordinates'], 'coordinate')}, probability "
             f"of a larger one by chance {fixed(100 * test['p'], 1)} %"
@@ -101,11 +101,11 @@ def _along(document: Document, rows: Sequence[Document], *, everything: bool) ->
         number("points", "points"),
         number("σ plan", "plan", 3, "m"),
         number("σ height", "height", 3, "m"),
-        number("center plan", "centre_plan", 3, "m", rank=1),
+        number("centre plan", "centre_plan", 3, "m", rank=1),
         number("height", "centre_height", 3, "m", rank=1),
         *([words("strip", "strip", rank=2)] if several else []),
     )
-    note = "rms of the points nearest to each photo, and its perspective center"
+    note = "rms of the points nearest to each photo, and its perspective centre"
     if left_out:
         note += f"; {elsewhere(left_out, 'photos', 'precision', 'precision')}"
     return tabulated(shown, columns, note=note)

@@ -145,7 +145,7 @@ def interior_line(interior: Document) -> str:
             f"at mark {interior['largest_mark']} of photo {interior['largest_photo']}"
         )
     if interior.get("interpolated"):
-        text += "; interpolated to the points"
+        text += "; the residuals are interpolated to the points"
     return text
 
 
@@ -155,7 +155,7 @@ def _screening(settings: Document) -> str:
         return str(method)
     text = f"{method}, level {settings['grubbs_alpha']:g}"
     if method == "parallax+grubbs":
-        text += f", y parallax up to {'4 of its standard deviations' if limit is None else f'{limit * 1000:g} µm'}"
+        text += f", y parallax up to {'4 times its standard deviation' if limit is None else f'{limit * 1000:g} µm'}"
     return text
 
 

@@ -60,8 +60,8 @@ def relative_section(document: Document, *, everything: bool) -> Section:
     rejected = sum(m["points_rejected"] for m in models)
     total = rejected + sum(m["points_used"] for m in models)
     sigma0 = (
-        f"{micrometres(summary['sigma0_um'])} µm, of an image coordinate, from "
-        f"{counted(summary['redundancy'], 'redundant point')}; stated are {micrometres(summary['sigma_given_um'])} µm"
+        f"{micrometres(summary['sigma0_um'])} µm for an image coordinate (stated: "
+        f"{micrometres(summary['sigma_given_um'])} µm), {counted(summary['redundancy'], 'redundant point')}"
     )
     largest = (
         f"{micrometres(worst['max_parallax_um'])} µm at point {worst['max_parallax_point']} of photos "
@@ -137,11 +137,13 @@ def _labelled(document: Document, strip: str, label: str) -> str:
 
 def _drift(strip: Document) -> str:
     drift, along = strip["scale_drift"], strip["discrepancy"]
-    text = f"{fixed(drift['expected_ppm'], 0)} ppm to be expected over the strip (one standard deviation)"
+    text = f"{fixed(drift['expected_ppm'], 0)} ppm expected over the strip (one standard deviation)"
     if drift["found_ppm"] is not None:
-        text += f", {fixed(drift['found_ppm'], 0)} ppm taken out by the polynomial"
+        text += f", {fixed(drift['found_ppm'], 0)} ppm removed by the polynomial"
     if along["up"] is not None:
-        text += f"; models differ by rms {', '.join(f'{metres(along[name])} m {name}' for name in DIRECTIONS)}"
+        text += (
+            f"; rms differences between models {', '.join(f'{metres(along[name])} m {name}' for name in DIRECTIONS)}"
+        )
     return text
 
 
@@ -161,8 +163,8 @@ def absolute_section(document: Document) -> Section:
         *(angle(name, _angle(key), 4, angle_unit(document), rank=2) for key, name in ANGLES),
     )
     note = (
-        "east, north, up: rms misclosures of the similarity; σ0: their ratio to what the control and one model let "
-        "expect"
+        "east, north, up: rms misclosures of the similarity; σ0: their ratio to what is expected from the "
+        "control and one model"
     )
     weights = tuple((_labelled(document, s["id"], "weights"), _weights(s["precision"])) for s in document["strips"])
     return Section("Absolute orientation", (tabulated(document["absolute"], columns, note=note), Facts(weights)))
@@ -175,7 +177,7 @@ def _angle(key: str) -> Callable[[Document], float | None]:
 
 def _weights(precision: Document) -> str:
     return (
-        "from the standard deviation of each control coordinate together with that of a point of one model, "
+        "from the standard deviation of each control coordinate, combined with that of a model point: "
         f"{metres(precision['plan'])} m in plan, {metres(precision['height'])} m in height"
     )
 
@@ -228,17 +230,17 @@ def _by_strip(blocks: Sequence[Document]) -> Table:
         number("height", "stations.height", unit="stations"),
         *(number(f"{axis.upper()} effect", effect(axis), 3, "m") for axis in "xyz"),
     )
-    note = "effect: of the largest term; evidence and coefficients stand in `polynomials` of result.json"
+    note = "effect: of the largest term; evidence and coefficients are in `polynomials` of result.json"
     return tabulated(blocks, columns, note=note)
 
 
 def _choice(document: Document, block: Document) -> str:
-    how = "decided by the evidence below" if block["asked"] == "auto" else f"degree {block['asked']} was asked for"
+    how = "chosen on the evidence below" if block["asked"] == "auto" else f"degree {block['asked']} as requested"
     plan, height = (degree_of(block["terms"][axis]) for axis in ("x", "z"))
     what = "no polynomial" if not block["degree"] else f"degree {plan} in plan and {height} in height"
     stations, (low, high) = block["stations"], block["reach"]
     text = (
-        f"{what}, {how}. The control stands at {counted(stations['plan'], 'station')} in plan and {stations['height']} "
+        f"{what}, {how}. The control lies at {counted(stations['plan'], 'station')} in plan and {stations['height']} "
         f"in height, from X = {low:.0f} m to {high:.0f} m along the strip."
     )
     return text[0].upper() + text[1:] if len(document["strips"]) == 1 else f"Strip {block['strip']}: {text}"
@@ -266,8 +268,8 @@ def _evidence(block: Document) -> Table:
     steps = block["evidence"]
     by = sorted({step["left_out_by"] for step in steps if step["left_out_by"]})
     note = (
-        f"rms: at the control; left out: at control that took no part, one {' or '.join(by) or 'point'} at a time; "
-        "F, p: ratio and probability by chance of the gain in all three axes together"
+        f"rms: at the control; left out: at control held back, one {' or '.join(by) or 'point'} at a time; "
+        "F, p: variance ratio of the gain in all three axes together, and its probability by chance"
     )
     return tabulated(steps, EVIDENCE, note=note)
 
@@ -291,6 +293,6 @@ def _coefficients(block: Document) -> Table:
     ]
     note = (
         "X along the strip, Y to its left, Z up, metres; effect: at the end of the control's range and the edge of the "
-        "strip; t: coefficient over its standard deviation σ, 2 and more are hardly chance"
+        "strip; t: coefficient over its standard deviation σ; 2 or more is hardly due to chance"
     )
     return tabulated(rows, COEFFICIENTS, note=note)

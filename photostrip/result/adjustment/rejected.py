@@ -26,7 +26,7 @@ ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of id
 REASONS = {
     WRONG_RAY: "the other rays of the point meet without it",
     TWO_RAYS: "the two rays of the point contradict each other: neither is used",
-    SEVERAL_RAYS: "the rays of the point contradict each other, and which is wrong cannot be told: none is used",
+    SEVERAL_RAYS: "the rays of the point contradict each other, and it cannot be told which is wrong: none is used",
 }
 EMPTY: Document = {
     "strip": "",
@@ -227,7 +227,7 @@ def _from_links(result: Result, strip: StripResult) -> list[Document]:
         parts = ", ".join(f"{axis} {value * MICROMETRES:+.0f}" for axis, value in zip(AXES, each.size, strict=True))
         size = float(np.linalg.norm(each.size))
         if formed.used[before] == formed.used[after]:
-            wrong = "which one is wrong cannot be told, and the mean is made of neither"
+            wrong = "it cannot be told which one is wrong, and neither enters the mean"
         else:
             right, other = pair if formed.used[before] else pair[::-1]
             wrong = f"other models agree with {right}: {other} is wrong"

@@ -49,7 +49,7 @@ def test_an_automatic_limit_and_automatic_heights_are_said() -> None:
     document["settings"]["interior"]["transform"] = "auto"
     document["corrections"]["interior"] = {"transforms": ["affine", "conformal"]}
     found = facts(document)
-    assert "four of its standard deviations" in found["limit of y parallax"]
+    assert "four times its standard deviation" in found["limit of y parallax"]
     assert "flying height above ground" in found["heights for refraction"]
     assert found["fiducial marks"].startswith("affine and conformal transformation")
 

@@ -107,7 +107,7 @@ def test_notes_of_a_kind_are_said_once() -> None:
         {"code": "c", "severity": "note", "message": f"strip {name}: so", "strip": name, "photos": [], "points": []}
         for name in "ABC"
     ]
-    assert "- strip A: so (likewise strips B, C)" in lines({**saved(), "notes": notes})
+    assert "- strip A: so (and the same for strips B, C)" in lines({**saved(), "notes": notes})
 
 
 def test_a_section_is_printed_whole_by_its_name() -> None:

@@ -79,7 +79,7 @@ def test_a_twisted_photo_shows_in_its_models() -> None:
     assert abs(middle["omega2_arcsec"] - 400.0) < 60
     assert abs(last["omega2_arcsec"] + 400.0) < 60
     text = sections_of(document_of(run(twist_arcsec=400.0)))
-    assert any("2 of them deformed" in part.text for s in text for part in s.parts if hasattr(part, "text"))
+    assert any("2 of them are deformed" in part.text for s in text for part in s.parts if hasattr(part, "text"))
 
 
 @pytest.mark.slow

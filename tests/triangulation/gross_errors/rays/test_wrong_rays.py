@@ -99,7 +99,7 @@ def test_two_rays_that_contradict_each_other_are_both_left_out() -> None:
     strip = spoiled(strip, {(photo, name): (0.0, 0.3)})
     result = adjusted(strip)
     assert set(found_in(strip, result).values()) == {TWO_RAYS}
-    assert result.not_determined == {name: "its rays contradict each other"}
+    assert result.not_determined == {name: "rays contradict each other"}
 
 
 def test_an_error_along_the_base_takes_the_place_and_leaves_the_parallaxes() -> None:
