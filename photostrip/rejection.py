@@ -21,7 +21,9 @@ class Rejection:
     axes: tuple[int, ...] = ()  # coordinates that are wrong; empty: all of the observation
     # estimated errors of its coordinates: mm, metres or radians; empty where nothing can be said
     size: tuple[float, ...] = ()
-    cause: str = ""  # of a ray: whether it is known to be the wrong one of its point
+    # of a ray: whether it is known to be the wrong one of its point; of control: ``image`` or ``exchanged``
+    cause: str = ""
+    other: int = -1  # of control: place of the photo whose image of it is wrong, or the point it was exchanged with
     readmitted: bool = False  # whether it came back in the end
 
     @property

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.selection import Selection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.check_errors import CheckErrors
-    from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
     from photostrip.triangulation.gross_errors.pairs import screening
     from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
@@ -122,7 +121,7 @@ class StripResult:
     model_stages: ModelStages | None = None  # None for photos
 
     @property
-    def wrong_control(self) -> tuple[ControlRejection, ...]:
+    def wrong_control(self) -> tuple[Rejection, ...]:
         """Control coordinates that were rejected."""
         return self.screened_control.rejections
 

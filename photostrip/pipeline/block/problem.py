@@ -294,10 +294,7 @@ def _begin(
         far[loose] = np.maximum(far[loose], FAR * np.median(miss[loose]))
     whole = Selection.everything(problem)
     given = whole.control.copy()
-    axes = list(GROUND_AXES)
-    wrong = {
-        each.id: [axes.index(axis) for axis in each.axes] for strip in start.strips for each in strip.wrong_control
-    }
+    wrong = {strip.control.ids[each.row]: list(each.axes) for strip in start.strips for each in strip.wrong_control}
     for row, number in enumerate(control_rows.tolist()):
         given[row, wrong.get(control.ids[number], [])] = False
     return replace(whole, images=inside | (free & (miss <= far)), control=given)

@@ -137,7 +137,7 @@ class LinkedModels:
             depth=float(np.nanmean(centers[:, 2]) - xyz[:, 2].mean()) if known else float("nan"),
             notes=(
                 *link_notes(strip, self.measured, formed),
-                *notes.wrong_control_notes(strip, screened.screened_control.rejections),
+                *notes.wrong_control_notes(strip, screened.screened_control),
                 *notes.control_notes(strip, oriented.absolute),
                 *notes.polynomial_notes(strip, correction, xyz),
             ),

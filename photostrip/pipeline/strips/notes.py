@@ -9,17 +9,18 @@ import numpy as np
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
+from photostrip.triangulation.gross_errors.control.control_rejections import EXCHANGED, WRONG_IMAGE
 from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING, Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from photostrip.arrays import Floats
     from photostrip.pipeline.inputs import ModelStrip, Strip
     from photostrip.points import ControlPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
+    from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
     from photostrip.triangulation.polynomial.correction import Polynomial
     from photostrip.triangulation.resection.resection import Resection
@@ -65,22 +66,24 @@ def screening_notes(strip: Strip, screened: ScreenedPairs, sigma: float) -> Iter
         yield Note("masked-errors", text, strip=strip.id, photos=names)
 
 
-def wrong_control_notes(strip: Strip | ModelStrip, wrong: Sequence[ControlRejection]) -> Iterator[Note]:
+def wrong_control_notes(strip: Strip | ModelStrip, screened: ScreenedControl) -> Iterator[Note]:
     """Name control that was not used, and what seems to be wrong with it."""
-    for each in wrong:
-        sizes = dict(zip(GROUND_AXES, each.size, strict=True))
-        parts = ", ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in each.axes)
+    ids = screened.kept.ids
+    for each in screened.rejections:
+        point = ids[each.row]
+        parts = ", ".join(f"{GROUND_AXES[axis]} by about {each.size[axis]:+.2f} m" for axis in each.axes)
         text = (
-            f"control point {each.id} contradicts the strip and the other control: {parts} (test value "
+            f"control point {point} contradicts the strip and the other control: {parts} (test value "
             f"{each.value:.1f}, limit {each.limit:.1f}); not used"
         )
-        if each.exchanged_with:
-            text += f"; it fits when exchanged with {each.exchanged_with}"
-        if each.photo:
-            text += f"; its image in photo {each.photo} is wrong, not its coordinates: they agree along its other ray"
-            yield Note("control-image", text, strip=strip.id, photos=(each.photo,), points=(each.id,))
-        else:
-            yield Note("control-rejected", text, strip=strip.id, points=(each.id,))
+        if each.cause == WRONG_IMAGE:
+            photo = strip.photos[each.other]
+            text += f"; its image in photo {photo} is wrong, not its coordinates: they agree along its other ray"
+            yield Note("control-image", text, strip=strip.id, photos=(photo,), points=(point,))
+            continue
+        if each.cause == EXCHANGED:
+            text += f"; it fits when exchanged with {ids[each.other]}"
+        yield Note("control-rejected", text, strip=strip.id, points=(point,))
 
 
 def junction_notes(strip: Strip, formed: FormedStrip) -> Iterator[Note]:

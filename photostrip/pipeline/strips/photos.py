@@ -108,9 +108,9 @@ class FormedPhotos:
         for row, place in enumerate(oriented.control_rows.tolist()):
             pair = rays.photo[point == place]
             if len(pair) == 2:
-                for along, other in (pair, pair[::-1]):
+                for along, other in (pair.tolist(), pair[::-1].tolist()):
                     ray = oriented.at_control[row] - centers[along]
-                    found.append(ControlRay(row, self.strip.photos[other], ray / np.linalg.norm(ray)))
+                    found.append(ControlRay(row, other, ray / np.linalg.norm(ray)))
         return found
 
     def screens_control(self, settings: Settings) -> bool:
@@ -153,7 +153,7 @@ class FormedPhotos:
             notes=(
                 *overruling.notes(settings.relative, strip.id, strip.photos),
                 *notes.screening_notes(strip, self.screened, self.sigma),
-                *notes.wrong_control_notes(strip, screened.screened_control.rejections),
+                *notes.wrong_control_notes(strip, screened.screened_control),
                 *notes.pair_notes(strip, self.orientation),
                 *notes.junction_notes(strip, formed),
                 *notes.control_notes(strip, oriented.absolute),

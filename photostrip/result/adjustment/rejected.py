@@ -12,6 +12,7 @@ from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import AXES, names_of
 from photostrip.result.numbers import MICROMETRES, Document, natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
+from photostrip.triangulation.gross_errors.control.control_rejections import EXCHANGED, WRONG_IMAGE
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation.scale_transfer import depths
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import Bundle
     from photostrip.points import PhotoPoints
     from photostrip.rejection import Rejection
-    from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
 
 ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity
 REASONS = {
@@ -197,23 +197,23 @@ def rejected_by_strip(strip: StripResult) -> list[Rejection]:
     return [each for each in strip.of_photos.wrong_rays if each.row in left]
 
 
-def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
-    sizes = dict(zip(GROUND_AXES, wrong.size, strict=True))
-    reason = "; ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in wrong.axes)
-    if wrong.exchanged_with:
-        reason += f"; fits when exchanged with {wrong.exchanged_with}"
-    if wrong.photo:
-        reason += f"; the wrong ray is that of photo {wrong.photo}: the error lies along the other ray"
+def _from_control(strip: StripResult, wrong: Rejection) -> Document:
+    photo = strip.strip.photos[wrong.other] if wrong.cause == WRONG_IMAGE else ""
+    reason = "; ".join(f"{GROUND_AXES[axis]} by about {wrong.size[axis]:+.2f} m" for axis in wrong.axes)
+    if wrong.cause == EXCHANGED:
+        reason += f"; fits when exchanged with {strip.control.ids[wrong.other]}"
+    if photo:
+        reason += f"; the wrong ray is that of photo {photo}: the error lies along the other ray"
     return _entry(
         strip=strip.strip.id,
-        point=wrong.id,
+        point=strip.control.ids[wrong.row],
         stage="control",
-        test="left out",
+        test=wrong.test,
         value=wrong.value,
         limit=wrong.limit,
-        size=max((sizes[axis] for axis in wrong.axes), key=abs, default=0.0),
+        size=wrong.worst,
         size_unit="m",
-        blamed=[wrong.photo] if wrong.photo else [],
+        blamed=[photo] if photo else [],
         reason=f"given coordinates contradict the strip and the other control: {reason}",
     )
 

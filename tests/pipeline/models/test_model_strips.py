@@ -134,7 +134,9 @@ def test_a_wrong_control_point_is_named(monkeypatch: pytest.MonkeyPatch, coordin
     row = int(np.flatnonzero(~whole.control.check)[4])
     enu[row, 2] += 5.0
     strip = linked(replace(whole, control=replace(whole.control, enu=enu)))
-    assert [(each.id, each.axes) for each in strip.wrong_control] == [(whole.control.ids[row], ("up",))]
+    assert [(each.row, each.axes) for each in strip.wrong_control] == [
+        (strip.control.ids.index(whole.control.ids[row]), (2,))
+    ]
     assert strip.wrong_control[0].size[2] == pytest.approx(5.0, abs=1.0)
 
 

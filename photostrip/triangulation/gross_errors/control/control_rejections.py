@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.rejection import Rejection
 from photostrip.statistics import f_quantile, normal_quantile
 from photostrip.triangulation.gross_errors.control.control_deletion import ALPHA, Deletion, adjust
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 
+EXCHANGED, WRONG_IMAGE = "exchanged", "image"
 POWER = 0.8  # an error is called detectable when it is found in this share of cases
 
 
@@ -38,24 +39,6 @@ class Found(NamedTuple):
         return tuple(column for column in self.out if column < self.whole.coordinates)
 
 
-@dataclass(frozen=True, slots=True)
-class ControlRejection:
-    """Wrong coordinates of one control point. With one plan coordinate the other one is not used either."""
-
-    id: str
-    # which coordinates look wrong: ``"east"``, ``"north"``, ``"up"`` (of the point's ground frame)
-    axes: tuple[str, ...]
-    # value, limit: test value, the length of the error in standard deviations, and its critical value
-    value: float
-    limit: float
-    # estimated errors of the coordinates east, north, up, metres: given minus what the others predict
-    size: tuple[float, float, float]
-    exchanged_with: str = ""  # the point with which it seems to have been exchanged; empty when there is none
-    photo: str = ""  # the photo in which its image is wrong rather than its coordinates; empty when they are
-    # smallest error of the worst coordinate that is found in 80 % of cases, metres
-    detectable: float = float("nan")
-
-
 def kept_of(strip: StripAtControl, found: Found) -> Flags:
     """Coordinates that stay (n, 3)."""
     kept = strip.control.use.copy()
@@ -64,12 +47,12 @@ def kept_of(strip: StripAtControl, found: Found) -> Flags:
     return kept
 
 
-def control_rejections(strip: StripAtControl, found: Found) -> list[ControlRejection]:
-    """List the points with rejected coordinates."""
-    control, place = strip.control, strip.coordinates
-    _, detectable = reliability(strip, found)
-    partner = _exchanges(strip, found)
-    rejections = []
+def control_rejections(strip: StripAtControl, found: Found, rows: Numbers) -> list[Rejection]:
+    """List the points with rejected coordinates. With one plan coordinate the other one is not used either.
+
+    rows: rows of the section's control in that of the whole strip.
+    """
+    place, partner, rejections = strip.coordinates, _exchanges(strip, found), []
     for point in found.whole.points:
         part = tuple(column for column in point if column in found.coordinates)
         if not part:
@@ -81,18 +64,18 @@ def control_rejections(strip: StripAtControl, found: Found) -> list[ControlRejec
         size = np.zeros(3)
         size[place.axis[list(point)]] = -others.estimate(point)
         single = np.abs(others.estimate(part)) / _deviations(others, part) / np.sqrt(tested.spread)
-        worst = part[int(single.argmax())]
         beyond = [column for column, value in zip(part, single, strict=True) if value > _limit(tested, found.whole, 1)]
         rejections.append(
-            ControlRejection(
-                id=control.ids[row],
-                axes=tuple(GROUND_AXES[place.axis[column]] for column in (beyond or part)),
+            Rejection(
+                kind="control",
+                row=int(rows[row]),
+                test="left out",
+                axes=tuple(place.axis[beyond or list(part)].tolist()),
                 value=float(np.sqrt(tested.gain / tested.spread)),
                 limit=_limit(tested, found.whole, len(part)),
-                size=(float(size[0]), float(size[1]), float(size[2])),
-                exchanged_with=partner.get(row, ""),
-                photo=photo,
-                detectable=float(detectable[row, place.axis[worst]]),
+                size=tuple(size.tolist()),
+                cause=EXCHANGED if row in partner else WRONG_IMAGE if photo >= 0 else "",
+                other=int(rows[partner[row]]) if row in partner else photo,
             )
         )
     return rejections
@@ -125,8 +108,8 @@ def _deviations(others: JointAdjustment, columns: Columns) -> Floats:
     return np.asarray(np.sqrt(others.cofactor(columns).diagonal()) / others.size[list(columns)], float)
 
 
-def _wrong_image(strip: StripAtControl, found: Found, point: Columns, part: Columns) -> str:
-    """Name the photo whose image of the point is wrong, not its coordinates.
+def _wrong_image(strip: StripAtControl, found: Found, point: Columns, part: Columns) -> int:
+    """Find the photo whose image of the point is wrong, not its coordinates; -1 where there is none.
 
     An error of the image moves the point along its other ray: that explains all its misclosures, and the rejected
     coordinates do not.
@@ -136,9 +119,9 @@ def _wrong_image(strip: StripAtControl, found: Found, point: Columns, part: Colu
     if len(part) < len(point):
         alone = others.deletions([part])[0]
         if _beside(everything, alone).probability > ALPHA:
-            return ""
+            return -1
     row = strip.coordinates.point[point[0]]
-    photo, best = "", ALPHA
+    photo, best = -1, ALPHA
     for column, ray in enumerate(strip.rays, found.whole.first_ray):
         if ray.point == row and len(point) > 1:
             left = _beside(everything, others.deletions([(column,)])[0]).probability
@@ -157,12 +140,12 @@ def _beside(everything: Deletion, some: Deletion) -> Deletion:
     )
 
 
-def _exchanges(strip: StripAtControl, found: Found) -> dict[int, str]:
+def _exchanges(strip: StripAtControl, found: Found) -> dict[int, int]:
     """Find pairs of rejected points that the others predict when each has the coordinates of the other."""
     control, whole, place = strip.control, found.whole, strip.coordinates
     kept = kept_of(strip, found)
     wrong = np.flatnonzero((control.use & ~kept)[:, 0]).tolist()
-    partner: dict[int, str] = {}
+    partner: dict[int, int] = {}
     for one, other in combinations(wrong, 2):
         if control.frame[one] != control.frame[other] or not (control.use[one] == control.use[other]).all():
             continue
@@ -175,5 +158,5 @@ def _exchanges(strip: StripAtControl, found: Found) -> dict[int, str]:
         gain = before.squares - before.without(both).squares
         exchange = Deletion(columns=both, gain=gain, squares=before.squares, freedom=before.freedom)
         if exchange.probability > whole.level:
-            partner[one], partner[other] = control.ids[other], control.ids[one]
+            partner[one], partner[other] = other, one
     return partner

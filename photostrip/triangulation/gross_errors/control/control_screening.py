@@ -20,6 +20,7 @@ from photostrip.errors import PhotostripError
 from photostrip.triangulation.gross_errors.control.control_components import ROUNDS, candidates
 from photostrip.triangulation.gross_errors.control.control_deletion import adjust
 from photostrip.triangulation.gross_errors.control.control_rejections import (
+    WRONG_IMAGE,
     Found,
     control_rejections,
     kept_of,
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.points import ControlPoints
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
-    from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.control.height_stretch import StretchedHeights
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
@@ -45,7 +46,7 @@ class ScreenedControl:
     """The control of a strip with ``use`` false where a coordinate was rejected."""
 
     kept: ControlPoints
-    rejections: tuple[ControlRejection, ...]
+    rejections: tuple[Rejection, ...]  # rows of the control
     # how far the others check each coordinate (n, 3): redundancy number, and smallest error in metres that is found in
     # 80 % of cases, infinite where none is; NaN without a test
     redundancy: Floats
@@ -65,11 +66,10 @@ def screen_control(strip: StripAtControl) -> ScreenedControl:
             continue
         if found is not None:
             use[rows] = kept_of(section, found)
-            rejections += control_rejections(section, found)
+            rejections += control_rejections(section, found, rows)
             redundancy[rows], detectable[rows] = reliability(section, found)
-    order = {name: row for row, name in enumerate(strip.control.ids)}
-    rejections.sort(key=lambda each: order[each.id])
-    use[[order[each.id] for each in rejections if each.photo]] = False
+    rejections.sort(key=lambda each: each.row)
+    use[[each.row for each in rejections if each.cause == WRONG_IMAGE]] = False
     return ScreenedControl(
         kept=replace(strip.control, use=use),
         rejections=tuple(rejections),

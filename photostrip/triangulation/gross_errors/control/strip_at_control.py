@@ -31,7 +31,7 @@ class ControlRay(NamedTuple):
     """The ray of a control point on two photos along which the error of its image in the other photo moves it."""
 
     point: int
-    photo: str  # the other photo, whose image would be wrong
+    photo: int  # place in the strip of the other photo, whose image would be wrong
     direction: Floats  # (3,): of the ray, unit vector in the intermediate frame
 
 

@@ -190,7 +190,7 @@ def test_nothing_is_said_of_a_strip_that_nothing_explains(worse: float, named: b
     strip = drawn(4, points=12, worse=worse)
     strip = replace(strip, w=strip.w + 200.0 * worse * (np.arange(36) == 8))
     found = control_screening.screen_control(strip).rejections
-    assert [(each.id, each.axes) for each in found] == ([("c2", ("up",))] if named else [])
+    assert [(each.row, each.axes) for each in found] == ([(2, (2,))] if named else [])
 
 
 # ---------------------------------------------------------------------------------------------------------- strips
@@ -214,7 +214,7 @@ def test_a_wrong_point_without_a_band_mate_is_found(error: tuple[float, float, f
     strip = flown()
     names = ("p0_1", "p1_-1", "p4_1", "p5_-1", "p7_0", "p9_1", "p11_-1", "p12_1")
     found = adjusted(strip, names, {"p7_0": error}).strips[0].wrong_control
-    assert [each.id for each in found] == ["p7_0"]
+    assert [names[each.row] for each in found] == ["p7_0"]
     assert found[0].size == pytest.approx(error, abs=1.5)
     assert not adjusted(strip, names, {}).strips[0].wrong_control
 
@@ -222,16 +222,16 @@ def test_a_wrong_point_without_a_band_mate_is_found(error: tuple[float, float, f
 def test_a_plan_error_of_two_metres_does_not_pass() -> None:
     """At 1:10 000 a point of the strip is good to 0.1 m in plan."""
     strip = flown()
-    found = adjusted(strip, strip.bands(0, 3, 6, 9, 12), {"p6_0": (2.0, 0.0, 0.0)}).strips[0].wrong_control
-    assert [(each.id, each.axes) for each in found] == [("p6_0", ("east",))]
-    assert found[0].detectable < 2.0
+    found = adjusted(strip, strip.bands(0, 3, 6, 9, 12), {"p6_0": (2.0, 0.0, 0.0)}).strips[0]
+    assert [(found.control.ids[each.row], each.axes) for each in found.wrong_control] == [("p6_0", (0,))]
+    assert found.screened_control.detectable[found.control.ids.index("p6_0"), 0] < 2.0
 
 
 def test_a_wrong_point_is_found_in_sections_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(strip_at_control, "LARGEST", 27)
     strip = flown()
-    found = adjusted(strip, strip.bands(0, 3, 6, 9, 12), {"p6_1": (0.0, 0.0, 8.0)}).strips[0].wrong_control
-    assert [(each.id, each.axes) for each in found] == [("p6_1", ("up",))]
+    found = adjusted(strip, strip.bands(0, 3, 6, 9, 12), {"p6_1": (0.0, 0.0, 8.0)}).strips[0]
+    assert [(found.control.ids[each.row], each.axes) for each in found.wrong_control] == [("p6_1", (2,))]
 
 
 def test_a_bend_takes_no_good_control() -> None:
@@ -242,7 +242,7 @@ def test_a_bend_takes_no_good_control() -> None:
     bent = replace(strip, xyz=strip.xyz + np.column_stack([0 * along, 0 * along, 400.0 * along**2]))
     assert not adjusted(bent, names, {}).strips[0].wrong_control
     found = adjusted(bent, names, {"p6_1": (0.0, 0.0, 8.0)}).strips[0].wrong_control
-    assert [each.id for each in found] == ["p6_1"]
+    assert [names[each.row] for each in found] == ["p6_1"]
 
 
 def test_a_wrong_image_of_a_control_point_on_two_photos_is_named_instead_of_its_coordinates() -> None:
@@ -255,12 +255,12 @@ def test_a_wrong_image_of_a_control_point_on_two_photos_is_named_instead_of_its_
     spoiled = replace(strip, observations=replace(o, xy=xy))
     result = adjusted(spoiled, strip.bands(0, 3, 6, 9, 12), {})
     (found,) = result.strips[0].wrong_control
-    assert (found.id, found.photo) == ("p0_1", o.photo_ids[0])
+    assert (result.strips[0].control.ids[found.row], found.cause, found.other) == ("p0_1", "image", 0)
     assert not result.strips[0].control.use[result.strips[0].control.ids.index("p0_1")].any()
     told = [note for note in result.notes if note.code in {"control-rejected", "control-image"}]
-    assert [(note.code, note.photos, note.points) for note in told] == [("control-image", (found.photo,), ("p0_1",))]
+    assert [(note.code, note.photos, note.points) for note in told] == [("control-image", (o.photo_ids[0],), ("p0_1",))]
     (line,) = [line for line in document_of(result)["rejected"] if line["stage"] == "control"]
-    assert line["blamed"] == [found.photo]
+    assert line["blamed"] == [o.photo_ids[0]]
 
 
 @pytest.mark.parametrize(("height", "wrong"), [(0.8, {0, 1, 2}), (0.0, {0, 1})])

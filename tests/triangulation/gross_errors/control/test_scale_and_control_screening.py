@@ -49,12 +49,12 @@ def adjusted(strip: Flown, wrong: dict[str, tuple[float, float, float]] | None =
 
 @pytest.mark.parametrize(
     ("error", "axes"),
-    [((0.0, 0.0, 8.0), ("up",)), ((-30.0, 0.0, 0.0), ("east",)), ((0.0, 5000.0, 0.0), ("north",))],
+    [((0.0, 0.0, 8.0), (2,)), ((-30.0, 0.0, 0.0), (0,)), ((0.0, 5000.0, 0.0), (1,))],
 )
 def test_a_wrong_coordinate_is_found_and_its_size_estimated(error: tuple[float, float, float], axes: object) -> None:
     result = adjusted(flown(), {"p6_1": error})
     (found,) = result.strips[0].wrong_control
-    assert found.id == "p6_1"
+    assert result.strips[0].control.ids[found.row] == "p6_1"
     assert found.axes == axes
     assert found.size == pytest.approx(error, abs=3.0)
     assert found.value > found.limit
@@ -70,8 +70,10 @@ def test_a_wrong_height_leaves_the_plan_position_in_use() -> None:
 def test_exchanged_points_are_named_as_an_exchange() -> None:
     strip = flown()
     step = strip.xyz[strip.at["p9_-1"]] - strip.xyz[strip.at["p6_1"]]
-    found = adjusted(strip, {"p6_1": tuple(step), "p9_-1": tuple(-step)}).strips[0].wrong_control
-    assert {each.id: each.exchanged_with for each in found} == {"p6_1": "p9_-1", "p9_-1": "p6_1"}
+    found = adjusted(strip, {"p6_1": tuple(step), "p9_-1": tuple(-step)}).strips[0]
+    ids = found.control.ids
+    assert {each.cause for each in found.wrong_control} == {"exchanged"}
+    assert {ids[each.row]: ids[each.other] for each in found.wrong_control} == {"p6_1": "p9_-1", "p9_-1": "p6_1"}
 
 
 def test_the_result_is_as_good_as_without_the_wrong_control() -> None:
@@ -163,4 +165,4 @@ def test_a_scale_that_may_be_wrong_does_not_cost_sound_control() -> None:
     assert not result.strips[0].wrong_control
     assert [note.photos for note in result.notes if note.code == "contradicting-joint"] == [("106",)]
     result = adjusted(replace(strip, observations=few), {"p12_0": (0.0, 0.0, 8.0)})
-    assert [each.id for each in result.strips[0].wrong_control] == ["p12_0"]
+    assert [result.strips[0].control.ids[each.row] for each in result.strips[0].wrong_control] == ["p12_0"]
