@@ -72,6 +72,8 @@ def read_measurements(file: str, findings: Findings, manner: Manner | None = Non
         fix = f"set `{key}` in the project file, or fill the columns sx and sy"
         missing = np.asarray(np.isnan(read.sigma).any(axis=1, keepdims=True))
         refuse_without_sigma(table, missing, ("sx", "sy"), fix, findings)
+    if in_pairs and pairs.refuse_exchanged(read, findings):
+        return read  # every one of their points disagrees with itself
     if manner.repeated == "average" or (in_pairs and not manner.repeated):
         return repeated.averaged(read, target, manner.sigma, findings)
     repeated.refuse(read, target, findings)

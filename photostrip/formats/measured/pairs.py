@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.measured.columns import POINT, numbers, sigmas
+from photostrip.formats.text.findings import counted
 from photostrip.formats.text.tables import Column, Table
 from photostrip.points import locate
 
 if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet
 
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Flags, Floats, Numbers
+    from photostrip.formats.measured.measurements import Measurements
     from photostrip.formats.text.findings import Findings
 
 PAIR = (Column("pair", aliases=("pair_id", "model", "stereopair")),)
@@ -35,6 +37,9 @@ TWO_POINTS = tuple(
 LAYOUTS = tuple(
     (*names, POINT, *columns, *sigmas(*"xy")) for names in (PAIR, BOTH) for columns in (PARALLAXES, TWO_POINTS)
 )
+FIX = "exchange the two ids, or the columns of the two photos"
+LEAST_AGAIN = 3  # measurements of a pair that are made in other pairs too, to see whether its photos are exchanged
+EXCHANGED_SHARE = 0.01  # of how far they differ as given, within which they agree when the photos are exchanged
 SIGNS = "-–—/:_+ "  # dashes as spreadsheets write them
 
 
@@ -95,3 +100,44 @@ def _refuse(table: Table, code: int, pair: str, ways: list[tuple[str, str]], fin
         message = f"pair {pair} does not name two photos of the strips"
     fix = "write it as LEFT-RIGHT with ids of the strips' photos, or use two columns left and right"
     findings.add(table.fault(row, "pair", message, "pair", expected="a pair such as 1001-1002", fix=fix))
+
+
+def refuse_exchanged(read: Measurements, findings: Findings) -> bool:
+    """Refuse pairs whose measurements agree with those of the other pairs when their photos are exchanged.
+
+    read: rows as ``photos_of_pairs`` makes them, left and right in turn.
+    """
+    left, right = read.photo[0::2], read.photo[1::2]
+    exchanged = _exchanged(read, np.ones(len(left), bool))
+    pairs = np.unique(np.column_stack([left, right]), axis=0)
+    which = [] if exchanged else [pair for pair in pairs if _exchanged(read, (left == pair[0]) & (right == pair[1]))]
+    if exchanged:
+        message = "in every pair the measurements agree with those of the other pairs when left and right are exchanged"
+        findings.add(read.table.fault(0, "photo", message, "pair-exchanged", fix=FIX))
+    for one, other in which:
+        inside = (left == one) & (right == other)
+        message = (
+            f"photos {read.photo_ids[one]} and {read.photo_ids[other]} are exchanged in their pair: its "
+            f"{counted(int(inside.sum()), 'point')} agree with the other pairs the other way round"
+        )
+        findings.add(read.table.fault(2 * int(np.argmax(inside)), "photo", message, "pair-exchanged", fix=FIX))
+    return exchanged or bool(which)
+
+
+def _exchanged(read: Measurements, inside: Flags) -> bool:
+    """Whether rows agree with the others, and all with each other, when their two photos are exchanged."""
+    swapped = read.photo.reshape(-1, 2).copy()
+    swapped[inside] = swapped[inside][:, ::-1]
+    given, then = (_apart(read, photo, np.repeat(inside, 2)) for photo in (read.photo, swapped.reshape(-1)))
+    if min(len(given), len(then)) < LEAST_AGAIN:
+        return False
+    return bool(np.median(then) < EXCHANGED_SHARE * np.median(given))
+
+
+def _apart(read: Measurements, photo: Numbers, inside: Flags) -> Floats:
+    """How far measurements of some rows lie from the others of the same point on the same photo."""
+    key = photo * len(read.target_ids) + read.target
+    order = np.argsort(key, kind="stable")
+    one, other = order[:-1], order[1:]
+    again = (key[one] == key[other]) & (inside[one] | inside[other])
+    return np.asarray(np.abs(read.xy[one[again]] - read.xy[other[again]]).max(axis=1), float)

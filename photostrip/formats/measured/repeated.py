@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from photostrip.formats.measured.measurements import Measurements
 
 POLICIES = ("refuse", "average")
+LEAST_TOGETHER = 4  # points measured several times, of which more than
+MOST_SHARE = 0.5  # disagree for one reason
+REACH_SHARE = 0.98  # of the coordinates
+AGREEING_SHARE = 3e-4  # of what coordinates reach to: 30 micrometres of 100 mm
 FARTHEST = 10.0  # standard deviations from the mean; beyond, two measurements are not of one point
 
 
@@ -52,7 +56,9 @@ def averaged(read: Measurements, target: str, default: float | None, findings: F
     total = _sums(group, weight)
     mean = _sums(group, weight * read.xy) / total
     off = np.where(count[group, None] > 1, read.xy - mean[group], 0.0)
-    _refuse_far(read, target, np.abs(off) / sigma, group, findings)
+    ratio = np.abs(off) / sigma
+    if not _refuse_all(read, target, off, ratio, group, findings):
+        _refuse_far(read, target, ratio, group, findings)
     findings.notes.append(_spread(read, target, off, count))
     of_mean = np.where(np.isnan(_sums(group, sigma)), np.nan, total**-0.5)
     order = np.argsort(first)
@@ -74,6 +80,37 @@ def _key(read: Measurements) -> Numbers:
 
 def _sums(group: Numbers, values: Floats) -> Floats:
     return np.column_stack([np.bincount(group, column) for column in values.T])
+
+
+def _refuse_all(
+    read: Measurements, target: str, off: Floats, ratio: Floats, group: Numbers, findings: Findings
+) -> bool:
+    """Refuse measurements of which most disagree: they have one cause, often the unit.
+
+    Measurements that differ by next to nothing of what they reach to agree, and what they are tested against is wrong.
+    """
+    several = np.bincount(group)[group] > 1
+    far = several & (np.nan_to_num(ratio.max(axis=1)) > FARTHEST)
+    names = len(np.unique(group[several]))
+    if names < LEAST_TOGETHER or far.sum() <= MOST_SHARE * several.sum():
+        return False
+    scatter = float(np.median(np.abs(off[several]).max(axis=1)))
+    reach = float(np.quantile(np.abs(read.xy), REACH_SHARE))
+    head = (
+        f"{names} {target}s are measured several times on a photo, and {len(np.unique(group[far]))} of them lie more "
+        f"than {FARTHEST:g} standard deviations from their mean"
+    )
+    if scatter < AGREEING_SHARE * reach:
+        message = (
+            f"{head}, by {scatter:.2g}, of coordinates that reach to {reach:.4g}: they agree as measurements do, so "
+            "that the unit or the standard deviation is wrong"
+        )
+        fix = "correct `observations.unit` or `observations.sigma`"
+    else:
+        message = f"{head}, by {scatter:.2g}, of coordinates that reach to {reach:.4g}"
+        fix = "were photos laid in anew between two pairs, or ids given anew? reduce coordinates to the fiducial marks"
+    findings.add(read.table.fault(int(np.argmax(far)), target, message, "measurements-disagree", fix=fix))
+    return True
 
 
 def _refuse_far(read: Measurements, target: str, ratio: Floats, group: Numbers, findings: Findings) -> None:

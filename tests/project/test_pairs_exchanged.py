@@ -1,0 +1,81 @@
+"""Pairs whose photos are exchanged, and lists in another unit, are told once, by their cause."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.formats.measured.observations import Manner, read_measurements
+from photostrip.formats.output.simulation import inputs_of
+from photostrip.formats.text.findings import Findings
+from photostrip.simulate import Flight, Spec
+from photostrip.simulate.simulation import simulate
+from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SIGMA = 0.005  # mm
+PAIRS = 5
+
+
+def listed(exchanged: set[int], *, factor: float = 1.0, noise: float = SIGMA) -> tuple[str, frozenset[str]]:
+    """Write a strip as a list of pairs, the photos of some pairs exchanged; and give its photos."""
+    inputs = inputs_of(simulate(Spec(seed=2, flight=Flight(photos=PAIRS + 1))))
+    o, photos, rng = inputs.observations, inputs.strips[0].photos, np.random.default_rng(1)
+    place = {(o.photo_ids[p], o.point_ids[q]): xy for p, q, xy in zip(o.photo, o.point, o.xy, strict=True)}
+    lines = ["left,right,point,xl,yl,xr,yr"]
+    for number, names in enumerate(pairwise(photos)):
+        for point in o.point_ids:
+            if not {(name, point) for name in names} <= set(place):
+                continue
+            found = [factor * (np.asarray(place[name, point]) + rng.normal(0.0, noise, 2)) for name in names]
+            one, other = found[::-1] if number in exchanged else found
+            lines.append(f"{','.join(names)},{point},{one[0]:.4f},{one[1]:.4f},{other[0]:.4f},{other[1]:.4f}")
+    return "\n".join(nonempty(lines)) + "\n", frozenset(photos)
+
+
+def faults(tmp_path: Path, listing: tuple[str, frozenset[str]]) -> list[tuple[str, str]]:
+    """Give code and message of what is refused."""
+    path = tmp_path / "pairs.csv"
+    path.write_text(listing[0], encoding="utf-8")
+    findings = Findings()
+    read_measurements(str(path), findings, Manner(sigma=SIGMA, photos=listing[1]))
+    return [(each.code, each.message) for each in findings.faults]
+
+
+@pytest.mark.parametrize("number", [0, 2, 4])
+def test_one_exchanged_pair_is_named(tmp_path: Path, number: int) -> None:
+    """It was told as one line for each of its points, none of which named the pair."""
+    ((code, message),) = faults(tmp_path, listed({number}))
+    assert code == "pair-exchanged"
+    assert f"photos 100{number + 1} and 100{number + 2} are exchanged in their pair" in message
+
+
+def test_all_pairs_exchanged_are_told_once(tmp_path: Path) -> None:
+    """The columns of left and right are exchanged."""
+    ((code, message),) = faults(tmp_path, listed(set(range(PAIRS))))
+    assert code == "pair-exchanged"
+    assert "in every pair" in message
+
+
+def test_sound_pairs_are_read(tmp_path: Path) -> None:
+    """Nothing is refused."""
+    assert faults(tmp_path, listed(set())) == []
+
+
+def test_another_unit_is_told_as_one(tmp_path: Path) -> None:
+    """Every measurement was refused by itself, and the unit never named."""
+    ((code, message),) = faults(tmp_path, listed(set(), factor=1000.0))
+    assert code == "measurements-disagree"
+    assert "the unit or the standard deviation is wrong" in message
+
+
+def test_photos_laid_in_anew_are_told_once(tmp_path: Path) -> None:
+    """Coordinates that scatter by a millimetre are in no common system."""
+    ((code, message),) = faults(tmp_path, listed(set(), noise=1.0))
+    assert code == "measurements-disagree"
+    assert "agree as measurements do" not in message
