@@ -378,7 +378,7 @@ def mistaken(kind: str) -> Inputs:
         ("sigma in mm", {"sigma-unit"}, set()),
         ("sigma in m", {"sigma-unit", "sigma-contradicted"}, set()),
         ("a digit", {"control-rejected"}, {"P406"}),
-        ("heights in feet", set(), {"P405"}),
+        ("heights in feet", {"unchecked-control"}, {"P405"}),
     ],
 )
 def test_mistakes_that_a_result_tells(kind: str, notes: set[str], findings: set[str]) -> None:
