@@ -6,7 +6,8 @@ best). Errors are from 5 standard deviations to 50 mm (all sizes on a logarithmi
 in a third of the projects one control coordinate is wrong too. Kinds: strips of 20 photos, blocks of 4 strips of 12
 photos by bundle (with GNSS and control at the corners of the strips, or with control along the perimeter), and strips
 of 19 independent models, with errors of their points or of their perspective centres, too. ``clean`` are projects of
-all sizes without errors, ``wrong-control`` strips with two fifths of the control wrong.
+all sizes without errors, ``wrong-control`` strips with two fifths of the control wrong, ``another-spot`` strips with a
+control point identified wrongly, ``long`` a fifth as many strips of 1000 photos with 300 equal errors.
 
 An error along the base moves a point that stands on two photos along its other ray, and nothing contradicts it; points
 with a wrong measurement of their own are therefore left out of the errors.
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
 SMALLEST, LARGEST = 5.0, 50_000.0  # standard deviations of a measurement; micrometres
 WRONG_SHARE = (0.01, 0.05)
 CONTROL_ERRORS = (0.5, 50.0)  # m
+SPOT, SLOPE = (1.0, 20.0), 0.3  # m and its sine: another spot than the control point that was meant
 MUCH_SHARE, MUCH_ERRORS, MUCH_POINTS = 0.4, (5.0, 100.0), (14, 20)  # of much wrong control; m; control points
 RUNS = ("without errors", "errors, auto", "errors, none", "errors, known")
 CLEAN, AUTO, NONE, KNOWN = RUNS
@@ -74,6 +76,11 @@ SCATTERED = replace(
     STRIP,
     flight=replace(STRIP.flight, photos=13),
     control=Control(layout="random", use={"xy": 0.2, "z": 0.2, "xyz": 0.6}, sigma=(0.02, 0.02, 0.02)),
+)
+LONG_STRIP = Spec(
+    flight=Flight(photos=1000),
+    control=Control(layout="bands", every=15, per_band=3),
+    gross_errors=(GrossError("image", count=300, size_um=300), GrossError("control", count=2, size_m=5)),
 )
 KINDS = {
     "strips": STRIP,
@@ -429,11 +436,62 @@ def print_much_wrong(pool: Pool, seeds: range) -> None:
     print(f"{failed.sum()} failed\n", flush=True)
 
 
+def another_spot_run(seed: int) -> tuple[int, int, int]:
+    """Adjust a strip with one control point identified wrongly: whether its plan and height are named, and others."""
+    rng, project = np.random.default_rng(seed), project_of(simulate(replace(STRIP, seed=seed)))
+    control = project.inputs.control
+    row = int(rng.choice(np.flatnonzero(control.use.all(axis=1) & ~control.check)))
+    way = rng.normal(size=2)
+    way *= np.exp(rng.uniform(*np.log(SPOT))) / np.linalg.norm(way)
+    enu = control.enu.copy()
+    enu[row] += [*way, rng.uniform(-SLOPE, SLOPE) * np.linalg.norm(way)]
+    result = triangulate(replace(project.inputs, control=replace(control, enu=enu)), project.settings)
+    (kept,) = (strip.control for strip in result.strips)
+    out = np.array([control.use[control.ids.index(name)] for name in kept.ids]) & ~kept.use
+    plan, height = out[kept.ids.index(control.ids[row])][[0, 2]].tolist()
+    return plan, height, int(out.any(axis=1).sum()) - int(plan or height)
+
+
+def print_another_spot(pool: Pool, seeds: range) -> None:
+    """Print how often plan and height of a control point are named that is identified wrongly."""
+    plan, height, others = np.array(pool.map(another_spot_run, seeds, 1), int).T
+    print(
+        f"one control point identified 1 to 20 m beside: plan named in {plan.sum()} of {len(seeds)} strips, its height"
+    )
+    print(f"too in {(plan & height).sum()}, {others.sum()} other points\n", flush=True)
+
+
+def long_run(seed: int) -> tuple[int, int, int]:
+    """Adjust a strip of 1000 photos with many errors: wrong control, how much of it is named, sound control named."""
+    project = project_of(simulate(replace(LONG_STRIP, seed=seed)))
+    run = adjusted(project, project.settings)
+    wrong = project.wrong_control & run.control
+    return len(wrong), len(wrong & run.rejected), len(run.rejected - wrong)
+
+
+def print_long(pool: Pool, seeds: range) -> None:
+    """Print whether much that is wrong in a long strip costs sound control."""
+    some = seeds[: max(2, len(seeds) // 5)]
+    wrong, named, others = np.array(pool.map(long_run, some, 1)).T
+    print(
+        f"{len(some)} strips of 1000 photos with 300 image errors: {named.sum()} of {wrong.sum()} wrong control points"
+    )
+    print(f"named, {others.sum()} sound ones in {(others > 0).sum()} strips\n", flush=True)
+
+
+OTHERS = {
+    "clean": print_clean,
+    "wrong-control": print_much_wrong,
+    "another-spot": print_another_spot,
+    "long": print_long,
+}
+
+
 def main() -> None:
     """Print the tables that are asked for."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("projects", type=int, nargs="?", default=60, help="projects of each kind (default 60)")
-    parser.add_argument("--kind", choices=[*KINDS, "clean", "wrong-control", "all"], default="all")
+    parser.add_argument("--kind", choices=[*KINDS, *OTHERS, "all"], default="all")
     parser.add_argument("--first-seed", type=int, default=1, help="number of the first project (default 1)")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one for each core)")
     options = parser.parse_args()
@@ -441,10 +499,9 @@ def main() -> None:
     with get_context("fork").Pool(options.workers, maxtasksperchild=1) as pool:
         if kinds := [kind for kind in KINDS if options.kind in {kind, "all"}]:
             print_kinds(pool, kinds, seeds)
-        if options.kind in {"clean", "all"}:
-            print_clean(pool, seeds)
-        if options.kind in {"wrong-control", "all"}:
-            print_much_wrong(pool, seeds)
+        for kind, show in OTHERS.items():
+            if options.kind in {kind, "all"}:
+                show(pool, seeds)
 
 
 if __name__ == "__main__":
