@@ -223,6 +223,23 @@ def unit(case: Case) -> Planted | None:
     return with_xy(case, case.inputs.observations.xy * factor), NOBODY
 
 
+def without_format(inputs: Inputs) -> Inputs:
+    """Leave out the format of the camera, where it has no marks, which would say as much."""
+    cameras = [replace(each.camera, format=None) for each in inputs.strips]
+    strips = [replace(each, camera=camera) for each, camera in zip(inputs.strips, cameras, strict=True)]
+    return replace(inputs, strips=tuple(strips), fiducials=None)
+
+
+def unit_without_format(case: Case) -> Planted | None:
+    """Give image coordinates ten times too large, without a format."""
+    return without_format(with_xy(case, case.inputs.observations.xy * 10.0)), NOBODY
+
+
+def distance_without_format(case: Case) -> Planted | None:
+    """Give a tenth of the principal distance, without a format."""
+    return without_format(with_camera(case, 0.1)), NOBODY
+
+
 def unit_of_one(case: Case) -> Planted | None:
     """Give one photo in micrometres."""
     photo = str(case.rng.choice(case.photos))
@@ -757,6 +774,8 @@ class Mistake:
 
 MISTAKES = (
     Mistake("image coordinates in another unit", unit, ("P101",)),
+    Mistake("ten times too large, no format", unit_without_format, ("P101",)),
+    Mistake("a tenth of the principal distance, no format", distance_without_format, ("P101",)),
     Mistake("one photo in another unit", unit_of_one, ("P102",)),
     Mistake("y down read as y up", y_down, ("P103", "P401")),
     Mistake("negatives read as positives", negatives, ("P103", "P401")),

@@ -171,6 +171,20 @@ def test_control_of_another_country() -> None:
     assert finding.key == "control[0].crs"
 
 
+@pytest.mark.parametrize(("of_images", "of_distance"), [(10.0, 1.0), (1.0, 0.1)])
+def test_points_that_no_lens_sees_without_a_format(of_images: float, of_distance: float) -> None:
+    """They reached to six times the principal distance, and the run was called good."""
+    inputs = inputs_of(simulation("utm"))
+    (strip,) = inputs.strips
+    distance = strip.camera.principal_distance * of_distance
+    camera = replace(strip.camera, principal_distance=distance, format=None)
+    observations = replace(inputs.observations, xy=inputs.observations.xy * of_images)
+    wrong = replace(inputs, strips=(replace(strip, camera=camera),), observations=observations)
+    (finding,) = gate.of_inputs(wrong, Settings())
+    assert finding.code == "P101"
+    assert f"or the principal distance is not {distance:g} mm" in finding.message
+
+
 @pytest.mark.parametrize("factor", [0.1, 0.01, 0.001])
 @pytest.mark.parametrize("frame", ["utm", "south"])
 def test_control_in_kilometres_or_without_its_last_digits(frame: str, factor: float) -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 REACH_SHARE = 0.98  # of the image points; the rest may be gross errors
 REACH = (0.12, 1.2)  # of half the format
 LIKELY_REACH = (0.3, 1.1)  # a reading that brings the reach into this range explains it
-REACH_OF_DISTANCE = (0.02, 8.0)  # of the principal distance, when no format is given
+REACH_OF_DISTANCE = (0.06, 3.0)  # of the principal distance, when no format is given: fields of 7 to 143 degrees
 LIKELY_OF_DISTANCE = (0.1, 2.0)
 MOST_LIKELY = 0.5  # of the upper end of such a range; below it other readings come first
 LIKELY_PIXELS = 2.2  # counted from a corner they reach twice as far
@@ -143,6 +143,9 @@ def _wrong_unit(camera: Camera, reach: float, reading: UnitReading, photos: Sequ
             f"; multiplied by {reading.factor:g} they would reach to {reach * reading.factor:.2f}: {reading.name}"
         )
         fix = "correct `observations.unit`, or the columns of the table"
+        if camera.format is None:
+            message += f"; or the principal distance is not {camera.principal_distance:g} mm"
+            fix += ", or the principal distance"
     else:
         fix = "check `observations.unit`, `observations.origin` and the format of the camera"
     evidence = {"reach": reach, "factor": reading.factor, "principal_distance_mm": camera.principal_distance}
