@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from typing import TYPE_CHECKING
 
 import pytest
@@ -33,10 +34,22 @@ def _plain_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="session")
-def forked() -> Iterator[Path]:
-    """Give a ``photostrip`` command that need not load the libraries each time."""
+def forks() -> Iterator[Forks]:
+    """Give a ``photostrip`` command and a ``python`` that need not load the libraries each time."""
     with Forks() as forks:
-        yield forks.command
+        yield forks
+
+
+@pytest.fixture(scope="session")
+def forked(forks: Forks) -> Path:
+    """Give the ``photostrip`` command of ``forks``."""
+    return forks.command
+
+
+@pytest.fixture
+def _quick_start(forks: Forks, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the processes that a test starts with ``sys.executable`` be copies of one that has loaded the libraries."""
+    monkeypatch.setattr(sys, "executable", str(forks.python))
 
 
 @pytest.fixture

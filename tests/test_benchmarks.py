@@ -11,10 +11,13 @@ import pytest
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
+PYTHON = sys.executable  # loads what it runs
+pytestmark = pytest.mark.usefixtures("_quick_start")
 
-def printed(program: str, *options: str) -> str:
+
+def printed(program: str, *options: str, python: str = "") -> str:
     """Run a benchmark program from elsewhere and give what it prints."""
-    command = [sys.executable, str(ROOT / "benchmarks" / program), *options]
+    command = [python or sys.executable, str(ROOT / "benchmarks" / program), *options]
     return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT.parent).stdout
 
 
@@ -110,7 +113,7 @@ def test_independent_models_prints_three_tables() -> None:
 @pytest.mark.slow
 def test_mutations_prints_changes_and_who_notices_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HYPOTHESIS_PROFILE", "quick")
-    out = printed("mutations.py", "--count", "2", "--seed", "1", "--room", "geometry", "--near")
+    out = printed("mutations.py", "--count", "2", "--seed", "1", "--room", "geometry", "--near", python=PYTHON)
     rows = re.findall(r"^\| `geometry/\w+\.py:\d+` \| `.+` to `.+` in `.+` \| (.+) \|$", out, re.MULTILINE)
     assert len(rows) == 2
     assert any(row.startswith("`geometry/test_") for row in rows)

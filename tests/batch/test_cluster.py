@@ -27,12 +27,14 @@ from photostrip.cli.main import main
 from photostrip.errors import InputError
 from tests.batch.faulty import WORK
 from tests.batch.projects import environment, run, tree, write_projects
+from tests.forked import Forks
 from tests.geodesy.frames import write_gtx
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any
 
+DASK = ("distributed.cli.dask_scheduler", "distributed.cli.dask_worker")
 QUICK = {  # a lost worker is noticed at once
     "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "5s",
     "DASK_DISTRIBUTED__COMM__RETRY__COUNT": "0",
@@ -47,7 +49,7 @@ def started(folder: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
         process = subprocess.Popen(
             [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]],
             cwd=folder,
-            env={**environment(), **QUICK},
+            env=environment(),
             stdout=log,
             stderr=log,
             text=True,
@@ -105,12 +107,27 @@ class Count:
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with two_workers(tmp_path_factory.mktemp("cluster") / "machines") as (address, _):
-        yield address
+def dask_forks() -> Iterator[Forks]:
+    """Give a ``python`` that has loaded Dask and its settings."""
+    with Forks(*DASK, **QUICK) as forks:
+        yield forks
+
+
+@pytest.fixture
+def _quick_start(dask_forks: Forks, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", str(dask_forks.python))
+
+
+@pytest.fixture(scope="module")
+def cluster(dask_forks: Forks, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "executable", str(dask_forks.python))
+        with two_workers(tmp_path_factory.mktemp("cluster") / "machines") as (address, _):
+            yield address
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_all_executors_write_the_same_bytes(tmp_path: Path, cluster: str) -> None:
     """One process, two processes, a cluster; a fault, a preset beside the projects and an absolute path among them."""
     projects = write_projects(tmp_path / "strips", 4)
@@ -136,6 +153,7 @@ def test_all_executors_write_the_same_bytes(tmp_path: Path, cluster: str) -> Non
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_one_of_two_machines_dies_in_the_middle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     number = 16
     write_projects(tmp_path / "strips", number)
@@ -160,6 +178,7 @@ def test_one_of_two_machines_dies_in_the_middle(tmp_path: Path, monkeypatch: pyt
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_a_project_that_crashes_or_hangs_leaves_the_machine_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cluster: str
 ) -> None:
@@ -178,6 +197,7 @@ def test_a_project_that_crashes_or_hangs_leaves_the_machine_alone(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_a_scheduler_that_goes_away_ends_the_batch_in_good_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -217,6 +237,7 @@ def _listening(port: int) -> Iterator[int]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_a_cluster_without_workers_is_waited_for_aloud(tmp_path: Path) -> None:
     """As on a busy queue: the scheduler is there, the machines come later."""
     write_projects(tmp_path / "strips", 2)

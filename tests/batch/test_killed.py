@@ -139,6 +139,7 @@ def test_killed_at_every_single_step_of_writing(here: Path, monkeypatch: pytest.
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_whole_commands_killed_with_their_workers(tmp_path: Path) -> None:
     write_projects(tmp_path / "strips", PROJECTS)
     begin = time.perf_counter()
@@ -222,6 +223,7 @@ def test_interrupted_in_good_order(tmp_path: Path, number: signal.Signals, execu
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_a_worker_killed_from_outside_costs_nothing(tmp_path: Path) -> None:
     write_projects(tmp_path / "strips", 12)
     mark = f"PHOTOSTRIP_TEST_{os.getpid()}"

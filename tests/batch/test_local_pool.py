@@ -45,6 +45,7 @@ FAULTS = {
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_every_fault_takes_only_its_own_project_along(tmp_path: Path) -> None:
     names = ["good1", *(name for fault in FAULTS for name in (fault, f"after-{fault}"))]
     tasks = tasks_of(tmp_path, names)
@@ -94,6 +95,7 @@ def _alive(pid: int) -> bool:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_workers_that_do_not_start_are_an_error_not_a_loop(tmp_path: Path) -> None:
     with (
         LocalPool(1, work="tests.batch.faulty:nothing") as pool,
@@ -104,6 +106,7 @@ def test_workers_that_do_not_start_are_an_error_not_a_loop(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_too_little_memory_for_anything_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(WorkerProcess, "fate", lambda worker: worker.end() and 71)
     with (

@@ -157,6 +157,7 @@ def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: pytest
     assert main(["batch", "strips", "-o", "out", "-q"]) == 0
 
 
+@pytest.mark.usefixtures("_quick_start")
 def test_the_lock_dies_with_its_process(here: Path) -> None:
     code = "import os, pathlib\nfrom photostrip.batch.result_folder import opened\n"
     code += "with opened(pathlib.Path('out')): os.kill(os.getpid(), 9)"
@@ -167,6 +168,7 @@ def test_the_lock_dies_with_its_process(here: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_of_two_batches_started_together_one_works(here: Path) -> None:
     started = [
         subprocess.Popen(

@@ -34,6 +34,7 @@ def test_a_damaged_project_ends_well(right: list[dict[str, bytes]], seed: int, c
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_the_benchmark_prints_its_table() -> None:
     command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "40", "7"]
     out = subprocess.run(command, capture_output=True, text=True, check=True).stdout

@@ -12,6 +12,7 @@ from tests.source_tree import ROOT
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_the_benchmark_prints_coverage_and_false_movements() -> None:
     command = [sys.executable, str(ROOT / "benchmarks" / "terrestrial.py"), "--runs", "3"]
     out = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT.parent).stdout
