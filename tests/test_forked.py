@@ -41,7 +41,7 @@ def test_a_copy_has_the_arguments_folder_environment_and_files_of_its_script(for
         encoding="utf-8",
     )
     reading, writing = os.pipe()
-    command = [forks.python, "program.py", "a b", str(writing)]
+    command = [str(forks.python), "program.py", "a b", str(writing)]
     environment = os.environ | {"COLOUR": "blue"}
     subprocess.run(
         command, cwd=tmp_path, env=environment, pass_fds=[writing], input="said\n", text=True, check=True

@@ -30,6 +30,7 @@ FAULTS: dict[str, Callable[[], object]] = {
     "exit": lambda: os._exit(5),
     "raise": lambda: sys.exit(0),
     "hang": lambda: time.sleep(1000),
+    "busy": lambda: sum(range(10**15)),  # one call of a library: no other thread of the process has a turn
     "memory": _eat,
     "grow": lambda: _kept.append(bytearray(140_000_000)),
 }

@@ -86,6 +86,16 @@ def test_workers_are_gone_when_the_pool_is(tmp_path: Path) -> None:
     assert not any(_alive(pid) for pid in pids)
 
 
+@pytest.mark.slow
+def test_a_worker_that_computes_for_ever_is_killed(tmp_path: Path) -> None:
+    (task,) = tasks_of(tmp_path, ["busy"])
+    pids: list[int] = []
+    with LocalPool(1, Limits(seconds=1.0), WORK, begun=lambda _: pids.append(pool.workers[0].process.pid)) as pool:
+        answers = pool.answers(iter([task]), never)
+        assert next(answers).outcome["status"] == "timeout"
+        assert not any(_alive(pid) for pid in nonempty(pids))
+
+
 def _alive(pid: int) -> bool:
     try:
         os.kill(pid, 0)
