@@ -15,7 +15,14 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
-from photostrip.pipeline.plausibility import control_layout, distance_trial, evidence, given_cameras, given_control
+from photostrip.pipeline.plausibility import (
+    control_layout,
+    distance_trial,
+    evidence,
+    given_cameras,
+    given_control,
+    slips,
+)
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images
 from photostrip.points import locate
@@ -57,7 +64,9 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     """Find what the data say against themselves, the adjustment being done."""
     inputs, settings = result.inputs, result.settings
     if inputs.models is not None:
-        return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
+        of_models = _of_models(inputs, inputs.models, settings, directory)
+        given = _given_control(inputs, directory)
+        return accepted(of_models if given is None else slips.judged(of_models, result, given), settings.accept)
     points = result.refined.observations
     photo = PhotoCoordinates(result.measured, result.interior)
     images = replace(of_images(inputs, settings, photo), observations=points)
@@ -67,7 +76,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         evidence.EvidenceStrip(each.strip, each.orientation, each.formed) for each in (s.of_photos for s in stages)
     ]
     strips = tuple(each.strip for each in formed)  # a photo that is a strip of its own forms nothing
-    findings = [*images.findings, *_of_control(control, images, strips, formed)]
+    of_control = _of_control(control, images, strips, formed)
+    findings = [*images.findings, *(of_control if control is None else slips.judged(of_control, result, control))]
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each in formed:
         findings += _of_formed(each, points)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,9 +14,13 @@ from photostrip.pipeline.plausibility import gate
 from photostrip.simulate import Control, Flight, Gnss, Ground, Image, Spec, Terrain, simulate
 from tests.pipeline.blocks import orientations, positions, with_control
 
+if TYPE_CHECKING:
+    from photostrip.simulate import Simulation
+
 BLOCK = Spec(
     seed=4, flight=Flight(photos=6, strips=4, side_lap_percent=40.0), control=Control(per_band=1, check=4), gnss=Gnss()
 )
+HILLS = Terrain(relief=60.0)
 BUNDLE = Settings(adjustment="bundle")
 
 
@@ -73,3 +78,30 @@ def test_a_start_may_be_far_off() -> None:
         far, observed=True, sigma=np.full(far.enu.shape, 500.0), sigma_angles=np.full(far.enu.shape, 1.0)
     )
     assert "P204" in told(replace(inputs_of(made), orientations=observed), BUNDLE)
+
+
+def long_strip() -> Simulation:
+    """Simulate a strip that bends between its bands by more than a low polynomial takes out."""
+    return simulate(Spec(seed=8, flight=Flight(photos=60, scale=20000.0), control=Control(every=15), terrain=HILLS))
+
+
+@pytest.mark.parametrize("adjustment", ["polynomial", "covariance"])
+def test_the_bend_of_a_long_strip_is_no_typing_error(adjustment: str) -> None:
+    """A check point between two bands lies metres from where a low polynomial puts it."""
+    made = simulate(Spec(seed=10, flight=Flight(photos=60), control=Control(every=15), terrain=HILLS))
+    assert told(inputs_of(made), replace(settings_of(made), adjustment=adjustment)) == []
+
+
+@pytest.mark.parametrize(("role", "index", "worth"), [("K", 1, 10.0), ("G", 5, 100.0)])
+def test_a_typing_error_in_a_long_strip_is_told_as_the_adjustment_sees_it(role: str, index: int, worth: float) -> None:
+    made = long_strip()
+    inputs = inputs_of(made)
+    row = [number for number, name in enumerate(inputs.control.ids) if name.startswith(role)][index]
+    enu = inputs.control.enu.copy()
+    digit = enu[row, 1] // worth % 10
+    enu[row, 1] += worth * ((digit + 5) % 10 - digit)
+    result = triangulate(replace(inputs, control=replace(inputs.control, enu=enu)), settings_of(made))
+    (finding,) = result.findings
+    assert (finding.code, finding.points) == ("P406", (inputs.control.ids[row],))
+    assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, 1], abs=0.01)
+    assert finding.evidence["off_m"] == pytest.approx(-result.control_differences[row, 1], abs=1e-6)

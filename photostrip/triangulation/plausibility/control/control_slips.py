@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding
     from photostrip.triangulation.plausibility.control.control_fit import RobustFit
     from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, StraightenedStrip, StripPoints
+    from photostrip.triangulation.plausibility.finding import Evidence
 
 
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
@@ -28,6 +30,8 @@ SOUND_SIGMAS = 4.5  # within which the other coordinates of a point with a slip 
 RIDGE_SHARE = 1e-9  # of a variance: no computer knows them better
 UNKNOWN_HEIGHT_SIGMAS = 1e3  # standard deviations in plan: that of a height that is not given
 EARTH_RADIUS = 6.37e6  # metres
+HEIGHT = 2
+DOUBT = "; or a coordinate along the base is wrong on one of its photos"
 
 
 class Misclosures(NamedTuple):
@@ -93,7 +97,7 @@ def find_height_slips(
                 continue
             # below a photo a wrong height goes with that photo's ray too: two rays cannot tell
             limit, spread = min(limit, NEAR_SIGMAS * spread), CLEARER_SIGMAS * spread
-            doubt = "; or a coordinate along the base is wrong on one of its photos"
+            doubt = DOUBT
         yield from _slips(given, on_strip, row, difference, (spread, limit), (2,), doubt)
 
 
@@ -162,22 +166,41 @@ def _slips(
     by_axis = given.axes[row] @ difference
     for axis in columns:
         others = [each for each in columns if each != axis]
-        off, unit = float(by_axis[axis]), float(given.unit[row, axis])
+        off = float(by_axis[axis])
         if others and max(abs(by_axis[each]) for each in others) > max(spread[1], 0.02 * abs(off)):
             continue
-        written = float(given.written[row, axis])
-        if not np.isfinite(written):
-            continue
-        near = spread[1] + SCALE_CHANGE * abs(off)
-        fits = slip(written, written - off / unit, spread[0] / unit, near / unit)
-        if fits is None:
-            continue
-        role = "check" if given.check[row] else "control"
-        message = (
-            f"{role} point {given.ids[row]} is off by {off:+.2f} m in {AXES[axis]}: looks like {fits.text}; "
-            f"{fits.meant:.10g} would fit within {abs(fits.meant - written + off / unit) * unit:.2g} m{doubt}"
-        )
-        evidence = {"given": written, "off_m": off, "would_fit": fits.meant, "standard_deviation_m": spread[0]}
-        fix = f"look {given.ids[row]} up in the records"
-        yield found("P406", message, fix, evidence, points=(given.ids[row],), strips=(on_strip.strip,))
-        return
+        found_ = slip_in(given, row, axis, off, spread, on_strip.strip)
+        if found_ is not None:
+            yield replace(found_, message=f"{found_.message}{doubt}")
+            return
+
+
+def slip_in(
+    given: GivenPoints, row: int, axis: int, off: float, spread: tuple[float, float], strip: str
+) -> Finding | None:
+    """Name the slip of the pen that explains why a coordinate is off; None when none does.
+
+    off: given minus predicted along the axis as it is written, metres.
+    spread: its standard deviation and its largest value by chance, metres.
+    """
+    written, unit = float(given.written[row, axis]), float(given.unit[row, axis])
+    if not np.isfinite(written):
+        return None
+    near = spread[1] + SCALE_CHANGE * abs(off)
+    fits = slip(written, written - off / unit, spread[0] / unit, near / unit)
+    if fits is None:
+        return None
+    role = "check" if given.check[row] else "control"
+    message = (
+        f"{role} point {given.ids[row]} is off by {off:+.2f} m in {AXES[axis]}: looks like {fits.text}; "
+        f"{fits.meant:.10g} would fit within {abs(fits.meant - written + off / unit) * unit:.2g} m"
+    )
+    evidence: Evidence = {
+        "axis": AXES[axis],
+        "given": written,
+        "off_m": off,
+        "would_fit": fits.meant,
+        "standard_deviation_m": spread[0],
+    }
+    fix = f"look {given.ids[row]} up in the records"
+    return found("P406", message, fix, evidence, points=(given.ids[row],), strips=(strip,))
