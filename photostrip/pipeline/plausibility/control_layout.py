@@ -120,16 +120,16 @@ def _of_block(
     if given is None:
         return
     plan = given.xyz[:, :2]
-    breadth = 0.0
-    for strip in strips:
-        rows, place = evidence.places_along_strip(strip, images.observations, control.points, images.steps)
-        rows, place, of_strip = _in_plan(control, rows, place)
-        ids = [control.points.ids[row] for row in rows]
-        if len(ids) > 1:
-            half = evidence.half_breadth(strip, images.observations, ids, of_strip, place, images.steps)
-            breadth = max(breadth, half if np.isfinite(half) else 0.0)
+    breadth = next((half for strip in strips if (half := _half_breadth(strip, images, control)) > 0), 0.0)
     what = f"strip {strips[0].id}" if len(strips) == 1 else "the block"
     yield from layout.find_line(plan, breadth, names, what, [strip.id for strip in strips])
+
+
+def _half_breadth(strip: Strip, images: ImageEvidence, control: GivenControl) -> float:
+    rows, place = evidence.places_along_strip(strip, images.observations, control.points, images.steps)
+    rows, place, plan = _in_plan(control, rows, place)
+    names = [control.points.ids[row] for row in rows]
+    return evidence.half_breadth(strip, images.observations, names, plan, place, images.steps)
 
 
 def _joined(one: ControlPoints, other: ControlPoints) -> ControlPoints:

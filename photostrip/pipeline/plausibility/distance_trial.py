@@ -62,7 +62,9 @@ def find_wrong_distance(
     first = compare(formed) or compare(formed.whole) if len(formed.strip.photos) <= MOST_PHOTOS else None
     if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
         return []
-    sigma0 = _middle_sigma0(formed)
+    sigma0, stated = _middle_sigma0(formed), formed.strip.median_sigma(observations)
+    if first.in_relief * LEFT_SHARE < 1.0 and sigma0 * BETTER_SIGMA0_RATIO < stated:
+        return []  # neither heights nor pairs could be so much better
     for start in (first.ratio, *FIRST_FACTORS):
         trial = _followed(formed.strip, observations, settings, compare, start)
         if trial is None or trial.misfit > LEFT_SHARE * first.misfit or trial.sigma0 > MOST_SIGMA0_RATIO * sigma0:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
@@ -63,6 +63,14 @@ class LevelPlan(NamedTuple):
     control: Floats  # (c, 3)
 
 
+class Shown(NamedTuple):
+    """Image points of control."""
+
+    photo: Numbers
+    number: Numbers  # of the control point, in the level plane
+    xy: Floats
+
+
 def centers(
     inputs: Inputs,
     observations: PhotoPoints,
@@ -86,8 +94,11 @@ def centers(
             plan = _level_plan(given, control, tied, target)
         except (GeometryError, InputError):
             continue  # what is wrong with the frames stops the run itself
+        number = locate(observations.point_ids, plan.ids)[observations.point]
+        rows = np.flatnonzero(number >= 0)
+        shown = Shown(photo=observations.photo[rows], number=number[rows], xy=observations.xy[rows])
         for strip in strips:
-            yield from _of_strip(strip, plan, observations)
+            yield from _of_strip(strip, plan, shown, observations.photo_ids)
 
 
 def _given_centers(inputs: Inputs, *, starts: bool) -> Iterator[GivenCenters]:
@@ -115,13 +126,13 @@ def _level_plan(
     return LevelPlan(key=given.key, photos=given.photos, centers=level[:count], ids=control.ids, control=level[count:])
 
 
-def _of_strip(strip: Strip, plan: LevelPlan, observations: PhotoPoints) -> Iterator[Finding]:
+def _of_strip(strip: Strip, plan: LevelPlan, shown: Shown, photo_ids: Sequence[str]) -> Iterator[Finding]:
     rows = locate(strip.photos, plan.photos)
     photos = tuple(photo for photo, row in zip(strip.photos, rows, strict=True) if row >= 0)
     if not photos:
         return
     xyz = plan.centers[rows[rows >= 0]]
-    height, scale = _ground_below(photos, plan, observations)
+    height, scale = _ground_below(locate(photos, photo_ids), plan, shown)
     usual = float(np.ptp(xyz[:, :2], axis=0).max())
     depth = xyz[:, 2] - height if np.isfinite(height).all() else np.full(len(photos), max(usual, 1.0))
     findings = list(flight.find_odd_centers(xyz, depth, np.array([0.0, 0.0, 1.0]), photos, strip.id))
@@ -137,17 +148,16 @@ def _of_strip(strip: Strip, plan: LevelPlan, observations: PhotoPoints) -> Itera
         yield replace(each, message=f"{plan.key}: {each.message}", fix=fix, key=plan.key)
 
 
-def _ground_below(photos: Sequence[str], plan: LevelPlan, observations: PhotoPoints) -> tuple[Floats, Floats]:
+def _ground_below(photos: Numbers, plan: LevelPlan, shown: Shown) -> tuple[Floats, Floats]:
     """Height of the ground under each photo, and metres on the ground in a millimetre of the photo."""
     height, scale = np.full(len(photos), np.nan), np.full(len(photos), np.nan)
-    given = locate(observations.point_ids, plan.ids)
-    for place, number in enumerate(locate(photos, observations.photo_ids)):
-        rows = np.flatnonzero((observations.photo == number) & (given[observations.point] >= 0))
+    for place, number in enumerate(photos.tolist()):
+        rows = np.flatnonzero(shown.photo == number)
         if not len(rows):
             continue
-        ground = plan.control[given[observations.point[rows]]]
+        ground = plan.control[shown.number[rows]]
         height[place] = np.median(ground[:, 2])
-        far = _spread(observations.xy[rows])
+        far = _spread(shown.xy[rows])
         scale[place] = _spread(ground[:, :2]) / far if len(rows) > 1 and far > 0 else np.nan
     known = np.isfinite(height)
     if known.any():

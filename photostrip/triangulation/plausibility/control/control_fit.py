@@ -26,14 +26,17 @@ if TYPE_CHECKING:
 LEAST_POINTS = 3  # in plan; two always fit
 PLAN_UNKNOWNS = 2  # complex ones: turn and shift
 MOST_PAIRS = 1500  # tried
-MEDIAN_POINTS = 400  # at most, from which a median misclosure is taken
+MEDIAN_POINTS = 100  # at most, from which a median misclosure is taken
 LEAST_PAIR_DISTANCE = 0.25  # of the largest distance: two points that give a similarity
-DRAWS = 250  # of as many points as unknowns, for a start that wrong points do not disturb
-WORST_CONDITION = 1e6  # condition number of such a draw
+GOOD_SHARE = 0.55  # of the points, at least
+NO_GOOD_DRAW = 1e-3  # probability that no draw of as many points as unknowns, for a start, is of good points alone
+LEAST_DETERMINANT = 1e-9  # of such a draw, columns of size one
 PLAN_REFITS = 3
 REWEIGHTINGS, SOFT_REWEIGHTINGS = 12, 8  # of a robust fit: in all, and with weights that fall slowly
+SETTLED = 0.05  # of the middle residual: a step below it ends the weights that fall slowly
 KEPT_SIGMAS = 5.0  # robust standard deviations within which a point goes with the others
 ODD_PROBABILITY = 1e-6  # that a good point is called odd
+TOGETHER_SIGMAS = 2.5  # smallest standard deviations that make sense: points that lie within all go together
 TINY = 1e-9
 
 
@@ -137,11 +140,12 @@ def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: Numbers) ->
     unknowns = columns.shape[1]
     if len(rows) <= unknowns:
         return None
-    draw = np.random.default_rng(len(rows)).random((DRAWS, len(rows)))  # the same for the same number of points
+    draws = int(np.ceil(np.log(NO_GOOD_DRAW) / np.log(1.0 - GOOD_SHARE**unknowns)))
+    draw = np.random.default_rng(len(rows)).random((draws, len(rows)))  # the same for the same number of points
     chosen = rows[np.argpartition(draw, unknowns - 1, axis=1)[:, :unknowns]]
     with np.errstate(all="ignore"):
         design = columns[chosen]
-        sound = np.linalg.cond(design) < WORST_CONDITION
+        sound = np.abs(np.linalg.det(design)) > LEAST_DETERMINANT
         if not sound.any():
             return None
         coefficient = np.linalg.solve(design[sound], values[chosen[sound]][:, :, None])[:, :, 0]
@@ -188,29 +192,19 @@ class RobustFit:
 def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, floor: float) -> RobustFit:
     """Fit columns to values, with less and less weight for what does not go with the others.
 
-    It starts from the fit through as many points as unknowns whose median residual is smallest, goes on with weights
-    that fall with the residual, and ends with the points that go with each other, all of one weight.
+    Where all points go together, that is the fit of all. Else it starts from the fit through as many points as unknowns
+    whose median residual is smallest, goes on with weights that fall with the residual, and ends with the points that
+    go with each other, all of one weight.
 
     columns, values: (n, c), (n,), metres; in_fit: (n,), points that may take part.
     floor: smallest standard deviation that makes sense, metres.
     """
     size = np.maximum(np.abs(columns[in_fit]).max(axis=0, initial=TINY), TINY)
     scaled = columns / size
-    weight = in_fit.astype(float)
-    first = _least_median(scaled, values, np.flatnonzero(in_fit))
-    if first is not None:
-        weight = in_fit / np.maximum(first / max(_robust(first[in_fit], columns.shape[1]), floor), 0.5) ** 2
-    coefficient, residual = np.zeros(columns.shape[1], values.dtype), values
-    for step in range(REWEIGHTINGS):
-        root = np.sqrt(weight)
-        coefficient = np.linalg.lstsq(scaled * root[:, None], values * root, rcond=1e-9)[0]
-        residual = values - scaled @ coefficient
-        middle = max(_robust(np.abs(residual[in_fit]), columns.shape[1]), floor)
-        if step < SOFT_REWEIGHTINGS:  # first by absolute residuals, then without what is far away
-            weight = in_fit / np.maximum(np.abs(residual) / middle, 0.5)
-        else:
-            weight = (in_fit & (np.abs(residual) < KEPT_SIGMAS * middle)).astype(float)
-    used = weight > 0
+    used = np.array(in_fit, bool)
+    coefficient, residual = _weighted(scaled, values, used.astype(float))
+    if len(residual[used]) <= columns.shape[1] or np.abs(residual[used]).max() > TOGETHER_SIGMAS * floor:
+        coefficient, residual, used = _reweighted(scaled, values, used, floor)
     parts = 2 if np.iscomplexobj(values) else 1
     freedom = parts * (int(used.sum()) - columns.shape[1])
     squares = float((np.abs(residual[used]) ** 2).sum())
@@ -227,3 +221,34 @@ def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, flo
         freedom=freedom,
         sigma0=sigma0,
     )
+
+
+def _weighted(columns: NDArray[Any], values: NDArray[Any], weight: Floats) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Fit by weighted least squares; coefficients, and residuals of all."""
+    root = np.sqrt(weight)
+    coefficient = np.linalg.lstsq(columns * root[:, None], values * root, rcond=1e-9)[0]
+    return coefficient, values - columns @ coefficient
+
+
+def _reweighted(
+    columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, floor: float
+) -> tuple[NDArray[Any], NDArray[Any], Flags]:
+    """Fit with weights that fall with the residual, then without what is far away; those kept come third."""
+    first = _least_median(columns, values, np.flatnonzero(in_fit))
+    weight = in_fit.astype(float)
+    if first is not None:
+        weight = in_fit / np.maximum(first / max(_robust(first[in_fit], columns.shape[1]), floor), 0.5) ** 2
+    coefficient, residual = np.zeros(columns.shape[1], values.dtype), values
+    is_soft = True
+    for step in range(REWEIGHTINGS):
+        last = residual
+        coefficient, residual = _weighted(columns, values, weight)
+        middle = max(_robust(np.abs(residual[in_fit]), columns.shape[1]), floor)
+        is_soft = is_soft and step < SOFT_REWEIGHTINGS and bool(np.abs(residual - last).max() > SETTLED * middle)
+        if is_soft:  # first by absolute residuals
+            weight = in_fit / np.maximum(np.abs(residual) / middle, 0.5)
+            continue
+        before, weight = weight, (in_fit & (np.abs(residual) < KEPT_SIGMAS * middle)).astype(float)
+        if (before == weight).all():
+            break
+    return coefficient, residual, weight > 0

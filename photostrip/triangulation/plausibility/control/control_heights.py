@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -55,11 +56,21 @@ class HeightComparison:
     usable: Flags
     in_fit: Flags
     value: Floats  # (n,): given minus height in the strip, metres
-    columns: Floats  # (n, c): tilt and, where it is needed, bending
     whole: list[Floats]  # (n,): all columns of tilt and bending
     deviation: Floats  # (n,): heights in the strip, against their mean
     relief: Floats  # (n,): heights given, against their mean: a strip that bends has heights where the ground has none
-    scaled: RobustFit  # fit with the scale of the heights free; its last coefficient is that scale minus one
+    floor: float  # smallest standard deviation that makes sense, metres
+
+    @cached_property
+    def columns(self) -> Floats:
+        """Tilt and, where it is needed, bending, shape (n, c); a wrong scale must not pass for a bending strip."""
+        taken, _ = fit_simplest([self.deviation, *self.whole], 4, self.value, self.in_fit, self.floor)
+        return np.asarray(taken[:, 1:])
+
+    @cached_property
+    def scaled(self) -> RobustFit:
+        """Fit with the scale of the heights free; its last coefficient is that scale minus one."""
+        return fit_robustly(np.column_stack([self.columns, self.deviation]), self.value, self.in_fit, self.floor)
 
 
 def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: Flags) -> HeightComparison | None:
@@ -75,20 +86,15 @@ def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: F
     height = np.where(usable, fitted.height, 0.0)
     value = np.where(usable, given.xyz[:, 2], 0.0) - height
     deviation = height - height[in_fit].mean()
-    # a wrong scale of the heights must not pass for a bending strip
-    base, _ = fit_simplest([deviation, *whole], 4, value, in_fit, fitted.floor[1])
-    base = base[:, 1:]
-    scaled = fit_robustly(np.column_stack([base, deviation]), value, in_fit, fitted.floor[1])
     relief = value + height
     return HeightComparison(
         usable=usable,
         in_fit=in_fit,
         value=value,
-        columns=base,
         whole=whole,
         deviation=deviation,
         relief=relief - relief[in_fit].mean(),
-        scaled=scaled,
+        floor=fitted.floor[1],
     )
 
 
