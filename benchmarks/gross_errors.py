@@ -109,6 +109,14 @@ class Project:
         """Control points with a wrong coordinate."""
         return {error.point for error in self.simulation.truth.errors if error.kind == "control"}
 
+    @property
+    def along_base(self) -> set[str]:
+        """Image points of points on two photos with an error along the base, which contradicts nothing."""
+        o = self.simulation.observations
+        two = {o.point_ids[number] for number in np.flatnonzero(np.bincount(o.point) == 2)}
+        errors = self.simulation.truth.errors
+        return {f"{e.photo}/{e.point}" for e in errors if e.kind == "image" and e.axis == "x" and e.point in two}
+
     def without_search(self) -> Settings:
         """Look for no gross errors."""
         s = self.settings
@@ -315,7 +323,8 @@ class Tally:
             self.counts.update(clean=1, touched=loses_anything(project, runs[CLEAN]))
         if AUTO in runs:
             found, wrong = runs[AUTO], project.wrong_control & runs[AUTO].control
-            self.counts.update(placing=len(found.placing & project.wrong), control=len(wrong))
+            placing = found.placing & project.wrong
+            self.counts.update(placing=len(placing), hidden=len(placing & project.along_base), control=len(wrong))
             self.counts.update(named=len(wrong & found.rejected), false=len(found.rejected - project.wrong_control))
             self.counts.update(lost=len(runs[KNOWN].used - found.used) if KNOWN in runs else 0)
             self.ratios += [rms[AUTO] / rms[CLEAN]] if CLEAN in runs else []
@@ -356,6 +365,9 @@ def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range) -> None:
     print(f"\n{HEAD}")
     for kind, tally in tallies.items():
         print(tally.row(kind))
+    print("\nproject    of those placing a point, along the base of points on two photos")
+    for kind, tally in tallies.items():
+        print(f"{kind:11s}{tally.counts['hidden']:32d}")
     print("\nproject    ratio of a project's rms: median, 95 % below, largest")
     for kind, tally in tallies.items():
         middle, most, largest = np.quantile(tally.ratios, (0.5, 0.95, 1.0)) if tally.ratios else 3 * (float("nan"),)
