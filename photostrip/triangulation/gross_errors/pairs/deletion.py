@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.gross_errors.pairs.global_test import SMALLEST_REDUNDANCY
+from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
@@ -32,7 +32,7 @@ def subsets(n: int, k: int) -> Numbers:
     return np.array(list(combinations(range(n), k)), np.intp).reshape(-1, k)
 
 
-def gains(residuals: Floats, matrix: Floats, sets: Numbers, least: float = SMALLEST_REDUNDANCY) -> Floats:
+def gains(residuals: Floats, matrix: Floats, sets: Numbers, least: float = UNCONTROLLED) -> Floats:
     """Compute what the sum of squares loses when sets of points are taken out: v_K^T (M_KK)^-1 v_K, shape (g, s).
 
     -inf for a set whose errors cannot be told from a change of the elements.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, normal_quantile
+from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.robust import MEDIAN_SPREAD
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 
 ALPHA = 0.01  # probability that a strip without gross errors fails anywhere
-SMALLEST_REDUNDANCY = 0.01  # a residual with less redundancy says nothing about its point
 # scale of residuals of which a fifth are large over that of the others: normal_quantile(13/16) * 1.4826
 FIFTH_WRONG = 1.315
 
@@ -60,7 +60,7 @@ class GlobalTest:
         pairs, share = orientation.pairs, orientation.redundancy
         with np.errstate(divide="ignore", invalid="ignore"):
             value = np.abs(orientation.parallax) * np.sqrt(pairs.weight / share) / self.sigma[pairs.pair]
-        return np.where(orientation.used & np.isfinite(value) & (share > SMALLEST_REDUNDANCY), value, 0.0)
+        return np.where(orientation.used & np.isfinite(value) & (share > UNCONTROLLED), value, 0.0)
 
     def largest_limits(self, count: Numbers) -> Floats:
         """Critical values of the largest standardised residual (Bonferroni)."""
@@ -90,7 +90,7 @@ class ParallaxScatter:
         if wrong points among them should make that ``spoiled`` times too large.
         """
         pairs, share = orientation.pairs, np.nan_to_num(orientation.redundancy)
-        tested = orientation.used & (share > SMALLEST_REDUNDANCY)
+        tested = orientation.used & (share > UNCONTROLLED)
         found = np.nan
         if tested.any():
             sizes = np.abs(orientation.parallax[tested]) * np.sqrt(pairs.weight[tested] / share[tested])

@@ -20,7 +20,7 @@ import numpy as np
 
 from photostrip.errors import InputError
 from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.triangulation.gross_errors.pairs.global_test import SMALLEST_REDUNDANCY
+from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, rejection, search
 from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT, Support, zones
 from photostrip.triangulation.relative_orientation.orientation import (
@@ -216,5 +216,5 @@ def _tau(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
     sigma = np.sqrt(2.0) * orientation.sigma0[pairs.pair]
     with np.errstate(divide="ignore", invalid="ignore"):
         value = np.abs(orientation.parallax) * np.sqrt(pairs.weight) / (sigma * np.sqrt(orientation.redundancy))
-    value[~(orientation.redundancy > SMALLEST_REDUNDANCY)] = 0.0
+    value[~(orientation.redundancy > UNCONTROLLED)] = 0.0
     return np.where(np.isfinite(value), value, 0.0), limits[pairs.pair]
