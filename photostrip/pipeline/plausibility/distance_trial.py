@@ -15,6 +15,7 @@ import numpy as np
 from photostrip.pipeline.plausibility import evidence
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control import control_heights
+from photostrip.triangulation.plausibility.finding import ERROR
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -96,9 +97,9 @@ def find_distance_without_pairs(
 def find_stretched(strips: Sequence[StripResult], findings: Sequence[Finding]) -> list[Finding]:
     """Name the strips whose control, all together, asks for another principal distance (P107, P105).
 
-    findings: what was found before; a strip whose distance is named already is not named again.
+    findings: what was found before: a strip whose distance is named already, or whose control is misread, is not named.
     """
-    named = {name for each in findings if each.code in {"P105", "P107"} for name in each.strips}
+    named = {name for each in findings if each.severity == ERROR or each.code == "P107" for name in each.strips}
     found_now = []
     for each in strips:
         stretch, strip = each.screened_control.stretch, each.of_photos.strip if each.photo_stages else None
