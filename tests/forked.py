@@ -86,10 +86,14 @@ os._exit(code)
 
 
 class Forks:
-    """The server, as the tests see it, with further libraries loaded; it ends with the process that began it."""
+    """The server, as the tests see it; it ends with the process that began it."""
 
-    def __init__(self, *libraries: str, **environment: str) -> None:
-        self.libraries, self.environment = libraries, environment
+    def __init__(self, python: str = sys.executable, libraries: Sequence[str] = (), **environment: str) -> None:
+        self.started_by, self.libraries, self.environment = python, libraries, environment
+
+    def with_libraries(self, *libraries: str, **environment: str) -> Forks:
+        """Give a server that is a copy of this one and loads more."""
+        return Forks(str(self.python), libraries, **environment)
 
     def __enter__(self) -> Self:
         self._folder = tempfile.TemporaryDirectory()
@@ -103,7 +107,7 @@ class Forks:
             script.chmod(0o755)
         environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUTF8": "1"} | self.environment
         self._server = subprocess.Popen(
-            [sys.executable, "-m", "tests.forked", str(address), *self.libraries],
+            [self.started_by, "-m", "tests.forked", str(address), *self.libraries],
             cwd=ROOT, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         )  # fmt: skip
         assert self._server.stdout is not None

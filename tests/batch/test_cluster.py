@@ -27,12 +27,13 @@ from photostrip.cli.main import main
 from photostrip.errors import InputError
 from tests.batch.faulty import WORK
 from tests.batch.projects import environment, run, tree, write_projects
-from tests.forked import Forks
 from tests.geodesy.frames import write_gtx
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any
+
+    from tests.forked import Forks
 
 DASK = ("distributed.cli.dask_scheduler", "distributed.cli.dask_worker")
 QUICK = {  # a lost worker is noticed at once
@@ -107,10 +108,10 @@ class Count:
 
 
 @pytest.fixture(scope="module")
-def dask_forks() -> Iterator[Forks]:
+def dask_forks(forks: Forks) -> Iterator[Forks]:
     """Give a ``python`` that has loaded Dask and its settings."""
-    with Forks(*DASK, **QUICK) as forks:
-        yield forks
+    with forks.with_libraries(*DASK, **QUICK) as with_dask:
+        yield with_dask
 
 
 @pytest.fixture

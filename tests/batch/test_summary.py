@@ -137,6 +137,7 @@ def test_without_a_terminal_what_is_said_goes_straight_out() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_a_person_at_a_terminal_sees_a_table(tmp_path: Path) -> None:
     """Stderr is a terminal: the table is there and goes away, failures stay above it; stdout is the summary alone."""
     write_projects(tmp_path / "strips", 12)
