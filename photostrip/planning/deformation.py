@@ -9,12 +9,13 @@ Source: [003] eq. 10.7-10.12, with results of Lobanov and of Skiridov.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import erfc, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.statistics import normal_quantile, t_quantile
+from photostrip.statistics import normal_quantile, t_p_value, t_quantile
 from photostrip.triangulation.relative_orientation import six_points
 
 if TYPE_CHECKING:
@@ -89,6 +90,13 @@ class Paraboloid:
         """C and D over their standard deviations, shape (2,)."""
         with np.errstate(divide="ignore", invalid="ignore"):  # parallaxes without any error
             return np.asarray(self.coefficients[3:] / self.sigmas[3:], float)
+
+    @property
+    def p_values(self) -> tuple[float, ...]:
+        """Probabilities of larger |t| by chance."""
+        if self.redundancy < LEAST_REDUNDANCY:
+            return tuple(erfc(abs(t) / sqrt(2)) for t in self.t_values.tolist())
+        return tuple(t_p_value(t, self.redundancy) for t in self.t_values.tolist())
 
     def critical(self, alpha: float = 0.05) -> float:
         """Return what |t| exceeds by chance with probability `alpha`; the normal quantile with stated sigmas."""

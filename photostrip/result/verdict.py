@@ -28,9 +28,11 @@ PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
 # Rms of the control's residuals in units of their standard deviation; a long strip bends by that much.
 POOR_CONTROL = 5.0
 CHECK_LEVEL = 0.01  # probability that the check points of a sound result contradict its standard deviations
+DEFORMED_LEVEL = 0.002  # probability that models of a sound result seem to be deformed, any of them or all alike
 MANY_REJECTED = 0.05  # share of the points in pairs
 SMALLEST = 0.001  # probability that is written as a number
 PARTS = "plan", "height"
+TERMS = "twist", "bending"
 AREAS = {"plan": "ellipse", "height": "interval"}
 NAMED = 3  # pairs, photos, findings or notes of one kind that are named
 
@@ -50,6 +52,7 @@ def verdict_of(document: Document) -> Document:
         *_sigma0(document),
         *_pairs(document),
         *_photos(document),
+        *_deformed(document),
         *_rejected(document),
         *_notes(document),
     ]
@@ -250,6 +253,26 @@ def _pairs(document: Document) -> Iterator[str]:
             f"largest y parallax is at point {pair['max_parallax_point']}"
         )
     yield from _more(len(odd), "pairs")
+
+
+def _deformed(document: Document) -> Iterator[str]:
+    """Name what all models have in common, then the models that are bent or twisted beyond chance."""
+    for name, common in document.get("common_deformation", {}).items():
+        if common["p"] is not None and common["p"] < DEFORMED_LEVEL / 2:  # twist and bending
+            yield (
+                f"{common['models']} models are deformed alike ({name}): {common['at_corner_m']:+.3f} m at a corner "
+                f"against the middle in the mean, t = {common['t']:.1f}; a lens, the film or the principal distance"
+            )
+    odd = [row for row in document.get("deformations", []) if row.get("p", 1.0) < DEFORMED_LEVEL]
+    odd.sort(key=lambda row: -max(abs(row[name]["at_corner_m"]) for name in TERMS))
+    for row in odd[:NAMED]:
+        name = max(TERMS, key=lambda name: abs(row[name]["t"]))
+        size, t = row[name]["at_corner_m"], row[name]["t"]
+        yield (
+            f"the model of photos {row['left']} and {row['right']} is deformed ({name}): {size:.3f} m at a corner "
+            f"against the middle, t = {t:.1f}"
+        )
+    yield from _more(len(odd), "models")
 
 
 def _more(number: int, what: str) -> Iterator[str]:

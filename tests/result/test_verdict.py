@@ -14,6 +14,7 @@ from photostrip.report.page.text import to_text
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, verdict_of
 from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Control, Flight, Terrain
 from photostrip.statistics import binomial_p_value
 from tests.results import Document, case, solved, spec
 
@@ -125,6 +126,25 @@ def test_sound_differences_hardly_ever_stand_out() -> None:
     rng = np.random.default_rng(20261122)
     wrong = [stand_out(rng.normal(size=n), 1, np.full(n, 9.0)).any() for n in (2, 4, 9, 30) for _ in range(1500)]
     assert np.mean(wrong) < 0.002
+
+
+@pytest.mark.parametrize("seed", [21, 22])
+def test_a_principal_distance_one_percent_off_over_relief_is_not_good(seed: int) -> None:
+    """Heights are half a metre to a metre off where control fits: only the check points see it."""
+    wanted = replace(
+        spec("projected"),
+        seed=seed,
+        flight=Flight(photos=8),
+        terrain=Terrain(relief=200.0),
+        control=Control(check=12),
+    )
+    inputs = inputs_of(simulate(wanted))
+    assert solved(inputs).document["status"] == GOOD
+    wrong = replace(inputs.strips[0].camera, principal_distance=inputs.strips[0].camera.principal_distance * 1.01)
+    document = solved(replace(inputs, strips=(replace(inputs.strips[0], camera=wrong),))).document
+    assert document["precision"]["check"]["tests"][0]["p"] < 0.001
+    assert document["status"] == LOOK
+    assert any(text.startswith("the check points are farther off") for text in document["verdict"]["look_at"])
 
 
 # ------------------------------------------------------------------------------------------------------------ pairs

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from photostrip.report.page.angles import angle_unit
-from photostrip.report.page.numbers import counted, joined, micrometres, percent, ratio
+from photostrip.report.page.numbers import counted, fixed, joined, micrometres, percent, ratio, signed
 from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import DIRECTIONS, photos_of, worst_first
@@ -123,10 +123,16 @@ def deformation_section(document: Document) -> Section:
     """Twist and bending of the models that have the height control for it."""
     rows, unit = document["deformations"], angle_unit(document)
     bent = sum(row["significant"] for row in rows)
+    means = [
+        f"{name} {signed(each['at_corner_m'])} m at a corner, t = {fixed(each['t'], 1)}"
+        for name, each in document.get("common_deformation", {}).items()
+        if each["t"] is not None
+    ]
     enough = f"{counted(len(rows), 'model')} {'has' if len(rows) == 1 else 'have'} enough height control"
     verdict = f"{bent or 'none'} of them {'are' if bent > 1 else 'is'} deformed"
+    common = f" On average over all models: {'; '.join(means)}." if means else ""
     text = Words(
-        f"{enough} to show twist (x y) and bending (x²); {verdict} (t test of all together at 5 %).",
+        f"{enough} to show twist (x y) and bending (x²); {verdict} (t test of all together at 5 %).{common}",
         "look" if bent else "",
     )
     columns = (

@@ -9,6 +9,7 @@ import numpy as np
 
 from photostrip.planning.deformation import Paraboloid, determines_paraboloid, fit_paraboloid
 from photostrip.result.quantities import record
+from photostrip.statistics import t_p_value
 from photostrip.triangulation.absolute_orientation import Targets
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 MILLIMETRES = 1000.0  # per metre
 LEVEL = 0.05  # of all tests together
+LEAST_MODELS = 3  # whose scatter says how far their mean may be from zero
 ARCSECONDS = float(np.degrees(1.0)) * 3600.0
 TERMS = ("twist", "bending")
 
@@ -123,12 +125,32 @@ def deformations_of(result: Result) -> Document:
         left, right = strip.strip.photos[model.model : model.model + 2]
         deformed = _deformation(model, LEVEL / (2 * len(found)))
         rows.append(record("deformations", {"strip": strip.strip.id, "left": left, "right": right, **deformed}))
-    return {"deformations": rows} if rows else {}
+    if not rows:
+        return {}
+    common = {name: _common([model for _, model in found], k) for k, name in enumerate(TERMS)}
+    return {"deformations": rows, "common_deformation": record("common_deformation", common)}
+
+
+def _common(models: Sequence[ModelDeformation], term: int) -> Document:
+    """Test the mean of a term over all models by their scatter.
+
+    A lens or a film deforms all models alike; errors of relative orientation, which are in no standard deviation of a
+    single model, deform them one way and the other.
+    """
+    values = np.array([model.surface.coefficients[3 + term] for model in models])
+    corner = np.array([model.at_corner[term] for model in models]) * np.sign(values)
+    found: Document = {"models": len(models), "at_corner_m": corner.mean(), "t": None, "p": None}
+    if len(models) < LEAST_MODELS:
+        return found
+    error = values.std(ddof=1) / np.sqrt(len(models))
+    t = float(values.mean() / error) if error else 0.0
+    return found | {"t": t, "p": t_p_value(t, len(models) - 1)}
 
 
 def _deformation(model: ModelDeformation, level: float) -> Document:
     surface = model.surface
     limit = surface.critical(level)
+    chance = min(surface.p_values) * LEVEL / level  # of all tests together
     omega, alpha = (angle * ARCSECONDS for angle in model.elements)
     terms = {
         name: {
@@ -147,5 +169,6 @@ def _deformation(model: ModelDeformation, level: float) -> Document:
         "omega2_arcsec": omega,
         "alpha2_minus_alpha1_arcsec": alpha,
         "t_limit": limit,
+        "p": min(1.0, chance),
         "significant": bool(np.abs(surface.t_values).max() > limit),
     }

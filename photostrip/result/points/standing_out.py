@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats
 
 LEVEL = 0.001  # probability that the largest of sound differences stands out
+ODD_POINT = 4.0  # times the rms of the others: points at the ends of a strip are not as good as those within
 ODD_RATIO = 3.0  # times its standard deviation: a few good points can be better than they should be
 MOST = 4  # at most one in so many points stands out
 
@@ -32,6 +33,7 @@ def stand_out(size: Floats, coordinates: int, ratio: Floats) -> Flags:
     for k in range(1, min(max(1, len(order) // MOST), len(order) - 1) + 1):
         rest = squares[k:].mean()
         chance = f_p_value(squares[k - 1] / rest, coordinates, coordinates * (len(order) - k)) if rest else 0.0
-        if chance * (len(order) - k + 1) < LEVEL and ratio[order[k - 1]] > ODD_RATIO:
+        far = squares[k - 1] > ODD_POINT**2 * rest and ratio[order[k - 1]] > ODD_RATIO
+        if far and chance * (len(order) - k + 1) < LEVEL:
             found[order[:k]] = True
     return found

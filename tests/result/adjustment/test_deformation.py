@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
@@ -14,6 +15,7 @@ from photostrip.report.sections.document import sections_of
 from photostrip.result.adjustment.deformation import model_deformations
 from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Points, Spec, Terrain, simulate
+from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result
@@ -90,3 +92,43 @@ def test_check_points_take_no_part_and_thin_control_gives_none() -> None:
     assert not used & {name for name, check in zip(control.ids, control.check, strict=True) if check}
     assert documents(run(count=4)) == []
     assert "deformations" not in document_of(run(count=4))
+
+
+def with_a_lens(seed: int, micrometres: float) -> dict[str, Any]:
+    """Adjust a strip of ten photos through a lens with a radial distortion of so much at 100 mm."""
+    simulation = simulate(spec(seed, count=160, photos=10))
+    inputs, settings = inputs_of(simulation), settings_of(simulation)
+    xy = inputs.observations.xy
+    xy = xy * (1 + micrometres / 1e3 / 100.0**3 * (xy**2).sum(axis=1, keepdims=True))
+    inputs = replace(inputs, observations=replace(inputs.observations, xy=xy))
+    return document_of(triangulate(inputs, settings))
+
+
+def test_what_all_models_have_in_common_is_in_the_verdict() -> None:
+    document = with_a_lens(1, 200.0)
+    bending = document["common_deformation"]["bending"]
+    assert bending["models"] == 9
+    assert bending["p"] < 0.001
+    (text,) = (text for text in document["verdict"]["look_at"] if "deformed alike" in text)
+    assert text.startswith(f"9 models are deformed alike (bending): {bending['at_corner_m']:+.3f} m at a corner")
+    assert document["status"] == "look"
+
+
+def test_the_mean_of_all_models_is_tested_by_their_scatter() -> None:
+    """By scipy, from the coefficients that the result shows."""
+    document = with_a_lens(2, 0.0)
+    for name, common in nonempty(document["common_deformation"].items()):
+        values = [row[name]["coefficient_m_per_mm2"] for row in document["deformations"]]
+        expected = stats.ttest_1samp(values, 0.0)
+        assert common["t"] == pytest.approx(expected.statistic, abs=0.01)
+        assert common["p"] == pytest.approx(expected.pvalue, abs=0.002)
+    assert not any("deformed" in text for text in document["verdict"]["look_at"])
+
+
+def test_a_deformed_model_is_in_the_verdict() -> None:
+    document = document_of(run(twist_arcsec=400.0))
+    texts = [text for text in document["verdict"]["look_at"] if "is deformed (twist)" in text]
+    assert {text.split(" is ")[0] for text in texts} == {
+        "the model of photos 1002 and 1003", "the model of photos 1003 and 1004"
+    }  # fmt: skip
+    assert document["status"] == "look"
