@@ -44,6 +44,11 @@ def listed(names: Sequence[str], most: int = MOST_NAMED) -> str:
     return head if len(names) <= most else f"{head} and {len(names) - most} more"
 
 
+def counted(number: int, one: str, many: str = "") -> str:
+    """Return a number with its noun: ``1 photo``, ``2 photos``."""
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
 def named(noun: str, names: Sequence[str], most: int = MOST_NAMED) -> str:
     """Name the first of many by what they are: ``points 1, 2 and 7 more``."""
     return f"{noun}{'s' if len(names) > 1 else ''} {listed(names, most)}"

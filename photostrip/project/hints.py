@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.text.findings import counted, listed
-from photostrip.notes import Note
+from photostrip.formats.text.findings import listed
+from photostrip.notes import Note, counted
 from photostrip.points import locate
 from photostrip.project.conversion import certificate_of
 from photostrip.project.tables import Tables, alike, rays

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.text.findings import counted
-from photostrip.notes import Note
+from photostrip.notes import Note, counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -17,9 +17,9 @@ from photostrip.cli.stdout import BatchFormat, Format, ascii_only, print_section
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_files, write_text
+from photostrip.notes import counted
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
 from photostrip.report.page import messages, text
-from photostrip.report.page.numbers import counted
 from photostrip.report.page.parts import Document
 from photostrip.report.page.progress import BatchTable, batch_table
 from photostrip.visible import visible, visible_json

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.text.findings import Findings, counted
 from photostrip.formats.text.tables import Column, Table
+from photostrip.notes import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from photostrip.arrays import Flags
+    from photostrip.formats.text.findings import Findings
 
 AXES = ("x", "y", "z")
 PHOTO = Column("photo", aliases=("photo_id", "image", "image_id"))

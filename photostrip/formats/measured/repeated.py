@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.text.findings import Findings, counted
-from photostrip.notes import Note
+from photostrip.notes import Note, counted
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.formats.measured.measurements import Measurements
+    from photostrip.formats.text.findings import Findings
 
 POLICIES = ("refuse", "average")
 LEAST_TOGETHER = 4  # points measured several times, of which more than

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from photostrip.formats.output import simulation_tables as tables
 from photostrip.formats.output.simulation_tables import on_one_line
 from photostrip.formats.output.simulation_truth import truth_text
-from photostrip.formats.text.findings import counted
 from photostrip.geodesy.tying import tie_frames
+from photostrip.notes import counted
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings

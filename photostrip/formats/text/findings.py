@@ -87,8 +87,3 @@ def listed(ids: Iterable[str], limit: int = IDS_NAMED) -> str:
     names = list(ids)
     head = ", ".join(names[:limit])
     return head if len(names) <= limit else f"{head} and {len(names) - limit} more"
-
-
-def counted(number: int, one: str, many: str = "") -> str:
-    """Return a number with its noun: ``1 row``, ``2 rows``."""
-    return f"{number} {one if number == 1 else many or one + 's'}"

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from photostrip.formats.text.findings import Findings, counted, suggestion
+from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import shown
+from photostrip.notes import counted
 from photostrip.project.schema.values import Section
 from photostrip.project.yaml.document import Node, Path, fault_at, key_path, type_names
 

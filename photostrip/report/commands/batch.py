@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.notes import counted
 from photostrip.report.page.junit import Case, to_junit
-from photostrip.report.page.numbers import counted, metres
+from photostrip.report.page.numbers import metres
 from photostrip.report.page.parts import DASH, Document, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.notes import counted
 from photostrip.report.page.angles import UNITS, AngleUnit
-from photostrip.report.page.numbers import counted, listed, short
+from photostrip.report.page.numbers import listed, short
 from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 

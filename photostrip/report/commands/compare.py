@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.numbers import counted, short, unit
+from photostrip.notes import counted
+from photostrip.report.page.numbers import short, unit
 from photostrip.report.page.parts import DASH, Document, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 

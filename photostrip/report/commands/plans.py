@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.notes import counted
 from photostrip.report.commands.plan_strip import strip_sections
-from photostrip.report.page.numbers import calibrated, counted, fixed, metres, micrometres, short
+from photostrip.report.page.numbers import calibrated, fixed, metres, micrometres, short
 from photostrip.report.page.parts import Column, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, over_plane, tabulated, words
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.numbers import calibrated, counted, fixed, short
+from photostrip.notes import counted
+from photostrip.report.page.numbers import calibrated, fixed, short
 from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, over_plane, tabulated, words
 

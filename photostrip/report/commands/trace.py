@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.numbers import counted, fixed, power, short
+from photostrip.notes import counted
+from photostrip.report.page.numbers import fixed, power, short
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 

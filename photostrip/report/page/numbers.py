@@ -59,11 +59,6 @@ def percent(part: float, whole: float) -> str:
     return f"{100 * part / whole:.1f} %" if whole else DASH
 
 
-def counted(number: int, one: str) -> str:
-    """Return a number with its noun: ``1 photo``, ``2 photos``."""
-    return f"{number} {one}{'' if number == 1 else 's'}"
-
-
 def listed(names: Iterable[str], limit: int) -> str:
     """Name some ids and count the rest."""
     given = list(names)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from photostrip.report.page.numbers import counted, short
+from photostrip.notes import counted
+from photostrip.report.page.numbers import short
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.plan_view import Plan, Spot, plan_of
 

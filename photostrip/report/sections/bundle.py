@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+from photostrip.notes import counted
 from photostrip.report.page.angles import angle_unit
-from photostrip.report.page.numbers import counted, fixed, power, short, unit
+from photostrip.report.page.numbers import fixed, power, short, unit
 from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 

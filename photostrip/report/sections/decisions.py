@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.numbers import LEAST_PROBABILITY, counted, micrometres, short
+from photostrip.notes import counted
+from photostrip.report.page.numbers import LEAST_PROBABILITY, micrometres, short
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import elsewhere

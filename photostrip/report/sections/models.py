@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from photostrip.notes import counted
 from photostrip.report.page.angles import angle_unit
-from photostrip.report.page.numbers import counted, fixed, joined, micrometres, percent, ratio, signed
+from photostrip.report.page.numbers import fixed, joined, micrometres, percent, ratio, signed
 from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import DIRECTIONS, photos_of, worst_first

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from photostrip.notes import counted
 from photostrip.report.page.layout import USUAL, lay_out
-from photostrip.report.page.numbers import counted, fixed, listed, metres, micrometres, percent
+from photostrip.report.page.numbers import fixed, listed, metres, micrometres, percent
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.decisions import chosen_degrees

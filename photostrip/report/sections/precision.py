@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.notes import counted
 from photostrip.report.page.angles import angle_unit
-from photostrip.report.page.numbers import counted, fixed, metres, micrometres, ratio
+from photostrip.report.page.numbers import fixed, metres, micrometres, ratio
 from photostrip.report.page.parts import Document, Facts, Section, Table, Words
 from photostrip.report.page.tables import angle, number, tabulated, words
 from photostrip.report.sections.strip import ALL_SHOWN, elsewhere

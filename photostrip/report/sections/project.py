@@ -6,8 +6,9 @@ from functools import partial
 from math import hypot
 from typing import TYPE_CHECKING
 
+from photostrip.notes import counted
 from photostrip.report.page.angles import angle_unit
-from photostrip.report.page.numbers import counted, fixed, joined, metres, micrometres, short
+from photostrip.report.page.numbers import fixed, joined, metres, micrometres, short
 from photostrip.report.page.parts import Document, Facts, Section
 from photostrip.report.page.tables import angle, number, tabulated, words
 from photostrip.report.sections.models import measured, of_models, project_rows, scale_word

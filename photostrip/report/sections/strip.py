@@ -6,8 +6,9 @@ import re
 from functools import partial
 from typing import TYPE_CHECKING
 
+from photostrip.notes import counted
 from photostrip.report.page.angles import angle_unit
-from photostrip.report.page.numbers import LEAST_PROBABILITY, counted, fixed, metres, micrometres, percent, power, short
+from photostrip.report.page.numbers import LEAST_PROBABILITY, fixed, metres, micrometres, percent, power, short
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import angle, number, tabulated, words
 

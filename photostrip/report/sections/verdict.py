@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from photostrip.report.page.numbers import counted, fixed, short, unit
+from photostrip.notes import counted
+from photostrip.report.page.numbers import fixed, short, unit
 from photostrip.report.page.parts import Document, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import elsewhere
