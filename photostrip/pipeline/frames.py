@@ -95,7 +95,7 @@ def curvature_notes(inputs: Inputs, settings: Settings) -> Iterator[Note]:
     """Say where a setting of Earth curvature changes nothing."""
     if settings.absolute.earth_curvature == "none" and inputs.frames and inputs.frames[0].crs != "local":
         text = (
-            "earth_curvature: none changes nothing here: the coordinates go through geocentric space, where the Earth "
+            "`earth_curvature: none` has no effect here: the coordinates go through geocentric space, where the Earth "
             "is curved"
         )
         yield Note("curvature-in-frames", text, severity="note")

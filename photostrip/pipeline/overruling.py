@@ -51,7 +51,7 @@ def _require_known(settings: RelativeSettings | LinkSettings, known: set[str], b
         if entry not in known
     ]
     faults += [
-        Fault(f"`{entry}` is to be kept and dropped", code="kept-and-dropped", key=f"processing.{block}.drop")
+        Fault(f"`{entry}` is both kept and dropped", code="kept-and-dropped", key=f"processing.{block}.drop")
         for entry in settings.drop
         if entry in settings.keep
     ]
@@ -104,8 +104,8 @@ def notes(settings: RelativeSettings, strip: str, photos: Sequence[str]) -> Iter
         for entries in (settings.keep, settings.drop)
     )
     if kept:
-        text = f"strip {strip}: kept at the user's wish, whatever the tests say: {kept}"
+        text = f"strip {strip}: kept at the user's request, whatever the tests say: {kept}"
         yield Note("user-keep", text, severity="note", strip=strip)
     if dropped:
-        text = f"strip {strip}: left out at the user's wish: {dropped}"
+        text = f"strip {strip}: left out at the user's request: {dropped}"
         yield Note("user-drop", text, severity="note", strip=strip)

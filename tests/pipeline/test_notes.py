@@ -28,5 +28,5 @@ def test_points_beyond_the_control_are_told_with_how_far(begin: float, end: floa
     adjusted = np.array([[begin, 0.0, 0.0], [2000.0, 0.0, 0.0], [end, 0.0, 0.0]])
     notes = list(polynomial_notes(cast("Strip", SimpleNamespace(id="A")), correction, adjusted))
     assert [note.code for note in notes] == ([] if beyond is None else ["extrapolation"])
-    words = "" if beyond is None else f"points lie up to {beyond} m beyond the control"
+    words = "" if beyond is None else f"1 point lies up to {beyond} m beyond the control"
     assert words in " ".join(note.message for note in notes)

@@ -40,10 +40,10 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
     """Say what the surveyor should know of the adjustment."""
     solution = bundle.screened.solution
     if solution.free:
-        whose = "those of the first strip" if bundle.start.free else "the start's"
+        whose = "are those of the first strip" if bundle.start.free else "come from the start values"
         text = (
-            f"neither control nor camera positions: a free network, frame and scale are {whose}; its accuracy is "
-            "relative only"
+            f"neither control nor camera positions are given: a free network, its frame and scale {whose}; its "
+            "accuracy is relative only"
         )
         yield Note("free-network", text)
     test = bundle.sigma0
@@ -58,7 +58,7 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
         if not parameter.significant:
             text = (
                 f"camera {parameter.camera}: {parameter.name} is {parameter.value:.3g} {parameter.unit} with a "
-                f"standard deviation of {parameter.sigma:.3g}: it does not differ from "
+                f"standard deviation of {parameter.sigma:.3g}: it does not differ significantly from "
                 "zero; leave it out of self_calibration"
             )
             yield Note("calibration-insignificant", text)

@@ -129,7 +129,7 @@ def datum(
         what = (
             f"strip {stages[group.members[0]].strip.id}" if len(group.members) == 1 else f"{len(group.members)} strips"
         )
-        message = f"{what}: neither control nor camera positions nor tie points bring it to the ground"
+        message = f"{what}: neither control nor camera positions nor tie points connect it to the ground"
         if refusal is not None:
             message += f" ({refusal})"
         raise GeometryError(message, photos=names, code="strip-not-tied") from refusal

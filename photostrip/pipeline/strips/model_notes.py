@@ -29,7 +29,8 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
     if links.factor > 1:
         text = (
             f"strip {strip.id}: the common points of the models differ {np.sqrt(links.factor):.1f} times as much as "
-            "the standard deviations of the model coordinates allow; gross errors are searched for with larger ones"
+            "the standard deviations of the model coordinates allow; larger ones are used in the search for gross "
+            "errors"
         )
         yield Note("sigma-contradicted", text, severity="note", strip=strip.id)
     center = np.bincount(
@@ -59,7 +60,7 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
         what = f"one of {', '.join(points)}" if len(points) > 1 else points[0]
         text = (
             f"strip {strip.id}: the common points of models {names[0]} and {names[1]} contradict each other: {what} is "
-            "wrong, and it is used all the same; measure more common points"
+            "wrong, but it is still used; measure more common points"
         )
         yield Note("contradicting-link", text, strip=strip.id, points=tuple(points))
 
@@ -79,8 +80,8 @@ def _unit_notes(strip: ModelStrip, formed: FormedModels) -> Iterator[Note]:
     ratio = float(np.sqrt(solved.squares.sum() / redundancy)) if redundancy else 1.0
     if ratio > ANOTHER_UNIT or NOTHING < ratio < 1 / ANOTHER_UNIT:
         text = (
-            f"strip {strip.id}: the models fit each other with {ratio:.3g} times the standard deviations that are "
-            "stated: are these in another unit?"
+            f"strip {strip.id}: the misfits between the models are {ratio:.3g} times their stated standard deviations: "
+            "are these in another unit?"
         )
         yield Note("sigma-unit", text, strip=strip.id, key="models.sigma")
 

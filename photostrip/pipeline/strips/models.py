@@ -215,7 +215,7 @@ def _refuse_reflected(strip: ModelStrip, links: ScreenedLinks) -> None:
         f"model {names[0]} is a mirror image" if len(names) == 1 else f"models {', '.join(names)} are mirror images"
     )
     fault = Fault(
-        f"strip {strip.id}: {listed} of the others: x and y are exchanged, or one axis has the other sign",
+        f"strip {strip.id}: {listed} of the others: x and y are exchanged, or one axis has the wrong sign",
         code="mirrored-model",
         key="models.file",
         expected="all models in axes of the same hand",

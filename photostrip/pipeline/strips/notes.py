@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.notes import Note
+from photostrip.notes import Note, counted
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
 from photostrip.triangulation.gross_errors.control.control_rejections import EXCHANGED, WRONG_IMAGE
 from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING, Orientation
@@ -37,12 +37,12 @@ def pair_notes(strip: Strip, oriented: Orientation) -> Iterator[Note]:
     for number, count in enumerate(oriented.points_used):
         names = strip.photos[number : number + 2]
         if count == MINIMUM_POINTS:
-            text = f"photos {names[0]} and {names[1]} are oriented on 5 points: no check"
+            text = f"photos {names[0]} and {names[1]} are oriented on 5 points only: there is no check"
             yield Note("no-check", text, strip=strip.id, photos=names)
         if oriented.condition[number] > CONDITION_WARNING:
             text = (
                 f"photos {names[0]} and {names[1]}: weak relative orientation (condition number "
-                f"{oriented.condition[number]:.0f}); the points stand in a narrow band"
+                f"{oriented.condition[number]:.0f}); the points lie in a narrow band"
             )
             yield Note("weak-pair", text, strip=strip.id, photos=names)
 
@@ -53,14 +53,14 @@ def screening_notes(strip: Strip, screened: ScreenedPairs, sigma: float) -> Iter
     if np.isfinite(scatter.found):
         text = (
             f"strip {strip.id}: the y parallaxes scatter as if image coordinates had a standard deviation of "
-            f"{scatter.found / np.sqrt(2.0) * 1000:.1f} µm, not the {sigma * 1000:.1f} µm stated; gross errors are "
-            "searched for with the larger one"
+            f"{scatter.found / np.sqrt(2.0) * 1000:.1f} µm, not the {sigma * 1000:.1f} µm stated; the larger one "
+            "is used in the search for gross errors"
         )
         yield Note("sigma-contradicted", text, severity="note", strip=strip.id)
     for number in np.flatnonzero(screened.masked):
         names = strip.photos[number : number + 2]
         text = (
-            f"photos {names[0]} and {names[1]}: masked errors suspected: the y parallaxes are larger than their "
+            f"photos {names[0]} and {names[1]}: masked errors are suspected: the y parallaxes are larger than their "
             "standard deviation allows, and no further point can be rejected; measure the pair again or add points"
         )
         yield Note("masked-errors", text, strip=strip.id, photos=names)
@@ -94,14 +94,14 @@ def junction_notes(strip: Strip, formed: FormedStrip) -> Iterator[Note]:
         photo = strip.photos[number + 1]
         text = (
             f"photo {photo}: its pass points contradict each other in the scale of the models by "
-            f"{junctions.doubt[number]:.2%}, and which is wrong cannot be told; measure another pass point"
+            f"{junctions.doubt[number]:.2%}, and it cannot be told which is wrong; measure another pass point"
         )
         yield Note("contradicting-joint", text, strip=strip.id, photos=(photo,))
     for number in np.flatnonzero(count == 1).tolist():
         photo = strip.photos[number + 1]
         text = (
-            f"photo {photo}: the models on either side are joined by a single pass point: its error goes into the "
-            "scale unseen"
+            f"photo {photo}: the models on either side are joined by a single pass point: an error in it enters the "
+            "scale unnoticed"
         )
         yield Note("weak-joint", text, strip=strip.id, photos=(photo,))
 
@@ -116,8 +116,8 @@ def control_notes(strip: Strip | ModelStrip, orientation: AbsoluteOrientation) -
         yield Note("little-control", text, strip=strip.id)
     if orientation.condition > 1 / WEAK_LIMIT:
         text = (
-            f"strip {strip.id}: the control is nearly on one line: errors of some motion of the strip are "
-            f"{orientation.condition:.0f} times those of the others"
+            f"strip {strip.id}: the control lies nearly on one line: the errors of one movement of the strip are "
+            f"{orientation.condition:.0f} times those of the other movements"
         )
         yield Note("weak-control", text, strip=strip.id)
 
@@ -129,9 +129,9 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
     asked = correction.asked
     if asked != "auto" and correction.degree < int(asked):
         text = (
-            f"strip {strip.id}: degree {asked} was asked for; the control, {len(correction.axes[0].residuals)} points "
-            f"at {correction.stations[0]} stations in plan and {correction.stations[1]} in height, carries degree "
-            f"{correction.degree}"
+            f"strip {strip.id}: degree {asked} was asked for; the control, "
+            f"{counted(len(correction.axes[0].residuals), 'point')} at {counted(correction.stations[0], 'station')} in "
+            f"plan and {correction.stations[1]} in height, supports degree {correction.degree}"
         )
         yield Note("degree-reduced", text, strip=strip.id)
     if correction.degree:
@@ -140,8 +140,8 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
         reach = max(low - float(adjusted[:, 0].min()), float(adjusted[:, 0].max()) - high)
         if outside and reach > 0.1 * (high - low):
             text = (
-                f"strip {strip.id}: {outside} points lie up to {reach:.0f} m beyond the control along the strip, where "
-                f"the polynomial of degree {correction.degree} is extrapolated"
+                f"strip {strip.id}: {counted(outside, 'point lies', 'points lie')} up to {reach:.0f} m beyond the "
+                f"control along the strip, where the polynomial of degree {correction.degree} is extrapolated"
             )
             yield Note("extrapolation", text, strip=strip.id)
         if min(axis.redundancy for axis in correction.axes) < 3:
@@ -162,20 +162,20 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
     models = len(strip.photos) - 1
     if models > LONG_STRIP:
         text = (
-            f"strip {strip.id}: {models} models; beyond about {LONG_STRIP} a polynomial falls far behind a rigorous "
-            "adjustment (errors 2.5 times larger at 30 models, 12 times at 100); use `processing.adjustment: "
+            f"strip {strip.id}: {models} models; beyond about {LONG_STRIP} models a polynomial falls far behind a "
+            "rigorous adjustment (errors 2.5 times larger at 30 models, 12 times at 100); use `processing.adjustment: "
             "covariance`, which does not"
         )
         yield Note("long-strip", text, strip=strip.id)
         return
     few = min(correction.stations) < POLYNOMIAL_BANDS
     if models > 1 and (models > POLYNOMIAL_MODELS or few):
-        bands = f"on {min(correction.stations)} bands of control"
+        bands = f"on {counted(min(correction.stations), 'band')} of control"
         why = f"over {models} models" if models > POLYNOMIAL_MODELS else bands
-        what = "a polynomial" if correction.degree else "the similarity, which no polynomial betters,"
+        what = "a polynomial" if correction.degree else "the similarity, which no polynomial improves,"
         text = (
-            f"strip {strip.id}: {what} {why} leaves more than it must; `processing.adjustment: covariance` "
-            "distributes the same misclosures within 5 % of a bundle adjustment"
+            f"strip {strip.id}: {what} {why} leaves larger errors than necessary; `processing.adjustment: covariance` "
+            "comes within 5 % of a bundle adjustment"
         )
         yield Note("covariance-proposed", text, severity="note", strip=strip.id)
 
@@ -193,7 +193,7 @@ def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceA
     for row in worst.tolist():
         name, axis = control.ids[adjusted.control.point[row]], GROUND_AXES[adjusted.control.axis[row]]
         text = (
-            f"control point {name} does not go with the strip and the other control: {axis} by about "
+            f"control point {name} does not agree with the strip and the other control: {axis} by about "
             f"{tested.size[row]:+.2f} m (test value {abs(tested.normalised[row]):.1f}, limit {tested.limit:.1f}); "
             "it was used"
         )
@@ -201,8 +201,8 @@ def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceA
     if not len(worst) and tested.probability < LEVEL:
         sigma0 = float(np.sqrt(tested.squares / tested.redundancy))
         text = (
-            f"strip {strip.id}: misclosures and distances are {sigma0:.2f} times what the standard deviations of image "
-            "coordinates and control let expect, and no single control point explains it: systematic errors of the "
-            "images, or standard deviations that are too small"
+            f"strip {strip.id}: misclosures and distances are {sigma0:.2f} times as large as expected from the "
+            "standard deviations of image coordinates and control, and no single control point explains it: systematic "
+            "errors of the images, or standard deviations that are too small"
         )
         yield Note("strip-contradicted", text, strip=strip.id)

@@ -216,8 +216,8 @@ class FormedPhotos:
         resection = resect(self.observations.xy[rays.rows], adjusted[points], rays.photo, start)
         if not resection.solved.any():
             msg = (
-                f"strip {strip.id}: no photo can be oriented on its adjusted points: strip and control belong to two "
-                "worlds"
+                f"strip {strip.id}: no photo can be oriented on its adjusted points: strip and control do not "
+                "belong together"
             )
             raise GeometryError(msg, photos=strip.photos, code="no-photo-oriented")
         return resection

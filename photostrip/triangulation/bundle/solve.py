@@ -11,6 +11,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
+from photostrip.notes import counted
 from photostrip.triangulation.bundle.normal_equations import datum, defects
 from photostrip.triangulation.bundle.normal_equations.reduced import (
     control_residuals,
@@ -88,7 +89,9 @@ def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> tuple[Par
         if damping > LARGEST_DAMPING:
             break
         best = reduce(prepared, state, damping)
-    raise GeometryError(f"the bundle adjustment did not come to an end in {len(steps)} steps", code="bundle-diverged")
+    raise GeometryError(
+        f"the bundle adjustment did not converge in {counted(len(steps), 'step')}", code="bundle-diverged"
+    )
 
 
 def _still_to_come(steps: list[IterationStep]) -> float:

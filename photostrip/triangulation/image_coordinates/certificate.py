@@ -117,7 +117,7 @@ def _adjusted(xy: Floats, ends: Numbers, given: Floats) -> Floats:
         values = np.linalg.svd(design, compute_uv=False)
         rank = int((values > LOOSE * values[:1]).sum())
         if rank < unknowns:
-            message = f"{rank} independent distances do not fix a figure of {len(xy)} marks, which needs {unknowns}"
+            message = f"{rank} independent distances do not fix a figure of {len(xy)} marks; it takes {unknowns}"
             fix = "give a diagonal, or distances of the loose mark to two others"
             raise InputError(Fault(message, code="certificate", key="fiducial_distances", fix=fix))
         step = np.linalg.lstsq(design, given - lengths, rcond=LOOSE)[0]

@@ -120,11 +120,11 @@ def faults(camera: Camera, farthest: float = 0.0) -> list[Fault]:
 def _bad_table(distortion: Distortion) -> str:
     radius, values = np.array(distortion.radius, float), np.array(distortion.distortion, float)
     if len(radius) != len(values) or not radius.any():
-        return f"{len(radius)} radii and {len(values)} distortions: as many of each are needed, and a radius above 0"
+        return f"{len(radius)} radii and {len(values)} distortions: equally many are needed, and a radius above 0"
     if radius[0] < 0 or (np.diff(radius) <= 0).any():
         return "the radii of the distortion table must increase from 0 or above"
     if radius[0] == 0 and values[0] != 0:
-        return f"the distortion at radius 0 is {values[0]:g} mm, it must be 0"
+        return f"the distortion at radius 0 is {values[0]:g} mm; it must be 0"
     return ""
 
 

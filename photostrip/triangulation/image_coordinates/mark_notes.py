@@ -84,7 +84,7 @@ def _fewer(part: InteriorOrientation, camera: Camera) -> list[Note]:
     notes = []
     unchecked = count == 2
     if unchecked.any():
-        text = f"{_photos(part, unchecked)}: with two marks neither wrong numbers nor a mirrored photo can be seen"
+        text = f"{_photos(part, unchecked)}: with two marks neither wrong numbers nor a mirrored photo can be detected"
         notes.append(_note("marks-unchecked", text, part, unchecked))
     conformal = np.array([kind == "conformal" for kind in part.transforms], bool) & ~unchecked
     if conformal.any() and not conformal.all():
@@ -104,7 +104,7 @@ def _poor_fit(part: InteriorOrientation, poor: Flags) -> Note:
     if part.redundancy[worst] > 2:
         text += f"largest residual {lengths.max() / MICROMETRE:.0f} um at mark {mark}"
     else:
-        text += "which mark is wrong cannot be told with so few"
+        text += "with so few marks it cannot be told which is wrong"
     return _note("marks-fit-poorly", text, part, poor)
 
 
@@ -138,5 +138,5 @@ def marks_of_no_strip(fiducials: PhotoPoints, cameras: Mapping[str, Camera]) -> 
     unused = tuple(photo for photo in fiducials.photo_ids if photo not in cameras)
     if not unused:
         return []
-    message = f"fiducial marks of {named('photo', unused, SHOWN)} are not used: in no strip"
+    message = f"fiducial marks of {named('photo', unused, SHOWN)} are not used: not in any strip"
     return [Note("marks-unused", message, severity="note", photos=unused)]

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.notes import counted
 from photostrip.triangulation.independent_models import linking
 
 if TYPE_CHECKING:
@@ -109,16 +110,16 @@ def require_links(shared: CommonPoints, models: StripModels, used: Flags, names:
     count = np.bincount(shared.link[used], minlength=shared.count)
     for link in np.flatnonzero(count < linking.LEAST_COMMON).tolist():
         msg = (
-            f"models {names[link]} and {names[link + 1]} have {count[link]} points in common, perspective centres "
-            "included: seven parameters need three that are not on one line (three or more and the common perspective "
-            f"centre are recommended){_neighbours(models, link, names)}"
+            f"models {names[link]} and {names[link + 1]} have {counted(int(count[link]), 'point')} in common, "
+            "perspective centres included: seven parameters need three that are not on one line (three or more and the "
+            f"common perspective centre are recommended){_neighbours(models, link, names)}"
         )
         raise GeometryError(msg, code="broken-link")
     centers = np.bincount(shared.link[used & (models.node[shared.before] >= models.points)], minlength=shared.count)
     for link in np.flatnonzero(linking.extents(shared, models, used) < linking.THIN).tolist():
         why = "" if centers[link] else "; with the common perspective centre it is determined"
         msg = (
-            f"the common points of models {names[link]} and {names[link + 1]} stand on one line: the rotation about it "
+            f"the common points of models {names[link]} and {names[link + 1]} lie on one line: the rotation about it "
             f"stays free{why}"
         )
         raise GeometryError(msg, code="link-on-a-line")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.notes import counted
 from photostrip.points import PhotoPoints, take_rows
 
 if TYPE_CHECKING:
@@ -100,8 +101,8 @@ def _require_points(counts: Numbers, photos: Sequence[str]) -> None:
     for number in np.flatnonzero(counts < MINIMUM_POINTS).tolist():
         names = photos[number : number + 2]
         msg = (
-            f"relative orientation of photos {names[0]} and {names[1]}: {counts[number]} common points, "
-            f"at least {MINIMUM_POINTS} are necessary (12 are recommended); measure more points or correct the order "
-            "of the photos"
+            f"relative orientation of photos {names[0]} and {names[1]}: "
+            f"{counted(int(counts[number]), 'common point')}, at least {MINIMUM_POINTS} are necessary (12 are "
+            "recommended); measure more points or correct the order of the photos"
         )
         raise GeometryError(msg, photos=names, code="too-few-common-points")

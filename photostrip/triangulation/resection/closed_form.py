@@ -13,6 +13,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.notes import counted
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives
 from photostrip.triangulation.resection.resection import Resection, resect
 
@@ -54,7 +55,9 @@ def space_resection(xy: Floats, sigma: Floats, points: Floats, focal: float) -> 
     start = KnownPhotos(center[None], rotation[None], np.array([focal]))
     found: Resection = resect(xy, points, number, start)
     if not found.solved[0]:
-        raise GeometryError("the space resection does not settle: the points are too few or too weak", code="resection")
+        raise GeometryError(
+            "the space resection does not converge: too few points, or in a poor arrangement", code="resection"
+        )
     by_photo, _ = derivatives(points, KnownPhotos(found.centers, found.rotations, start.focal), number)
     design = (by_photo / sigma[:, :, None]).reshape(-1, 6)
     redundancy = 2 * len(xy) - 6
@@ -87,7 +90,9 @@ def approximate(xy: Floats, points: Floats, focal: float) -> tuple[Floats, Float
     Source: [Grunert 1841] in the form of [Haralick 1994].
     """
     if len(xy) < LEAST_POINTS:
-        raise GeometryError(f"{len(xy)} known points do not orient a photo; it needs four", code="resection")
+        raise GeometryError(
+            f"{counted(len(xy), 'known point')} cannot orient a photo; four are needed", code="resection"
+        )
     if collinearity(points) < ON_A_LINE**2:
         raise GeometryError("the known points of the photo lie on one line", code="resection")
     rays = np.column_stack([xy, np.full(len(xy), -focal)])

@@ -93,7 +93,7 @@ def messages(rows: list[tuple[str, str, float]], places: dict[str, str] = CORNER
 def test_four_sides_leave_the_figure_loose() -> None:
     sides = [(a, b, 212.0) for a, b in (("F1", "F2"), ("F2", "F3"), ("F3", "F4"), ("F4", "F1"))]
     (line,) = messages(sides)
-    assert "4 independent distances do not fix a figure of 4 marks, which needs 5" in line
+    assert "4 independent distances do not fix a figure of 4 marks; it takes 5" in line
     assert "give a diagonal" in line
 
 

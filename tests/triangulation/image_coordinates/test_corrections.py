@@ -316,7 +316,7 @@ def test_the_last_radius_of_a_table_belongs_to_it(direction: str) -> None:
         ((0.0,), (0.0,), "a radius above 0"),
         ((0.0, 20.0, 10.0), (0.0, 0.001, 0.002), "must increase"),
         ((-1.0, 20.0), (0.0, 0.001), "must increase from 0 or above"),
-        ((0.0, 20.0), (0.003, 0.001), "at radius 0 is 0.003 mm, it must be 0"),
+        ((0.0, 20.0), (0.003, 0.001), "at radius 0 is 0.003 mm; it must be 0"),
     ],
 )
 def test_a_table_that_is_none_is_refused(radius: tuple[float, ...], values: tuple[float, ...], message: str) -> None:

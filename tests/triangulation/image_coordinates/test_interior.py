@@ -450,7 +450,7 @@ def test_a_poor_fit_names_photo_and_mark() -> None:
     assert "worst photo 7, sigma0" in note.message
     assert "at mark B" in note.message
     (alike,) = orient({"1": {**calibrated(CORNERS), "F2": np.array([-106.0, -105.0])}}).notes
-    assert alike.message.endswith("which mark is wrong cannot be told with so few")
+    assert alike.message.endswith("with so few marks it cannot be told which is wrong")
 
 
 def test_an_odd_affinity_is_told() -> None:
@@ -495,7 +495,7 @@ def test_marks_of_photos_in_no_strip_are_left_aside() -> None:
     )
     assert found.photo_ids == ("a",)
     assert found.notes[0].photos == ("x", "y")
-    assert found.notes[0].message == "fiducial marks of photos x, y are not used: in no strip"
+    assert found.notes[0].message == "fiducial marks of photos x, y are not used: not in any strip"
 
 
 def test_points_of_a_photo_without_orientation_are_refused() -> None:

@@ -563,7 +563,7 @@ def test_a_degree_that_control_does_not_carry_is_said() -> None:
     assert reduced.strips[0].polynomial.degree == 2
     (note,) = [n for n in reduced.notes if n.code == "degree-reduced"]
     assert "degree 3 was asked for" in note.message
-    assert "9 points at 3 stations in plan and 3 in height, carries degree 2" in note.message
+    assert "9 points at 3 stations in plan and 3 in height, supports degree 2" in note.message
     assert "degree-reduced" not in codes(strip_result(flown, 90.0, "2"))
 
 

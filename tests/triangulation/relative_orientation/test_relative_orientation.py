@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.errors import EXIT_GEOMETRY, GeometryError
+from photostrip.notes import counted
 from photostrip.pipeline import Settings, triangulate
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again, orient_pairs
@@ -145,7 +146,7 @@ def test_the_degenerate_examples_are_refused(example: Vector) -> None:
     n = len(example.input["points"])
     if n < MINIMUM_POINTS:
         assert error.code == "too-few-common-points"
-        assert f"{n} common points, at least 5 are necessary" in str(error)
+        assert f"{counted(n, 'common point')}, at least 5 are necessary" in str(error)
     else:
         assert error.code == "points-on-a-line"
         assert "all common points lie on one line of the photo" in str(error)
@@ -477,7 +478,7 @@ STANDARD = [[0.0, 0.0], [700.0, 0.0], [0.0, 650.0], [700.0, 650.0], [0.0, -650.0
 
 def test_a_pair_on_five_points_is_warned_of() -> None:
     said = notes_of_a_pair(STANDARD[:5])
-    assert "photos 1 and 2 are oriented on 5 points: no check" in said["no-check"]
+    assert "photos 1 and 2 are oriented on 5 points only: there is no check" in said["no-check"]
     assert "no-check" not in notes_of_a_pair(STANDARD)
 
 
@@ -495,7 +496,7 @@ def test_fewer_than_five_common_points(common: int) -> None:
     pairs = true_pairs(np.random.default_rng(1)).pairs
     error = refusal(of_arrays(pairs.left[:common], pairs.right[:common]))
     assert error.code == "too-few-common-points"
-    assert f"{common} common points, at least 5 are necessary" in str(error)
+    assert f"{counted(common, 'common point')}, at least 5 are necessary" in str(error)
     assert "order of the photos" in str(error)
 
 
