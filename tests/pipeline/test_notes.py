@@ -28,5 +28,6 @@ def test_points_beyond_the_control_are_told_with_how_far(begin: float, end: floa
     adjusted = np.array([[begin, 0.0, 0.0], [2000.0, 0.0, 0.0], [end, 0.0, 0.0]])
     notes = list(polynomial_notes(cast("Strip", SimpleNamespace(id="A")), correction, adjusted))
     assert [note.code for note in notes] == ([] if beyond is None else ["extrapolation"])
-    words = "" if beyond is None else f"1 point lies up to {beyond} m beyond the control"
+    points = "2 points lie" if begin < -500.0 and end > 5000.0 else "1 point lies"
+    words = "" if beyond is None else f"{points} up to {beyond} m beyond the control"
     assert words in " ".join(note.message for note in notes)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.measured.columns import POINT, numbers, sigmas
-from photostrip.formats.text.findings import counted
 from photostrip.formats.text.tables import Column, Table
+from photostrip.notes import counted
 from photostrip.points import locate
 
 if TYPE_CHECKING:
