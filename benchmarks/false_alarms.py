@@ -279,7 +279,7 @@ def calibrating(seed: int) -> Sound:
     inputs = with_gnss(simulation)
     camera = simulation.camera
     off = replace(camera, principal_distance=camera.principal_distance + float(rng.normal(0, 0.05)))
-    inputs = replace(inputs, strips=tuple(replace(each, camera=off) for each in inputs.strips))
+    inputs = replace(inputs, strips=tuple(replace(each, camera=off, calibrate=FREE) for each in inputs.strips))
     settings = replace(settings_of(simulation), adjustment="bundle", bundle=BundleSettings(self_calibration=FREE))
     return Sound(inputs, settings, simulation.spec)
 
