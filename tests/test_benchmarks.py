@@ -165,3 +165,10 @@ assert ablation.scaled(0.999, 2.0) == 0.998 and ablation.scaled(3, 0.5) == 2 and
 def test_ablation_prints_a_line_for_every_change() -> None:
     out = printed("ablation.py", "1", "--only", "as it is", "re-admission", "--workers", "1")
     assert re.findall(r"^(\w[\w -]+\w)  +\d\.\d{3}/", out, re.MULTILINE) == ["as it is", "without re-admission"]
+
+
+@pytest.mark.slow
+def test_false_alarms_prints_a_row_for_each_layout() -> None:
+    out = printed("false_alarms.py", "--count", "1", "--first", "7", "corners", "GNSS")
+    assert len(re.findall(r"^(?:corners|blocks|strips)[\w ,]+ +1 +0", out, re.MULTILINE)) == 3
+    assert re.search(r"^all +3 +0 +0\.00 %$", out, re.MULTILINE)

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.plausibility.finding import Evidence
 
 
+EARTH_RADIUS = 6.37e6  # metres
 FALSE_ALARM = 1e-5  # probability of a finding where there is nothing to find
 LEAST_SCALE_ERROR = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
 LEAST_OFFSET_SIGMAS = 8.0  # a-priori standard deviations of a height: a smaller constant does no harm
@@ -58,7 +59,9 @@ class HeightComparison:
     value: Floats  # (n,): given minus height in the strip, metres
     whole: list[Floats]  # (n,): all columns of tilt and bending
     deviation: Floats  # (n,): heights in the strip, against their mean
-    relief: Floats  # (n,): heights given, against their mean: a strip that bends has heights where the ground has none
+    # (n,): heights given, without the curvature of the Earth, against their mean: a strip that bends has heights where
+    # the ground has none
+    relief: Floats
     floor: float  # smallest standard deviation that makes sense, metres
 
     @cached_property
@@ -86,7 +89,7 @@ def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: F
     height = np.where(usable, fitted.height, 0.0)
     value = np.where(usable, given.xyz[:, 2], 0.0) - height
     deviation = height - height[in_fit].mean()
-    relief = value + height
+    relief = value + height + np.where(usable, x**2 + y**2, 0.0) / (2.0 * EARTH_RADIUS)
     return HeightComparison(
         usable=usable,
         in_fit=in_fit,
@@ -167,10 +170,10 @@ def find_wrong_heights(
 
 
 def _shows_in_relief(heights: HeightComparison, floor: float) -> bool:
-    """Whether the heights given show the stretch beside any bend, in which they have no part."""
-    columns = np.column_stack([*heights.whole, heights.relief])
-    fit = fit_robustly(columns, heights.value, heights.in_fit & heights.scaled.used, floor)
-    return _significant(float(fit.coefficient[-1]), float(fit.sigma[-1]), fit.freedom, LEAST_SCALE_ERROR)
+    """Whether the heights given show the stretch as well: they have no part in a bend of the strip."""
+    agreeing = heights.in_fit & heights.scaled.used
+    _, fit = fit_simplest([heights.relief, *heights.whole], 4, heights.value, agreeing, floor)
+    return _significant(float(fit.coefficient[0]), float(fit.sigma[0]), fit.freedom, LEAST_SCALE_ERROR)
 
 
 def _significant(value: float, sigma: float, freedom: int, least: float) -> bool:
