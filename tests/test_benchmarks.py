@@ -150,12 +150,12 @@ from benchmarks import ablation
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.gross_errors.rays import point_decisions, strip_network
 names = [f"{module.rpartition('.')[2]}.{name}" for module, name, _ in ablation.constants()]
-assert "strip_network.FAR" in names and "point_decisions.LIKELIER" in names
+assert "strip_network.LEVEL" in names and "point_decisions.LIKELIER" in names
 ablation.put(reliability.__name__, "UNCONTROLLED", 0.25)
 assert point_decisions.UNCONTROLLED == reliability.UNCONTROLLED == 0.25
 for make in list(ablation.changes().values()):
     make()
-assert strip_network.FAR == 5.0
+assert strip_network.LEVEL == 0.0075
 assert ablation.scaled(0.999, 2.0) == 0.998 and ablation.scaled(3, 0.5) == 2 and ablation.scaled(0.2, 2.0) == 0.4
 """
     subprocess.run([sys.executable, "-c", program], check=True, cwd=ROOT)
