@@ -37,7 +37,7 @@ def test_console_blocks_are_run_or_say_why_not(page: Path) -> None:
     silent = [block for block in found if block.kind == "console" and not block.runs]
     commands = [step.command for block in found if block.runs for step in steps(block)]
     assert [block.place for block in found if not block.kind] == [], "say what the block is (text, console, yaml, ...)"
-    assert [command for command in commands if FRESH_CLONE.search(command)] == [], "this belongs into a sh block"
+    assert [command for command in commands if FRESH_CLONE.search(command)] == [], "this belongs in a sh block"
     assert [block.place for block in silent if not block.above.startswith("<!--")] == [], "say above why it is not run"
 
 

@@ -69,7 +69,8 @@ def _of_models(models: ModelTables, control: Sequence[ControlTable | None], proj
             continue
         rows = np.flatnonzero(np.isin(each.models, locate(strangers, each.model_ids)))
         number_of = counted(len(strangers), "model")
-        message = f"{counted(len(rows), what)} of {number_of} in no strip not used: {listed(strangers)}"
+        verb = "is" if len(rows) == 1 else "are"
+        message = f"{counted(len(rows), what)} of {number_of} in no strip {verb} not used: {listed(strangers)}"
         yield each.table.note(rows[0], "model-in-no-strip", message, key="model")
     centers = set(models.center_rows(photos).tolist())
     inside = np.array([name in used for name in read.model_ids], bool)[read.models]
@@ -105,7 +106,7 @@ def _cameras_not_used(
     """Say which rows of a table of cameras are not used, and that the strip method uses none."""
     what = name.replace("_", " ")
     if project.processing.adjustment != "bundle":
-        message = f"the {what} are not used: the strip method has no place for them, `adjustment: bundle` has"
+        message = f"the {what} are not used: the strip method cannot use them, `adjustment: bundle` can"
         yield Note("cameras-not-used", message, file=read.table.file, key=name)
         return
     others = [name for name in read.ids if name not in photos]
@@ -151,7 +152,8 @@ def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
 
 
 def _in_no_strip(table: Table, rows: list[int], others: list[str], photos: set[str]) -> Note:
-    message = f"{counted(len(rows), 'row')} of {counted(len(others), 'photo')} in no strip not used"
+    verb = "is" if len(rows) == 1 else "are"
+    message = f"{counted(len(rows), 'row')} of {counted(len(others), 'photo')} in no strip {verb} not used"
     message = f"{message}: {listed(others)}{_twins(alike(others, photos))}"
     return replace(table.note(rows[0], "photo-in-no-strip", message, key="photo"), photos=tuple(others))
 

@@ -81,7 +81,7 @@ def check_models(root: Node, tables: ModelTables, findings: Findings) -> dict[in
             faults = list(_as_listed(root, number, flight, names, tables, centers))
         for place, name in enumerate(names):
             if owner.setdefault(name, number) != number or names.index(name) != place:
-                message = f"model {name} stands twice in the strips"
+                message = f"model {name} appears twice in the strips"
                 path = ("strips", number, "photos" if models is None else "models")
                 faults.append(fault_at(root, path, message, "model-twice", fix="list every model once"))
         findings.add(*faults)
@@ -158,7 +158,7 @@ def _as_listed(
         strange = [photo for photo in centers.get(name, {}) if photo not in pair]
         if strange and len(pair) > 1:
             message = (
-                f"model {name} stands between photos {pair[0]} and {pair[1]}, and has the perspective centre of "
+                f"model {name} is listed between photos {pair[0]} and {pair[1]}, and has the perspective centre of "
                 f"{strange[0]}"
             )
             fix = "put the models in flight order, or correct the id of the centre"

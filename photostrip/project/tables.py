@@ -146,7 +146,7 @@ def _some_photo(
     near = alike([photo.id for photo in photos], read.ids)
     named = f"; did you mean `{next(iter(near.values()))}`?" if near else ""
     message = f"{read.table.file} has none of the photos of the strips; its photos are {listed(read.ids, 4)}{named}"
-    fix = "write the ids of the photos alike in both files"
+    fix = "write the ids of the photos the same way in both files"
     yield fault_at(root, (section, "file"), message, "not-measured", fix=fix)
 
 
@@ -160,13 +160,13 @@ def _every_photo(root: Node, photos: list[ListedPhoto], read: Measurements, noth
     strangers = [name for name in read.photo_ids if name not in known]
     if len(missing) == len(known) > 1:
         message = f"{file} has {nothing} on any photo of the strips; its photos are {listed(strangers, 4)}"
-        fix = "write the ids of the photos alike in both files"
+        fix = "write the ids of the photos the same way in both files"
         yield fault_at(root, ("strips",), message, "not-measured", fix=fix)
         return
     near = alike([photo.id for photo in missing], strangers)
     for photo in missing:
         twin = near.get(photo.id)
-        fix = f"did you mean `{twin}`?" if twin else "measure it, or take it out of the strip"
+        fix = f"did you mean `{twin}`?" if twin else "measure it, or remove it from the strip"
         message = f"{file} has {nothing} on photo {photo.id}"
         yield fault_at(root, photo.path, message, "not-measured", fix=fix)
 

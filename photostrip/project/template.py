@@ -91,4 +91,4 @@ def refuse_existing(folder: Path, names: list[str]) -> None:
     there = [folder / name for name in names if (folder / name).exists() or (folder / name).is_symlink()]
     if there:
         fix = "choose another folder, or remove it"
-        raise InputError(Fault("exists already and is not overwritten", "exists", str(path), fix=fix) for path in there)
+        raise InputError(Fault("already exists and is not overwritten", "exists", str(path), fix=fix) for path in there)

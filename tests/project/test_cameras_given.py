@@ -117,7 +117,7 @@ def test_self_calibration_of_each_camera(tmp_path: Path) -> None:
 
 
 WRONG = [
-    (G, "1002,4650000.75", "1001,4650000.75", "gnss.csv:3:1: photo:", "photo 1001 is given already, in line 2"),
+    (G, "1002,4650000.75", "1001,4650000.75", "gnss.csv:3:1: photo:", "photo 1001 is already given, in line 2"),
     (G, "4650000.75,500900.5", ",500900.5", "gnss.csv:3:6: x:", "photo 1002 has no x, but its use is xy"),
     (G, "0.1,0.2,0.3", "0.1,0,0.3", "gnss.csv:2:45: sy:", "larger than 0"),
     (G, "photo,x", "photo,X_m", "gnss.csv:1", "x"),
@@ -131,7 +131,7 @@ WRONG = [
     (Y, "lever_arm:", "lever_am:", "project.yaml:32:3:", "did you mean `lever_arm`?"),
     (Y, "crs: EPSG:32633\n  axes: [north", "crs: local\n  axes: [north", "project.yaml:29:8:", "nobody knows where"),
     (I, "omega,phi,kappa,sx", "alpha,phi,kappa,sx", "imu.csv:1", "omega"),
-    (I, "1001,500000.25", "2002,500000.25", "imu.csv:3:1: photo:", "given already"),
+    (I, "1001,500000.25", "2002,500000.25", "imu.csv:3:1: photo:", "already given"),
     (I, ",-100,", ",,", "imu.csv:3", "kappa"),
     (Y, "  sigma_angles: [0.02, 0.02, 0.04]\n", "", "imu.csv:2", "orientations.sigma_angles"),
     (Y, "system: omega-phi-kappa, unit: gon}\n  s", "system: opk, unit: gon}\n  s", "project.yaml:38:20:", "opk"),

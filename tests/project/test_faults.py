@@ -40,7 +40,7 @@ YAML_MANNERS = [
     (Y, "name: sample", "name: !!int 3", "project.yaml:2:7:", "tag !!int"),
     (Y, "name: sample", "name: !<tag:example.com,2000:x> 3", "project.yaml:2:7:", "tag"),
     (Y, "name: sample", "<<: {name: a}", "project.yaml:2:1:", "merge keys", "extends"),
-    (Y, "name: sample", "? [a]\n: 1", "project.yaml:2:3:", "a list stands as a key"),
+    (Y, "name: sample", "? [a]\n: 1", "project.yaml:2:3:", "a list is used as a key"),
     (Y, "name: sample", "{{ name }}: 1", "project.yaml:2:2:", "key"),
     (Y, "name: sample", "'': 1", "project.yaml:2:1:", "a key is empty"),
     (Y, "name: sample", "name: a\n---\nname: b", "project.yaml:3:1:", "second document"),
@@ -49,10 +49,10 @@ SCHEMA = [
     (Y, "photostrip: 1", "photostrip: 2", "project.yaml:1:13: photostrip:", "does not read schema 2", "photostrip: 1"),
     (Y, "photostrip: 1\n", "", "project.yaml:1:1: photostrip:", "is missing"),
     (Y, "name: sample", "nmae: sample", "project.yaml:2:1: nmae:", "not known", "did you mean `name`?"),
-    (Y, "name: sample", "grubbs_alpha: 0.1", "project.yaml:2:1: grubbs_alpha:", "belongs into `processing.relative`"),
+    (Y, "name: sample", "grubbs_alpha: 0.1", "project.yaml:2:1: grubbs_alpha:", "belongs in `processing.relative`"),
     (Y, "name: sample", "name:", "project.yaml:2:6: name:", "no value is given"),
     (Y, "name: sample", "name: ''", "project.yaml:2:7: name:", "no value is given"),
-    (Y, "name: sample", "name: {a: 1}", "project.yaml:2:7: name:", "a mapping stands here"),
+    (Y, "name: sample", "name: {a: 1}", "project.yaml:2:7: name:", "a mapping is given here"),
     (Y, "name: sample", 'name: "a\\nb"', "project.yaml:2:7: name:", "line break"),
     (Y, "153.217", "153,217", "project.yaml:5:25: cameras.RC30.principal_distance:", "decimal comma", "153.217"),
     (Y, "153.217", "153.217 mm", "project.yaml:5:25:", "unit in it", "the number alone: 153.217"),
@@ -64,7 +64,7 @@ SCHEMA = [
     (Y, "153.217", "1_53.217", "project.yaml:5:25:", "underscore", "153.217"),
     (Y, "153.217", "１53.217", "project.yaml:5:25:", "ASCII", "153.217"),
     (Y, "153.217", "~", "project.yaml:5:25:", "`~` is not a number"),
-    (Y, "153.217", "[153.217]", "project.yaml:5:25:", "a list stands here", "a number"),
+    (Y, "153.217", "[153.217]", "project.yaml:5:25:", "a list is given here", "a number"),
     (
         Y,
         "    principal_distance: 153.217\n",
@@ -88,7 +88,7 @@ SCHEMA = [
     (Y, PROJECT[PROJECT.index("cameras:") : PROJECT.index("strips:")], "cameras:\n", "project.yaml:3:9:", "no camera"),
     (Y, "[1001, 1002]", "[1001]", "project.yaml:12:13: strips[0].photos:", "only one photo", "at least 2 photos"),
     (Y, "[1001, 1002]", "1001", "project.yaml:12:13:", "a single value", "a list"),
-    (Y, "[1001, 1002]", "[1001, [1002]]", "project.yaml:12:20: strips[0].photos[1]:", "a list stands here"),
+    (Y, "[1001, 1002]", "[1001, [1002]]", "project.yaml:12:20: strips[0].photos[1]:", "a list is given here"),
     (Y, "unit: mm", "unit: cm", "project.yaml:18:9: observations.unit:", "`cm` is not known", "mm, um, 0.1um, px"),
     (Y, "unit: mm", "unit: mm\n  repeated: mean", "project.yaml:19:13: observations.repeated:", "`mean` is not known"),
     (Y, "  unit: mm\n", "", "project.yaml:17:3: observations.unit:", "`unit` is missing"),
@@ -112,9 +112,9 @@ NOT_YET = [
 ]
 REFERENCES = [
     (Y, "id: B\n    camera: RC30", "id: B\n    camera: RC3O", "project.yaml:14:13:", "no camera `RC3O`", "mean `RC30`"),
-    (Y, "id: B", "id: A", "project.yaml:13:9: strips[1].id:", "strip A exists already, in line 10"),
-    (Y, "2002]", "1002]", "project.yaml:15:20: strips[1].photos[1]:", "listed already, in strip A", "12:20"),
-    (Y, "1002]", "1001]", "project.yaml:12:20: strips[0].photos[1]:", "listed already", "12:14"),
+    (Y, "id: B", "id: A", "project.yaml:13:9: strips[1].id:", "strip A already exists, in line 10"),
+    (Y, "2002]", "1002]", "project.yaml:15:20: strips[1].photos[1]:", "already listed, in strip A", "12:20"),
+    (Y, "1002]", "1001]", "project.yaml:12:20: strips[0].photos[1]:", "already listed", "12:14"),
     (Y, "1002]", "1002, 1003]", "project.yaml:12:26: strips[0].photos[2]:", "no point on photo 1003"),
     (Y, "1002]", "1002, 1OO3]", "project.yaml:12:26:", "no point on photo 1OO3"),
     (Y, "unit: mm", "unit: px", "project.yaml:5:5: cameras.RC30.pixel_size:", "has no pixel_size", "in mm"),
@@ -177,13 +177,13 @@ TABLES = [
     (P, "1001,P1", '1001,"P\n1"', "observations.csv:2:6: point:", "control character"),
     (P, "1001,P1", '"1001,P1', "observations.csv:2:", "never closed"),
     (P, "1001,P1", '"10"01,P1', "observations.csv:2:", "closing quotation mark"),
-    (P, "1001,P2", "1001,P1", "observations.csv:3:6: point:", "P1 is measured on photo 1001 already", "line 2"),
-    (P, "1001,P2", "1001, P1", "observations.csv:3:7: point:", "P1 is measured on photo 1001 already"),
+    (P, "1001,P2", "1001,P1", "observations.csv:3:6: point:", "P1 is already measured on photo 1001", "line 2"),
+    (P, "1001,P2", "1001, P1", "observations.csv:3:7: point:", "P1 is already measured on photo 1001"),
     (Y, "  sigma: 0.005\n", "", "observations.csv:2: sx:", "8 rows have no standard deviation", "observations.sigma"),
     (C, "xyz", "xyy", "control.csv:2:32: use:", "one of xyz, xy, z, off", "did you mean"),
     (C, "control\n", "chek\n", "control.csv:2:36: role:", "did you mean `check`?"),
     (C, "212.31", "", "control.csv:2:25: z:", "G1 has no z", "use is xyz"),
-    (C, "P2", "G1", "control.csv:3:1: point:", "G1 is given already in control.csv:2"),
+    (C, "P2", "G1", "control.csv:3:1: point:", "G1 is already given in control.csv:2"),
     (C, "500100.12", "500100.12 m", "control.csv:2:4: x:", "unit in it"),
     (C, "500100.12", "500 100.12", "control.csv:2:4: x:", "digits in groups"),
     (
@@ -197,7 +197,7 @@ TABLES = [
 ]
 MARKS = [
     (F, "1001,F1", "1001,F3", "fiducials.csv:2:6: mark:", "camera RC30 has no mark F3", "one of F1, F2"),
-    (F, "1001,F2", "1001,F1", "fiducials.csv:3:6: mark:", "F1 is measured on photo 1001 already"),
+    (F, "1001,F2", "1001,F1", "fiducials.csv:3:6: mark:", "F1 is already measured on photo 1001"),
     (F, "mark", "point", "fiducials.csv:1: mark:", "no column `mark`"),
     (F, "2002,F1,106.1,-106\n2002,F2,-105.9,-106\n", "", "project.yaml:16:20:", "no fiducial mark on photo 2002"),
     (Y, "    fiducials: {F1: [106, -106], F2: [-106, -106]}\n", "", "project.yaml:5:5:", "camera RC30 has none"),
@@ -333,7 +333,7 @@ def test_the_same_point_in_two_control_lists_is_refused(tmp_path: Path) -> None:
     project.change("project.yaml", "output:", SECOND_LIST)
     project.write("second.csv", "point,x,y,z\nN1,1,2,3\nG1,4,5,6\n")
     assert project.lines() == [
-        "second.csv:3:1: point: point G1 is given already in control.csv:2; keep one, or set use to off in the other"
+        "second.csv:3:1: point: point G1 is already given in control.csv:2; keep one, or set use to off in the other"
     ]
     project.change("control.csv", "xyz", "off")
     assert project.lines() == []
@@ -353,7 +353,7 @@ def test_no_photo_of_the_strips_is_measured(tmp_path: Path) -> None:
     table = "photo,point,x,y\nIMG_1.tif,P1,1,2\nIMG_2.tif,P1,1,2\n"
     project.write("observations.csv", table)
     message = "observations.csv has no point on any photo of the strips; its photos are IMG_1.tif, IMG_2.tif"
-    fix = "write the ids of the photos alike in both files"
+    fix = "write the ids of the photos the same way in both files"
     assert project.lines() == [f"project.yaml:10:3: strips: {message}; {fix}"]
 
 

@@ -462,9 +462,9 @@ def test_blanks_around_ids_and_a_byte_order_mark(tmp_path: Path) -> None:
     told = [str(note).replace(f"{tmp_path}/", "") for note in loaded.hints]
     assert told == [
         "project.yaml:1: begins with a byte order mark; it was skipped",
-        "project.yaml:15:14: blanks around `2001 ` taken off",
+        "project.yaml:15:14: blanks around `2001 ` removed",
         "observations.csv:1: begins with a byte order mark; it was skipped",
-        "observations.csv:2: blanks around the id of a point taken off in 1 row, here `P1 `",
+        "observations.csv:2: blanks around the id of a point removed in 1 row, here `P1 `",
     ]
 
 

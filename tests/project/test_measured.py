@@ -135,7 +135,7 @@ def test_a_strip_from_a_stereocomparator_is_that_of_its_photos(tmp_path: Path) -
 def test_points_measured_again_are_refused_unless_asked_for(sample: Sample) -> None:
     sample.write("observations.csv", AGAIN)
     assert told(sample)[0].endswith(
-        "point P1 is measured on photo 1001 already, in line 2; keep one of the two, give one another id, or set "
+        "point P1 is already measured on photo 1001, in line 2; keep one of the two, give one another id, or set "
         "`repeated: average`"
     )
 
@@ -170,7 +170,7 @@ def test_measurements_that_are_not_of_one_point_are_refused(sample: Sample) -> N
     (line,) = told(sample)
     assert line == (
         "observations.csv:10:6: point: point P1 is measured 2 times on photo 1001 (lines 2, 10), up to 0.2 in y apart: "
-        "20 standard deviations from the mean; take the wrong one out, or give the other point an id of its own"
+        "20 standard deviations from the mean; remove the wrong one, or give the other point an id of its own"
     )
 
 

@@ -171,9 +171,9 @@ FAULTS = [
         {M: MODELS + "23,C1,1,2,3\n"},
         "measured-twice",
         "models.csv:18:4",
-        "model 23 already, in line 13",
+        "already measured in model 23, in line 13",
     ),
-    ("a model twice", {M: MODELS + without("model", "12")}, "model-twice", "models.csv:18", "model 23 stands twice"),
+    ("a model twice", {M: MODELS + without("model", "12")}, "model-twice", "models.csv:18", "model 23 appears twice"),
     ("unknown key", {P: PROJECT.replace("unit: mm", "unit: mm\n  scal: 3")}, "unknown-key", "project.yaml:9:3", "scal"),
     ("unit", {P: PROJECT.replace("unit: mm", "unit: cm")}, "word", "project.yaml:8:9", "cm"),
     ("no unit", {P: PROJECT.replace("  unit: mm\n", "")}, "missing-key", "project.yaml", "`unit` is missing"),
@@ -236,10 +236,10 @@ LISTED = "photos: [1, 2, 3]\n    models: {}"
 @pytest.mark.parametrize(
     ("models", "code", "words"),
     [
-        ("['23', '12']", "wrong-center", "stands between photos 1 and 2, and has the perspective centre of 3"),
+        ("['23', '12']", "wrong-center", "is listed between photos 1 and 2, and has the perspective centre of 3"),
         ("['12']", "length", "1 models are listed for 3 photos"),
         ("['12', '32']", "unknown-model", "model 32 is not measured"),
-        ("['12', '12']", "model-twice", "model 12 stands twice in the strips"),
+        ("['12', '12']", "model-twice", "model 12 appears twice in the strips"),
     ],
 )
 def test_models_that_are_listed_wrongly(tmp_path: Path, models: str, code: str, words: str) -> None:

@@ -158,8 +158,8 @@ def test_keys_can_be_set_and_files_extended(tmp_path: Path) -> None:
         ("flight: {heading: 3}", "2:10: flight.heading", "the key `heading` is not known; did you mean `heading_deg`?"),
         ("flight: {photos: 2.5}", "2:18: flight.photos", "2.5 is not a whole number; expected a whole number"),
         ("flight: {photos: ten}", "2:18: flight.photos", "`ten` is not a number; expected a whole number"),
-        ("flight: {photos: [1]}", "2:18: flight.photos", "no number stands here; expected a whole number"),
-        ("flight: 3", "2:9: flight", "a single value stands here; expected a mapping (lines `key: value`)"),
+        ("flight: {photos: [1]}", "2:18: flight.photos", "no number is given here; expected a whole number"),
+        ("flight: 3", "2:9: flight", "a single value is given here; expected a mapping (lines `key: value`)"),
         ("control: {sigma: [1, 2]}", "2:18: control.sigma", "2 values in the list; expected 3 values"),
         (
             "camera: {preset: fil}",

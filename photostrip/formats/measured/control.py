@@ -127,5 +127,5 @@ def refuse_repeated(tables: Sequence[ControlTable | None], findings: Findings) -
             if (owner, before) != (read, int(row)):
                 where = f"{owner.table.file}:{owner.table.lines[before]}"
                 fix = "keep one, or set use to off in the other"
-                message = f"point {name} is given already in {where}"
+                message = f"point {name} is already given in {where}"
                 findings.add(read.table.fault(int(row), "point", message, "given-twice", fix=fix))

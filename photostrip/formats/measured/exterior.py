@@ -122,5 +122,5 @@ def read_orientations(
 def _refuse_repeated(table: Table, ids: Sequence[str], rows: Numbers, findings: Findings) -> None:
     """Refuse a second row of the same photo."""
     for again, before in repeated_rows(ids[row] for row in rows.tolist()):
-        message = f"photo {ids[rows[again]]} is given already, in line {table.lines[rows[before]]}"
+        message = f"photo {ids[rows[again]]} is already given, in line {table.lines[rows[before]]}"
         findings.add(table.fault(int(rows[again]), "photo", message, "given-twice", fix="keep one of the two"))

@@ -125,13 +125,13 @@ def _refuse_repeated(read: ModelTable, findings: Findings) -> None:
             if model not in reported:
                 reported.add(model)
                 message = (
-                    f"model {name} stands twice: its points begin again here, and are given already in line {line}"
+                    f"model {name} appears twice: its points begin again here, and are already given in line {line}"
                 )
-                fix = "give one of the two another id, or take it out"
+                fix = "give one of the two another id, or remove it"
                 findings.add(read.table.fault(row, "model", message, "model-twice", fix=fix))
             continue
         message = (
-            f"{read.target} {read.target_ids[read.targets[row]]} is measured in model {name} already, in line {line}"
+            f"{read.target} {read.target_ids[read.targets[row]]} is already measured in model {name}, in line {line}"
         )
         fix = "keep one of the two, or give one another id"
         findings.add(read.table.fault(row, read.target, message, "measured-twice", fix=fix))

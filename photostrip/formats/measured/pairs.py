@@ -118,7 +118,7 @@ def refuse_exchanged(read: Measurements, findings: Findings) -> bool:
         inside = (left == one) & (right == other)
         message = (
             f"photos {read.photo_ids[one]} and {read.photo_ids[other]} are exchanged in their pair: its "
-            f"{counted(int(inside.sum()), 'point')} agree with the other pairs the other way round"
+            f"{counted(int(inside.sum()), 'point')} agree with the other pairs if they are exchanged"
         )
         findings.add(read.table.fault(2 * int(np.argmax(inside)), "photo", message, "pair-exchanged", fix=FIX))
     return exchanged or bool(which)

@@ -35,7 +35,7 @@ def refuse(read: Measurements, target: str, findings: Findings) -> None:
             findings.count(read.table.file, 1)
             continue
         name, photo = read.target_ids[read.target[row]], read.photo_ids[read.photo[row]]
-        message = f"{target} {name} is measured on photo {photo} already, in line {read.table.lines[number]}"
+        message = f"{target} {name} is already measured on photo {photo}, in line {read.table.lines[number]}"
         fix = "keep one of the two, give one another id, or set `repeated: average`"
         findings.add(read.table.fault(row, target, message, "measured-twice", fix=fix))
 
@@ -108,7 +108,9 @@ def _refuse_all(
         fix = "correct `observations.unit` or `observations.sigma`"
     else:
         message = f"{head}, by {scatter:.2g}, of coordinates that reach to {reach:.4g}"
-        fix = "were photos laid in anew between two pairs, or ids given anew? reduce coordinates to the fiducial marks"
+        fix = (
+            "were photos set up again between two pairs, or points renumbered? reduce coordinates to the fiducial marks"
+        )
     findings.add(read.table.fault(int(np.argmax(far)), target, message, "measurements-disagree", fix=fix))
     return True
 
@@ -129,7 +131,7 @@ def _refuse_far(read: Measurements, target: str, ratio: Floats, group: Numbers, 
             f"{target} {name} is measured {len(rows)} times on photo {photo} (lines {lines}), up to {apart.max():g} in "
             f"{'xy'[int(apart.argmax())]} apart: {farthest[number]:.0f} standard deviations from the mean"
         )
-        fix = "take the wrong one out, or give the other point an id of its own"
+        fix = "remove the wrong one, or give the other point an id of its own"
         findings.add(read.table.fault(int(rows[-1]), target, message, "measurements-disagree", fix=fix))
 
 

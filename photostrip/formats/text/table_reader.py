@@ -176,7 +176,9 @@ class _Reader:
             for place in places:
                 del unused[place]
             for place in places[1:]:
-                message = f"column `{names[place]}` stands twice in the header (fields {places[0] + 1} and {place + 1})"
+                message = (
+                    f"column `{names[place]}` appears twice in the header (fields {places[0] + 1} and {place + 1})"
+                )
                 self._add(line, column.name, message, "duplicate-column", fix="remove or rename one")
         self._missing(unused, line)
         self._extra(unused, line)
@@ -239,9 +241,9 @@ class _Reader:
     def _unreadable(self, error: csv.Error, line: int) -> None:
         fix = ""
         if any(word in str(error) for word in ("unexpected end", "field limit")):
-            message, fix = "a quotation mark is opened and never closed", 'close it, or write `""` for one in a field'
+            message, fix = "a quotation mark is never closed", 'close it, or write `""` for one in a field'
         elif "expected after" in str(error):
-            message, fix = "something stands between a closing quotation mark and the comma", "remove it"
+            message, fix = "something appears between a closing quotation mark and the comma", "remove it"
         else:
             message = f"cannot be read as CSV ({error})"
         self._add(line, "", message, "csv", fix=fix)
@@ -349,7 +351,7 @@ class _Reader:
         padded = np.array([name != name.strip() for name in written])
         rows = np.flatnonzero(padded[codes])
         example = shown(written[codes[rows[0]]])
-        message = f"blanks around the id of a {column.name} taken off in {counted(len(rows), 'row')}, here `{example}`"
+        message = f"blanks around the id of a {column.name} removed in {counted(len(rows), 'row')}, here `{example}`"
         name = self.source.header.get(column.name, column.name)
         note = Note("stray-blanks", message, "note", file=self.source.file, line=int(lines[rows[0]]), key=name)
         self.findings.notes.append(note)

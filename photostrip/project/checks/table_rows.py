@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 IN_NO_STRIP = "its photo belongs to no strip"
 ONCE = "the point is measured on one photo only"
-NO_NEIGHBOUR = "the point is on no two neighbouring photos of one strip"
+NO_NEIGHBOUR = "the point is not on two neighbouring photos of one strip"
 IN_NO_MODEL = "its model belongs to no strip"
 NO_MODEL = "not measured in any model of the strips"
 OFF = "switched off (use: off)"

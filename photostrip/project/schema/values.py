@@ -40,7 +40,7 @@ def single(value: object, expected: str) -> str:
     """Require a single value."""
     if not isinstance(value, str):
         what = "a list" if isinstance(value, list) else "a mapping"
-        raise wrong(f"{what} stands here", code="type", expected=expected)
+        raise wrong(f"{what} is given here", code="type", expected=expected)
     if not value:
         raise wrong("no value is given", code="no-value", expected=expected, fix="write one or remove the key")
     return value
@@ -137,7 +137,7 @@ def schema_number(name: str, number: int, kind: str = "") -> Callable[[object], 
 def _whole(value: object) -> int:
     expected = "a whole number"
     if not isinstance(value, str) or not value:
-        raise wrong("no number stands here", code="type", expected=expected)
+        raise wrong("no number is given here", code="type", expected=expected)
     try:
         result = read_number(value)
     except NotANumber as why:

@@ -57,7 +57,7 @@ def parse(text: str, file: str, findings: Findings) -> Node | None:
     if bad:
         line = text.count("\n", 0, bad.start()) + 1
         column = bad.start() - text.rfind("\n", 0, bad.start())
-        message = f"the character U+{ord(bad[0]):04X} cannot stand in YAML"
+        message = f"the character U+{ord(bad[0]):04X} is not allowed in YAML"
         findings.add(Fault(message=message, code="yaml", file=file, line=line, column=column, fix="remove it"))
         return None
     builder = _Builder(file, findings)
@@ -160,7 +160,7 @@ class _Builder:
         text: str = event.value
         stripped = text.strip()
         if stripped != text and event.style in {"'", '"'}:
-            message = f"blanks around `{shown(text)}` taken off"
+            message = f"blanks around `{shown(text)}` removed"
             self.findings.notes.append(place.note("stray-blanks", message))
         return stripped
 
@@ -187,7 +187,7 @@ class _Builder:
     def _key(self, node: Node) -> tuple[str, Place]:
         place = node.place
         if not isinstance(node.value, str):
-            self._refuse(place, f"{type_names[type(node.value)]} stands as a key", "key", expected="a single word")
+            self._refuse(place, f"{type_names[type(node.value)]} is used as a key", "key", expected="a single word")
             self.sound = False
         elif not node.value:
             self._refuse(place, "a key is empty", "key", expected="a name before the colon")
@@ -202,7 +202,7 @@ class _Builder:
         first = parent.keys.get(key)
         if first is not None:
             where = f"line {first.line}" if first.line != place.line else f"column {first.column}"
-            message = f"the key `{shown(key)}` stands here for the second time, first in {where}"
+            message = f"the key `{shown(key)}` appears a second time; it is first given in {where}"
             self.findings.add(place.fault(message, "duplicate-key", key=shown(key), fix="keep one of them"))
             return
         parent.entries[key] = node
@@ -229,17 +229,17 @@ def _syntax(error: yaml.YAMLError, text: str, file: str) -> Fault:
 _PROBLEMS = (
     ("mapping values are not allowed", "a second colon, or a key where none can stand",
      "put the value between quotation marks, or correct the indentation"),
-    ("did not find expected ',' or", "a bracket is opened and not closed", "close it"),
-    ("expected ',' or", "a bracket is opened and not closed", "close it"),
-    ("did not find expected key", "the line does not fit to the one above", "indent it like its neighbours"),
-    ("did not find expected '-'", "the line does not fit to the list above", "indent it like its neighbours"),
-    ("did not find expected node content", "a value is missing or has a character that it cannot begin with",
+    ("did not find expected ',' or", "a bracket is not closed", "close it"),
+    ("expected ',' or", "a bracket is not closed", "close it"),
+    ("did not find expected key", "the line does not fit the one above", "indent it like its neighbours"),
+    ("did not find expected '-'", "the line does not fit the list above", "indent it like its neighbours"),
+    ("did not find expected node content", "a value is missing, or begins with a character that is not allowed there",
      "put the value between quotation marks"),
-    ("expected <block end>", "the line does not fit to the one above", "indent it like its neighbours"),
+    ("expected <block end>", "the line does not fit the one above", "indent it like its neighbours"),
     ("expected the node content", "a value is missing", "put the value between quotation marks"),
-    ("expected <document start>", "the line does not fit to the one above", "indent it like its neighbours"),
-    ("expected '<document start>'", "the line does not fit to the one above", "indent it like its neighbours"),
-    ("unexpected end of stream", "a quotation mark is opened and not closed", "close it"),
+    ("expected <document start>", "the line does not fit the one above", "indent it like its neighbours"),
+    ("expected '<document start>'", "the line does not fit the one above", "indent it like its neighbours"),
+    ("unexpected end of stream", "a quotation mark is not closed", "close it"),
     ("unknown escape", "a backslash between double quotation marks begins an escape",
      "use single quotation marks, or / in paths"),
     ("could not find expected ':'", "a line without a colon", "write `key: value`, with a blank after the colon"),
@@ -250,7 +250,7 @@ def _explained(problem: str, line: str, column: int) -> tuple[str, str]:
     """Turn the parser's words into the user's."""
     blank = line[: len(line) - len(line.lstrip())]
     if "\t" in blank or line[column : column + 1] == "\t":
-        return "a tab stands where YAML needs blanks", "indent with blanks"
+        return "there is a tab where YAML needs blanks", "indent with blanks"
     if "cannot start any token" in problem:
         return f"a value cannot begin with {line[column : column + 1] or 'this'}", "put it between quotation marks"
     for words, what, fix in _PROBLEMS:

@@ -76,7 +76,7 @@ def _only_photos(root: Node) -> Iterator[Fault]:
             path = ("strips", number, "camera")
             yield fault_at(root, path, "`camera` is missing", "missing-key", expected=expected)
         if strip.has("models"):
-            message, fix = "models are listed, and none are measured", "give their coordinates in `models`"
+            message, fix = "models are listed, but none are measured", "give their coordinates in `models`"
             yield fault_at(root, ("strips", number, "models"), message, "no-model", fix=fix)
 
 
@@ -102,7 +102,7 @@ def _strips(root: Node) -> Iterator[Fault]:
         name, camera = strip.word("id"), strip.word("camera")
         if name and first.setdefault(name, number) != number:
             line = root.place_of(("strips", first[name], "id")).line
-            message = f"strip {shown(name)} exists already" + (f", in line {line}" if line else "")
+            message = f"strip {shown(name)} already exists" + (f", in line {line}" if line else "")
             yield fault_at(root, ("strips", number, "id"), message, "duplicate-strip", fix="give it another id")
         if camera and known and camera not in known:
             message = f"there is no camera `{shown(camera)}`"
@@ -121,7 +121,7 @@ def _photos(root: Node) -> Iterator[Fault]:
         strip = root.word("strips", before[1], "id") or str(before[1])
         place = root.place_of(before)
         where = f"{place.file}:{place.line}:{place.column}" if place.line else place.file
-        message = f"photo {shown(photo.id)} is listed already, in strip {shown(strip)} ({where})"
+        message = f"photo {shown(photo.id)} is already listed, in strip {shown(strip)} ({where})"
         yield fault_at(root, photo.path, message, "duplicate-photo", fix="list every photo once")
 
 
@@ -144,7 +144,7 @@ def _cameras(root: Node) -> Iterator[Fault]:
         path = ("cameras", name)
         marks = marks_of(camera)
         if marks is not None and len(marks.entries) == 1:
-            message = "one mark alone does not orient a photo"
+            message = "one mark alone cannot orient a photo"
             yield fault_at(root, (*path, "fiducials"), message, "length", expected="at least 2 marks")
         if name not in used or not isinstance(camera.value, dict):
             continue
@@ -191,7 +191,7 @@ def _curvature(root: Node) -> Iterator[Fault]:
     systems = [each.word("crs") for each in root.list_at("control")]
     curved = next((crs for crs in [*systems, root.word("output", "crs")] if crs not in {"", "local"}), "")
     if curved:
-        message = f"Earth curvature would be counted twice: coordinates in {shown(curved)} carry it already"
+        message = f"Earth curvature would be counted twice: coordinates in {shown(curved)} already carry it"
         fix = "remove earth_curvature, or give plane coordinates of an unknown projection as `crs: local`"
         path = ("processing", "earth_curvature")
         yield fault_at(root, path, message, "curvature-twice", expected="auto", fix=fix)
@@ -222,6 +222,6 @@ def _camera_positions(root: Node) -> Iterator[Fault]:
     for section in ("camera_positions", "orientations"):
         crs = root.word(section, "crs")
         if crs not in {"", "local"}:
-            message = f"Earth curvature would be counted twice: {section} in {shown(crs)} carry it already"
+            message = f"Earth curvature would be counted twice: {section} in {shown(crs)} already carry it"
             fix = "remove earth_curvature, or give the positions in the `local` frame of the control"
             yield fault_at(root, (section, "crs"), message, "curvature-twice", expected="local", fix=fix)

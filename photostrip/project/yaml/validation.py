@@ -82,7 +82,7 @@ def _unknown(schema: Model, root: Node, path: Path) -> Fault:
     known = list(_fields_at(schema, path[:-1]))
     fix = suggestion(name, known)
     if not fix and name in homes(schema):
-        fix = f"`{name}` belongs into `{homes(schema)[name]}`"
+        fix = f"`{name}` belongs in `{homes(schema)[name]}`"
     message = f"the key `{shown(name)}` is not known"
     expected = "" if fix else f"one of {', '.join(known)}"
     return place.fault(message, "unknown-key", key=key_path(path), expected=expected, fix=fix)
@@ -91,7 +91,7 @@ def _unknown(schema: Model, root: Node, path: Path) -> Fault:
 def _wrong_type(root: Node, path: Path, expected: str) -> Fault:
     node = root.find(*path)
     value = node.value if node is not None else ""
-    message = "no value is given" if value == "" else f"{type_names[type(value)]} stands here"
+    message = "no value is given" if value == "" else f"{type_names[type(value)]} is given here"
     return fault_at(root, path, message, "type", expected=expected)
 
 

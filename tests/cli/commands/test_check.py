@@ -264,7 +264,7 @@ def test_every_row_is_accounted_for(tmp_path: Path) -> None:
     assert told["observations.csv"] == [
         ("its photo belongs to no strip", ["9999"], 10),
         ("the point is measured on one photo only", ["lonely"], 11),
-        ("the point is on no two neighbouring photos of one strip", ["apart"], 12),
+        ("the point is not on two neighbouring photos of one strip", ["apart"], 12),
     ]
     assert told["fiducials.csv"] == [("its photo belongs to no strip", ["9999"], 10)]
     assert told["control.csv"] == [
@@ -340,7 +340,7 @@ def test_notes_of_a_run_know_their_place(tmp_path: Path, project: Path, capsys: 
     _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml", "--format", "github")
     assert out.startswith("::warning file=observations.csv,line=2,title=photostrip photo-in-no-strip::")
     _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml")
-    assert "- warning: observations.csv:2: 1 row of 1 photo in no strip not used: IMG_1" in out
+    assert "observations.csv:2: 1 row of 1 photo in no strip is not used: IMG_1" in out
 
 
 # ----------------------------------------------------------------------------------------- the environment

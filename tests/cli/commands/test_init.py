@@ -98,7 +98,7 @@ def test_nothing_is_overwritten(tmp_path: Path, name: str, capsys: pytest.Captur
     (tmp_path / name).write_text("mine", encoding="utf-8")
     code, _, err = call(capsys, "init", tmp_path)
     assert code == 2
-    assert err.startswith(f"error: {tmp_path}/{name}: exists already and is not overwritten")
+    assert err.startswith(f"error: {tmp_path}/{name}: already exists and is not overwritten")
     assert [path.name for path in tmp_path.iterdir()] == [name]
     assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
 

@@ -139,7 +139,7 @@ def test_paths_of_overrides_are_relative_to_the_project(tmp_path: Path, monkeypa
         ),
         ("processing.relative.grubbs_alpha=5", "--set: processing.relative.grubbs_alpha: 5 is out of range"),
         ("processing.relative.grubbs_alpha=", "--set: processing.relative.grubbs_alpha: no value is given"),
-        ("processing.adjustment=[a", "--set:1:1: a bracket is opened and not closed"),
+        ("processing.adjustment=[a", "--set:1:1: a bracket is not closed"),
         ("processing.adjustment=*x", "--set:1:1: the alias *x"),
         ("nothing", "--set: `nothing` sets nothing; expected key.path=value"),
         ("=5", "--set: `=5` sets nothing"),
