@@ -41,6 +41,8 @@ class FrameSpec:
     ellipsoid: Ellipsoid | None = None
     # radius R of the curvature correction (eq. 153), metres. Only for ``local``; None: no correction
     curvature_radius: float | None = None
+    # decimal year of the coordinates, for frames in which the ground moves (ITRF, WGS 84)
+    epoch: float | None = None
 
     def __post_init__(self) -> None:
         """Turn lists, as a project file has them, into tuples."""

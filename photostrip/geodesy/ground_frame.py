@@ -217,6 +217,11 @@ class GroundFrame:
         return 0.0 if self._shift is None else self._shift.operation.accuracy
 
     @property
+    def datum_change(self) -> DatumShift | None:
+        """Datum shift to the Cartesian frame; None where there is none."""
+        return self._shift
+
+    @property
     def grids(self) -> tuple[str, ...]:
         """Paths of the grid files that are read for the heights and the datum shift; known after the first use."""
         shift = None if self._shift is None else self._shift.operation

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
 
 
+EARTH_RADIUS = 6.37e6  # metres
+DECADE = 10.0  # years
+
+
 @cache
 def load_pyproj() -> Any:  # noqa: ANN401 (a module; pyproj does not say what it exports)
     """Load pyproj at first need, its network access off: a run must not depend on what a server sends."""
@@ -41,13 +45,14 @@ class ProjOperation:
     of the first points is kept.
     """
 
-    def __init__(self, source: CRS, target: CRS) -> None:
+    def __init__(self, source: CRS, target: CRS, epoch: float | None = None) -> None:
         self._ends = (source, target)
+        self.epoch = epoch  # decimal year of the coordinates; None: that to which the operation refers
         self._decided_by: tuple[Floats, bool] | None = None  # the point, and whether it went the inverse way
 
     def __getstate__(self) -> dict[str, Any]:
         """Keep what the operation is made from: PROJ's own object cannot be sent to another process."""
-        return {"_ends": self._ends, "_decided_by": self._decided_by}
+        return {"_ends": self._ends, "_decided_by": self._decided_by, "epoch": self.epoch}
 
     @cached_property
     def transformer(self) -> Transformer:
@@ -69,7 +74,33 @@ class ProjOperation:
             self._decided_by = columns[len(columns) // 2], inverse
             self.transformer = _used(self.transformer, columns[len(columns) // 2], inverse=inverse)
         rows = np.repeat(columns, 2, axis=0) if len(columns) == 1 else columns  # pyproj 3.6 takes one row for numbers
-        return np.stack(_run(self.transformer, rows.T, inverse=inverse), axis=-1)[: len(columns)]
+        return self._run(rows, self.epoch, inverse=inverse)[: len(columns)]
+
+    def _run(self, rows: Floats, epoch: float | None, *, inverse: bool) -> Floats:
+        """Transform rows with the coordinates of an epoch."""
+        dated = rows if epoch is None else np.column_stack([rows, np.full(len(rows), epoch)])
+        return np.stack(_run(self.transformer, dated.T, inverse=inverse), axis=-1)[:, : rows.shape[1]]
+
+    @property
+    def area(self) -> str:
+        """Where the operation is made for, in PROJ's words; empty when it does not say."""
+        return str(getattr(self.transformer.area_of_use, "name", "") or "").partition(":")[0].rstrip(".")
+
+    @property
+    def reference_epoch(self) -> float | None:
+        """Epoch to which a time-dependent operation refers; None where time changes nothing."""
+        stated = re.findall(r"\bt_epoch=(\S+)", self.transformer.definition)
+        return float(stated[-1]) if stated else None
+
+    def moved_per_year(self) -> Floats:
+        """By how much the result moves in a year at the first point, in the units of the CRS it leads to."""
+        reference = self.reference_epoch
+        if reference is None or self._decided_by is None:
+            return np.zeros(3)
+        point, inverse = self._decided_by
+        rows = np.tile(point, (2, 1))
+        first, last = (self._run(rows, epoch, inverse=inverse)[0] for epoch in (reference, reference + DECADE))
+        return np.asarray((last - first) / DECADE, float)
 
     @property
     def accuracy(self) -> float | None:
@@ -150,6 +181,12 @@ class DatumShift:
     def forward(self, geodetic: Floats) -> Floats:
         """From the frame's own datum to that of the Cartesian frame."""
         return geodetic if self.operation.idle else self._apply(geodetic, inverse=False)
+
+    @property
+    def moved_per_year(self) -> float:
+        """By how much the result moves in a year, metres, about."""
+        east, north, up = self.operation.moved_per_year()
+        return float(np.hypot(np.hypot(east, north) * self.target_unit * EARTH_RADIUS, up))
 
     def inverse(self, geodetic: Floats) -> Floats:
         """Undo ``forward``.

@@ -93,6 +93,12 @@ def _check_together(wanted: list[tuple[str, FrameSpec]], parts: dict[FrameSpec, 
                 f"the curvature correction differs from that of {first_path}: it counts before and after, or never"
             )
             faults.append(Fault(message, code="curvature-once", key=f"{path}.crs"))
+    dated = [(path, spec.epoch) for path, spec in wanted if spec.epoch is not None]
+    for path, epoch in dated[1:]:
+        if epoch != dated[0][1]:
+            message = f"coordinates of {epoch:g} stand beside those of {dated[0][1]:g} of {dated[0][0]}"
+            fix = "bring them to one epoch: photostrip moves no points from one to another"
+            faults.append(Fault(message, code="epochs", key=f"{path}.epoch", fix=fix))
 
 
 def _build_all(
@@ -102,6 +108,7 @@ def _build_all(
     frames: dict[FrameSpec, GroundFrame] = {}
     shifts: list[tuple[CrsParts, DatumShift]] = []
     out = parts[target]
+    epoch = next((spec.epoch for _, spec in wanted if spec.epoch is not None), None)
     for path, spec in wanted:
         crs, shift = parts[spec], None
         if spec in frames:
@@ -111,7 +118,7 @@ def _build_all(
             if crs.kind != "local" and crs is not out and not _same_datum(crs, out):
                 shift = next((made for other, made in shifts if _same_datum(crs, other)), None)
                 if shift is None:
-                    shift = _datum_shift(spec, crs, target, out)
+                    shift = _datum_shift(spec, crs, target, out, epoch)
                     shifts.append((crs, shift))
         except Refusal as refusal:
             faults.append(refusal.at(path))
@@ -160,9 +167,9 @@ def _same_datum(one: CrsParts, other: CrsParts) -> bool:
     return first is not None and second is not None and first.longitude == second.longitude
 
 
-def _datum_shift(spec: FrameSpec, crs: CrsParts, target: FrameSpec, out: CrsParts) -> DatumShift:
+def _datum_shift(spec: FrameSpec, crs: CrsParts, target: FrameSpec, out: CrsParts, epoch: float | None) -> DatumShift:
     """Find the PROJ operation from one datum to that of the Cartesian frame; refused when there is no sound one."""
-    operation = ProjOperation(crs.shift_end, out.shift_end)
+    operation = ProjOperation(crs.shift_end, out.shift_end, epoch)
     trouble, missing = trouble_with(operation), missing_named_grids(crs) or missing_named_grids(out)
     if not trouble and not missing:
         return DatumShift(operation, crs.angle, out.angle)

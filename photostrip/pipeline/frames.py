@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Inputs, Settings
 
+EPOCH_UNKNOWN = 10.0  # years by which an epoch that is not given may differ from that of an operation
 CAMERAS = ("camera_positions", "orientations")  # keys of what may be given of cameras
 
 
@@ -89,6 +92,36 @@ def _nothing_given(inputs: Inputs) -> bool:
     given = any(yes and name in measured for name, yes in zip(control.ids, counts.tolist(), strict=True))
     cameras = any(each is not None and each.photos for each in (inputs.positions, inputs.orientations))
     return not given and not cameras
+
+
+def datum_notes(inputs: Inputs, ground: GroundFrames) -> Iterator[Note]:
+    """Say by which operation coordinates go from one datum to another, and where an epoch is missing."""
+    control = inputs.control
+    sigma_of = {f"control[{number}]": control.sigma[control.frame == number] for number in range(len(ground.control))}
+    frames = {f"control[{number}]": frame for number, frame in enumerate(ground.control)}
+    for key, frame, given in zip(
+        CAMERAS, (ground.positions, ground.orientations), (inputs.positions, inputs.orientations), strict=True
+    ):
+        if frame is not None and given is not None:
+            frames[key], sigma_of[key] = frame, given.sigma
+    for key, frame in frames.items():
+        shift = frame.datum_change
+        if shift is None:
+            continue
+        operation, title = shift.operation, f"{frame.title} to {ground.output.title}"
+        epoch, reference = operation.epoch, operation.reference_epoch
+        text = f"{key}: {title} by {operation}" + (f", made for {operation.area}" if operation.area else "")
+        if reference is not None:
+            text += f"; coordinates of {epoch or reference:.1f}"
+        yield Note("datum-change", text, severity="note", key=f"{key}.crs")
+        sigma = sigma_of[key][(sigma_of[key] > 0) & np.isfinite(sigma_of[key])]
+        moved = shift.moved_per_year
+        if epoch is None and len(sigma) and EPOCH_UNKNOWN * moved > float(np.median(sigma)):
+            text = (
+                f"{key}: {title}: coordinates move by {100 * moved:.1f} cm a year between them, and no `epoch` is "
+                f"given: that of the operation, {reference:.1f}, is taken"
+            )
+            yield Note("epoch-missing", text, key=f"{key}.epoch")
 
 
 def curvature_notes(inputs: Inputs, settings: Settings) -> Iterator[Note]:

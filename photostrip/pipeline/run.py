@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.pipeline.common_points import join_strips
 from photostrip.pipeline.cross_validation import cross_validate
-from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, tie_ground_frames
+from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
 from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
 from photostrip.pipeline.not_determined import not_determined
@@ -91,6 +91,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
                 *(photo.interior.notes if photo.interior is not None else ()),
                 *adjusted.notes,
                 *curvature_notes(inputs, settings),
+                *datum_notes(inputs, ground),
                 *unchecked_control_notes(adjusted, settings.bundle.power),
             ),
             precision=adjusted.precision,

@@ -170,6 +170,7 @@ def frame_spec(given: GivenList) -> FrameSpec:
         axes=given.axes or CARTESIAN_AXES,
         height=given.height,
         geoid_undulation=given.geoid_undulation,
+        epoch=given.epoch,
         ellipsoid=semi_axes(given.ellipsoid),
     )
 
@@ -192,7 +193,7 @@ def first_frame(project: ProjectFile) -> FrameSpec:
 
 def output_spec(output: Output, first: FrameSpec) -> FrameSpec | None:
     """Return the frame of the results, `first` standing in for what is not given; None when nothing is given."""
-    said = (output.crs, output.axes, output.height, output.geoid_undulation, output.ellipsoid)
+    said = (output.crs, output.axes, output.height, output.geoid_undulation, output.epoch, output.ellipsoid)
     if all(each is None for each in said):
         return None
     if output.crs is None:
@@ -201,12 +202,14 @@ def output_spec(output: Output, first: FrameSpec) -> FrameSpec | None:
             spec = replace(spec, height=output.height, geoid_undulation=None)
         if output.geoid_undulation is not None:
             spec = replace(spec, geoid_undulation=output.geoid_undulation)
+        spec = replace(spec, epoch=output.epoch or first.epoch)
         return spec if output.ellipsoid is None else replace(spec, ellipsoid=semi_axes(output.ellipsoid))
     return FrameSpec(
         crs=str(output.crs),
         axes=output.axes or (CARTESIAN_AXES if output.crs == "geocentric" else GROUND_AXES),
         height=output.height or "ellipsoidal",
         geoid_undulation=output.geoid_undulation,
+        epoch=output.epoch,
         ellipsoid=semi_axes(output.ellipsoid),
     )
 

@@ -92,6 +92,7 @@ def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
         "axes": spec.axes,
         "height": spec.height,
         "geoid_undulation": spec.geoid_undulation,
+        "epoch": spec.epoch,
         "ellipsoid": ellipsoid,
     }
     filled: dict[str, Any] = {

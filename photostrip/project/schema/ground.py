@@ -27,6 +27,7 @@ USUAL = Settings()
 CRS = "An authority code (`EPSG:32633`), a PROJ string, WKT, `geocentric`, or `local` (right-handed, metres)"
 SIGMA = "Standard deviations of rows without sx, sy, sz, in the order of `axes`"
 UNDULATION: Any = key("Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m")
+EPOCH: Any = key("Decimal year of the coordinates, for frames in which the ground moves (ITRF, WGS 84)", None, unit="a")
 ELLIPSOID: Any = key("Ellipsoid of geocentric coordinates; default: WGS 84", None)
 
 
@@ -47,6 +48,7 @@ class GivenList(Section):
     )
     height: Height = key("`ellipsoidal` or `orthometric`", "ellipsoidal")
     geoid_undulation: Number | None = UNDULATION
+    epoch: Positive | None = EPOCH
     ellipsoid: Ellipsoid | None = ELLIPSOID
 
     @model_validator(mode="after")
@@ -124,5 +126,6 @@ class Output(Section):
         "`ellipsoidal` or `orthometric`; default: that of the first control list, or ellipsoidal", None
     )
     geoid_undulation: Number | None = UNDULATION
+    epoch: Positive | None = EPOCH
     ellipsoid: Ellipsoid | None = ELLIPSOID
     angles: Angles = key("Angles of the exterior orientations", Angles.model_construct())
