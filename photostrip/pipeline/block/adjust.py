@@ -14,13 +14,13 @@ from photostrip.pipeline.block import start as block_start
 from photostrip.pipeline.block.check_points import check_errors
 from photostrip.pipeline.block.datum import known_of
 from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart, Bundle, SinglePhoto
+from photostrip.triangulation.bundle.common_errors import taken_up
 from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.correlations import Correlation, correlations
 from photostrip.triangulation.bundle.selection import restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.rays import snooping
-from photostrip.triangulation.gross_errors.rays.common_errors import taken_up
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

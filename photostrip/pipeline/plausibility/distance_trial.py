@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.results import StripResult
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.gross_errors.control.height_stretch import StretchedHeights
     from photostrip.triangulation.plausibility.control.control_heights import HeightStretch
+    from photostrip.triangulation.plausibility.control.stretched_heights import StretchedHeights
     from photostrip.triangulation.plausibility.finding import Evidence
 
     Compare = Callable[[EvidenceStrip], HeightStretch | None]
@@ -102,7 +102,7 @@ def find_stretched(strips: Sequence[StripResult], findings: Sequence[Finding]) -
     named = {name for each in findings if each.severity == ERROR or each.code == "P107" for name in each.strips}
     found_now = []
     for each in strips:
-        stretch, strip = each.screened_control.stretch, each.of_photos.strip if each.photo_stages else None
+        stretch, strip = each.stretch, each.of_photos.strip if each.photo_stages else None
         if stretch is not None and strip is not None and strip.id not in named:
             found_now.append(_stretched(strip, stretch))
     return found_now

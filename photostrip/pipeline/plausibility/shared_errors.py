@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.triangulation.bundle.common_errors import ALL, DISTANCE, DRIFT
 from photostrip.triangulation.bundle.observations.given_orientations import drift_columns
-from photostrip.triangulation.gross_errors.rays.common_errors import ALL, DISTANCE, DRIFT
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control.control_heights import LEAST_SCALE_ERROR
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.results import Bundle
+    from photostrip.triangulation.bundle.common_errors import CommonError
     from photostrip.triangulation.bundle.quality.self_calibration import Parameter
-    from photostrip.triangulation.gross_errors.rays.common_errors import CommonError
 
 SHOWN_SIGMAS = 4.0  # standard deviations from which a group, or a camera, is named
 KEY = "camera_positions.correction"

@@ -5,7 +5,7 @@ Source: [001] eq. 142-149.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
@@ -18,8 +18,8 @@ from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Strip
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.gross_errors.control.height_stretch import find_stretch
 from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay, StripAtControl
+from photostrip.triangulation.plausibility.control.stretched_heights import find_stretch
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
+    from photostrip.triangulation.plausibility.control.stretched_heights import StretchedHeights
     from photostrip.triangulation.polynomial.correction import Polynomial
 
 
@@ -148,6 +149,7 @@ class ScreenedStrip(Generic[Errors]):
 
     oriented: OrientedStrip[Errors]
     screened_control: ScreenedControl
+    stretch: StretchedHeights | None = None  # what all control shares, found before points were tested one by one
 
 
 def orient_on_control(
@@ -189,7 +191,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
     )
     stretch = find_stretch(place) if isinstance(stage.strip, Strip) else None
     if stretch is not None:  # single points prove nothing then
-        return ScreenedStrip(oriented, replace(control_screening.not_screened(control), stretch=stretch))
+        return ScreenedStrip(oriented, control_screening.not_screened(control), stretch)
     screened = control_screening.screen_control(place)
     if screened.rejections:
         oriented = to_ground(stage, screened.kept, oriented.control_rows, oriented.frames)

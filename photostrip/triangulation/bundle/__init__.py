@@ -1,8 +1,9 @@
 """Bundle adjustment: all rays of all photos with control and camera positions in one least-squares solution.
 
 In comes a ``BundleProblem`` (``observations.problem``), out come a ``BundleSolution`` and its ``Cofactors``: ``solve``
-leads from the one to the other over the reduced ``normal_equations``; ``snooping`` takes gross errors out,
-``quality`` says how good everything is. Arrays in, arrays out: frames, ids and files are the business of the pipeline.
+leads from the one to the other over the reduced ``normal_equations``; ``common_errors`` finds what groups of given
+coordinates share, ``quality`` says how good everything is. Arrays in, arrays out: frames, ids and files are the
+business of the pipeline.
 
 Source: [Granshaw 1980]; step control after [Marquardt 1963].
 """

@@ -7,7 +7,7 @@ number: the share of an error of the observation that shows in its own residual.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.settings import BundleSettings
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"
@@ -134,3 +135,26 @@ def sigma0_test(solution: BundleSolution) -> Sigma0Test:
     ends = (chi2_quantile(p, f) for p in (SIGMA0_LEVEL / 2, 1 - SIGMA0_LEVEL / 2))
     lower, upper = (float(np.sqrt(end / f)) for end in ends)
     return Sigma0Test(sigma0=solution.sigma0, redundancy=f, lower=lower, upper=upper)
+
+
+class Limit(NamedTuple):
+    """What a point is tested against."""
+
+    value: float  # largest standardised residual of a coordinate
+    alpha: float  # probability that the test of one good coordinate, or of rays that agree, rejects them
+    unit: float  # standard deviation of unit weight in force
+
+
+def limit_of(solution: BundleSolution, settings: BundleSettings, established: int) -> Limit:
+    """Limit of standardised residuals: never sharper than the stated standard deviations allow.
+
+    Without errors all tests together, as many as there are conditions, have the level q of the settings. With many
+    errors q is the part of the rejections that are false: with k of m hypotheses rejected the next is tested at
+    i q / (m + 1 - i (1 - q)), i = k + 1, and m - k conditions are left. Source: [Gavrilov 2009].
+    """
+    share = settings.level * (established + 1)
+    alpha = share / (max(solution.redundancy, 1) + share) if settings.alpha is None else settings.alpha
+    stated = Limit(normal_quantile(1 - alpha / 2), alpha, 1.0)
+    if settings.test != "tau" or not sigma0_test(solution).too_large:
+        return stated
+    return Limit(limit("tau", alpha, solution.redundancy), alpha, solution.sigma0)

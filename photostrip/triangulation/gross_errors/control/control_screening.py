@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from photostrip.points import ControlPoints
     from photostrip.rejection import Rejection
     from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
-    from photostrip.triangulation.gross_errors.control.height_stretch import StretchedHeights
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 
@@ -51,7 +50,6 @@ class ScreenedControl:
     # 80 % of cases, infinite where none is; NaN without a test
     redundancy: Floats
     detectable: Floats
-    stretch: StretchedHeights | None = None  # what all of it shares, found before points were tested one by one
 
 
 def screen_control(strip: StripAtControl) -> ScreenedControl:

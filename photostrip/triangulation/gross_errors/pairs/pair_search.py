@@ -20,10 +20,10 @@ import numpy as np
 from photostrip.rejection import Rejection
 from photostrip.triangulation.gross_errors.pairs import deletion
 from photostrip.triangulation.gross_errors.pairs.global_test import FIFTH_WRONG, GlobalTest, ParallaxScatter
-from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT, Support
 from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again
 from photostrip.triangulation.relative_orientation.robust import RobustElements, orient_robustly
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes
+from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT, Support
 from photostrip.triangulation.robust import TUNING, scales
 
 if TYPE_CHECKING:

@@ -22,7 +22,6 @@ from photostrip.errors import InputError
 from photostrip.statistics import grubbs_limit, tau_limit
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, rejection, search
-from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT, Support, zones
 from photostrip.triangulation.relative_orientation.orientation import (
     LEAST_IN_FRONT,
     RelativeSettings,
@@ -31,6 +30,7 @@ from photostrip.triangulation.relative_orientation.orientation import (
 )
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import base_rays, in_front_of_cameras, rays_meet_in_front
+from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT, Support, zones
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.triangulation.bundle.quality import reliability
+from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST
 
@@ -26,37 +25,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.bundle.settings import BundleSettings
-    from photostrip.triangulation.bundle.solution import BundleSolution
+    from photostrip.triangulation.bundle.quality.reliability import Limit
 
 
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
 ROUNDING = 1e-9  # keeps a point that holds its photos alone from stopping the others
 WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
 """What was found at a point: its wrong rays; two rays that contradict each other; several of which any may be wrong."""
-
-
-class Limit(NamedTuple):
-    """What a point is tested against."""
-
-    value: float  # largest standardised residual of a coordinate
-    alpha: float  # probability that the test of one good coordinate, or of rays that agree, rejects them
-    unit: float  # standard deviation of unit weight in force
-
-
-def limit_of(solution: BundleSolution, settings: BundleSettings, established: int) -> Limit:
-    """Limit of standardised residuals: never sharper than the stated standard deviations allow.
-
-    Without errors all tests together, as many as there are conditions, have the level q of the settings. With many
-    errors q is the part of the rejections that are false: with k of m hypotheses rejected the next is tested at
-    i q / (m + 1 - i (1 - q)), i = k + 1, and m - k conditions are left. Source: [Gavrilov 2009].
-    """
-    share = settings.level * (established + 1)
-    alpha = share / (max(solution.redundancy, 1) + share) if settings.alpha is None else settings.alpha
-    stated = Limit(normal_quantile(1 - alpha / 2), alpha, 1.0)
-    if settings.test != "tau" or not reliability.sigma0_test(solution).too_large:
-        return stated
-    return Limit(reliability.limit("tau", alpha, solution.redundancy), alpha, solution.sigma0)
 
 
 @dataclass(frozen=True, eq=False)

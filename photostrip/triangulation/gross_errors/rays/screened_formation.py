@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS
 from photostrip.triangulation.relative_orientation.orientation import orient_again
+from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT
 from photostrip.triangulation.strip_formation import non_neighbours
 from photostrip.triangulation.strip_formation.strip import form_from_pairs, without_rows
 

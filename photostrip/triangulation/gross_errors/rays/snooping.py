@@ -19,21 +19,19 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.rejection import Rejection
 from photostrip.triangulation.bundle import robust
+from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.gross_errors.rays.common_errors import CommonError, find_common_error, taken_up
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
     SEVERAL_RAYS,
     Decision,
-    Limit,
     PointRays,
     cause_of_all,
     decide,
-    limit_of,
     undecided,
 )
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
@@ -44,6 +42,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.quality.reliability import Limit
     from photostrip.triangulation.bundle.settings import BundleSettings
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
@@ -76,7 +75,7 @@ class ScreenedBundle:
             selection=selection,
             solution=solution,
             precision=cofactors_of(solution),
-            limit=limit_of(solution, settings, _established(problem, selection)),
+            limit=reliability.limit_of(solution, settings, _established(problem, selection)),
         )
 
     @cached_property

@@ -18,9 +18,9 @@ from photostrip.triangulation.bundle.observations.problem import (
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.gross_errors.pairs.global_test import ALPHA, FIFTH_WRONG
-from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT
 from photostrip.triangulation.gross_errors.rays.snooping import screen_bundle
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT
 from photostrip.triangulation.robust import MEDIAN_SPREAD, scales
 from photostrip.triangulation.strip_formation.strip import mean_points
 

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result
-    from photostrip.triangulation.gross_errors.rays.point_decisions import Decision, Limit, PointRays
+    from photostrip.triangulation.bundle.quality.reliability import Limit
+    from photostrip.triangulation.gross_errors.rays.point_decisions import Decision, PointRays
     from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from tests.strips import Flown

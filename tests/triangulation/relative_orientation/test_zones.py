@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.triangulation.gross_errors.pairs.zones import Support, zones
+from photostrip.triangulation.relative_orientation.zones import Support, zones
 from tests.strips import true_pairs
 
 if TYPE_CHECKING:

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
     from photostrip.rejection import Rejection
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.quality.reliability import Limit
     from photostrip.triangulation.bundle.solution import BundleSolution
-    from photostrip.triangulation.gross_errors.rays.point_decisions import Limit
 
 OFFSET, DRIFT, DISTANCE = "offset", "drift", "principal distance"
 ALL = "all"  # positions of all groups share one error
