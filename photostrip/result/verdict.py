@@ -205,7 +205,7 @@ def _cross_validation(document: Document) -> Iterator[str]:
             if (part := found[name])["count"]
         ]
         yield (
-            "control points left out in turn are farther off than the standard deviations of the points let expect: "
+            "control points left out in turn are farther off than expected from the standard deviations of the points: "
             f"{'; '.join(said)}; probability {_percent(found['p'])} by chance"
         )
 

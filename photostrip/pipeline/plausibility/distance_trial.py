@@ -114,7 +114,7 @@ def _stretched(strip: Strip, stretch: StretchedHeights) -> Finding:
     message = (
         f"the heights of strip {strip.id} are stretched by {100 * stretch.share:+.2f} % against its control, as by a "
         f"wrong principal distance: {given * factor:.2f} mm would fit (standard deviation {sigma:.2g} mm), "
-        f"{given:g} mm are given; no control was tested by itself"
+        f"{given:g} mm is given; no control was tested by itself"
     )
     evidence_: Evidence = {
         "heights_stretched": stretch.share,
@@ -159,7 +159,7 @@ def _finding(strip: Strip, ratio: float, how: str, numbers: Evidence) -> list[Fi
     if abs(ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
         return []
     given = strip.camera.principal_distance
-    message = f"strip {strip.id} {how} with a principal distance of {given * ratio:.1f} mm; {given:g} mm are given"
+    message = f"strip {strip.id} {how} with a principal distance of {given * ratio:.1f} mm; {given:g} mm is given"
     evidence_ = numbers | {"principal_distance_mm": given, "would_fit_mm": given * ratio}
     key = f"cameras.{strip.camera.name}.principal_distance"
     return [found("P105", message, "take it from the certificate", evidence_, strips=(strip.id,), key=key)]

@@ -172,7 +172,7 @@ def _spread(points: Floats) -> float:
 def _other_height(strip: Strip, plan: LevelPlan, photos: Sequence[str], depth: Floats, wanted: Floats) -> Finding:
     message = (
         f"the perspective centres of strip {strip.id} are given {np.median(depth):.4g} m above the control, and the "
-        f"scale of the photos asks for {np.median(wanted):.4g} m"
+        f"scale of the photos requires {np.median(wanted):.4g} m"
     )
     numbers = {"given_above_control_m": float(np.median(depth)), "by_photo_scale_m": float(np.median(wanted))}
     fix = "are their heights in another unit, or of another vertical datum? or is the principal distance wrong?"

@@ -43,9 +43,9 @@ def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
     given = next(each.camera.principal_distance for each in inputs.strips if each.camera.name == parameter.camera)
     would_fit = given + parameter.value
     message = (
-        f"control and camera positions go with the photos of camera {parameter.camera} at a principal distance of "
-        f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {given:g} mm are given. The adjustment "
-        "went on with the one that fits"
+        f"control and camera positions agree with the photos of camera {parameter.camera} at a principal distance of "
+        f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {given:g} mm is given. The adjustment "
+        "continued with the one that fits"
     )
     evidence = {"principal_distance_mm": given, "would_fit_mm": would_fit, "standard_deviation_mm": parameter.sigma}
     fix = "take it from the certificate; if that agrees with what is given, name it in `self_calibration`"
@@ -85,7 +85,7 @@ def _finding(
         message += f", and drift by {_steps(drift, axes)} from the first to the last"
         evidence |= {f"drift_{axis}_m": float(each) for axis, each in zip(axes, drift, strict=True)}
         correction = "drift"
-    message += f"; the adjustment went on as with `correction: {correction}`"
+    message += f"; the adjustment continued as with `correction: {correction}`"
     if error.rival:
         message += ". A wrong principal distance would explain it nearly as well"
     fix = (

@@ -76,7 +76,7 @@ def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> Plan
 
     w: (n,), places of the points in the upright strip.
     plan: (n,), given places E + iN, metres.
-    Returns none for fewer than three points, or when all stand at one place.
+    Returns none for fewer than three points, or when all lie at the same place.
     """
     if len(w) < LEAST_POINTS:
         return None

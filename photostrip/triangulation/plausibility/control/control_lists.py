@@ -81,7 +81,7 @@ def _other_frame(
 ) -> Finding:
     """Say how a list differs from the largest one: its shift, and its scale where that is known."""
     evidence: Evidence = {"points": len(names), "offset_east_m": shift.real, "offset_north_m": shift.imag}
-    head = f"control[{number}] does not go with control[{first}] on strip {on_strip.strip}"
+    head = f"control[{number}] does not agree with control[{first}] on strip {on_strip.strip}"
     key = f"control[{number}]"
     if scale is not None:
         evidence["scale_against_other_list"] = scale

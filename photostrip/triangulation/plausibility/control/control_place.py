@@ -90,7 +90,7 @@ def _readings(level: Floats) -> Iterator[tuple[str, Floats, str, str]]:
     yield "P403", level[:, [1, 0, 2]] * FOOT, "read as feet with exchanged axes it would lie there", feet
     zone = level.copy()
     zone[:, 0] -= np.floor(zone[:, 0] / MILLION) * MILLION
-    prefixed = "without the millions of its eastings it would lie there: they are the number of a zone"
+    prefixed = "without the millions of its eastings it would lie there: they are a zone number"
     yield "P402", zone, prefixed, "name the crs of that zone, as of Gauss-Kruger zones"
     yield (
         "P402",

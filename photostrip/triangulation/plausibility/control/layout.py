@@ -43,8 +43,8 @@ def find_weak_ends(place: Floats, photos: Sequence[str], strip: str, ids: Sequen
     if high - low < ONE_END_SHARE * last and (at_begin or at_end):
         end = "beginning" if at_begin else "end"
         message = (
-            f"strip {strip}: all control lies at its {end}, within {high - low:.1f} of {last} bases; from there the "
-            "strip hangs free, its errors grow with the 1.5th power of the length"
+            f"strip {strip}: all control lies at its {end}, within {high - low:.1f} of {last} bases; beyond it the "
+            "strip is unsupported, and its errors grow with the 1.5th power of the length"
         )
         fix = "add control at the other end"
         yield found("P501", message, fix, evidence, points=ids, strips=(strip,))
@@ -76,7 +76,7 @@ def find_line(
     if breadth > LEAST_BREADTH:
         return
     message = (
-        f"{what}: its control stands on one line, {100 * breadth:.2g} % of half the breadth of "
+        f"{what}: its control lies on one line, {100 * breadth:.2g} % of half the breadth of "
         f"{'a' if len(strips) > 1 else 'the'} strip to either side: an error of a height turns the "
         f"{'block' if len(strips) > 1 else 'strip'} about it"
     )

@@ -22,7 +22,7 @@ MOST_X_OVER_Y = 5.0  # times the y parallax: how large an error of the x paralla
 LEAST_APART_SHARE = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it
 SAME_PLACE_SIGMAS = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
 SAME_HEIGHT_FACTOR = 3.0  # times that in height, times height over base
-MOST_BY_CHANCE = 0.01  # points that may stand at one place by chance in the whole strip; else nothing is said
+MOST_BY_CHANCE = 0.01  # points that may lie at the same place by chance in the whole strip; else nothing is said
 FAR_BASES = 2.0  # bases between two places of one id: tilts move them by less
 LEAST_RAYS = 2  # photos that must agree
 TINY = 1e-12
@@ -81,7 +81,7 @@ def find_shared_ids(
 def find_double_ids(
     observations: PhotoPoints, formed: FormedStrip, focal: float, photos: Sequence[str], strip_id: str, sigma: float
 ) -> Iterator[Finding]:
-    """Find points that stand at one place of the formed strip and are on no photo two different points."""
+    """Find points that lie at the same place of the formed strip and are on no photo two different points."""
     bases = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)
     depth = _depth(formed)
     reach = SAME_PLACE_SIGMAS * sigma / focal * depth
@@ -102,8 +102,8 @@ def find_double_ids(
         names = tuple(observations.point_ids[number] for number in numbers)
         gap = float(np.linalg.norm(formed.xyz[a, :2] - formed.xyz[b, :2]) / depth * focal)
         message = (
-            f"points {names[0]} and {names[1]} stand at one place, {1000 * gap:.0f} µm from each other at photo scale, "
-            "and no photo shows them as two: two ids for one point"
+            f"points {names[0]} and {names[1]} lie at the same place, {1000 * gap:.0f} µm from each other at photo "
+            "scale, and no photo shows them as two: two ids for one point"
         )
         fix = f"give {names[1]} the id {names[0]}"
         evidence = {"distance_at_photo_scale_mm": gap, "expected_by_chance": float(expected)}
@@ -170,7 +170,7 @@ def find_double_ids_in_images(observations: PhotoPoints, rows: Numbers, strip_id
         names = (o.point_ids[a], o.point_ids[b])
         gap = float(np.mean(gaps))
         message = (
-            f"points {names[0]} and {names[1]} stand at one place on all {len(both)} photos that show both, "
+            f"points {names[0]} and {names[1]} lie at the same place on all {len(both)} photos that show both, "
             f"{1000 * gap:.0f} µm from each other: two ids for one point"
         )
         evidence = {"photos": len(both), "mean_distance_mm": gap}
@@ -208,7 +208,7 @@ def _near(xyz: Floats, reach: float) -> tuple[Numbers, Numbers]:
 
 
 def _together(observations: PhotoPoints, numbers: tuple[int, int], photos: Sequence[str]) -> bool | None:
-    """Whether two points stand at one place on the photos that show both; None when there is no such photo."""
+    """Whether two points lie at the same place on the photos that show both; None when there is no such photo."""
     inside = np.array([name in set(photos) for name in observations.photo_ids], bool)[observations.photo]
     rows = [np.flatnonzero((observations.point == number) & inside) for number in numbers]
     _, one, two = np.intersect1d(observations.photo[rows[0]], observations.photo[rows[1]], return_indices=True)

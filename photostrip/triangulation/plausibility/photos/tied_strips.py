@@ -54,7 +54,7 @@ def find_shared_ids_of_strips(ties: TiesOfStrips) -> Iterator[Finding]:
     for row in np.flatnonzero(fit.odd & ((ties.rays > TWO_RAYS) | (far > ONE_RAY_SHARE * ties.depth))).tolist():
         message = (
             f"point {ties.names[row]} stands for two points: strip {other} puts it {far[row]:.4g} m away from where "
-            f"strip {one} puts it; half of the other common points go together within {_others(far, row):.2g} m"
+            f"strip {one} puts it; half of the other common points agree within {_others(far, row):.2g} m"
         )
         evidence = {"distance_m": float(far[row]), "limit_m": float(fit.limit[row])}
         fix = f"give it another id on the photos of strip {other}"
