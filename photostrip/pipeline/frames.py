@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.geodesy.curvature import curvature_correction
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Inputs, Settings
+    from photostrip.pipeline.results import StripResult
 
+LEFT_BY_A_LEVEL_FIT = 2.0 / (3.0 * 5.0**0.5)  # rms of what a parabola leaves about its mean, of its height at the ends
 EPOCH_UNKNOWN = 10.0  # years by which an epoch that is not given may differ from that of an operation
 CAMERAS = ("camera_positions", "orientations")  # keys of what may be given of cameras
 
@@ -124,11 +127,30 @@ def datum_notes(inputs: Inputs, ground: GroundFrames) -> Iterator[Note]:
             yield Note("epoch-missing", text, key=f"{key}.epoch")
 
 
-def curvature_notes(inputs: Inputs, settings: Settings) -> Iterator[Note]:
-    """Say where a setting of Earth curvature changes nothing."""
+def curvature_notes(inputs: Inputs, settings: Settings, strips: Sequence[StripResult]) -> Iterator[Note]:
+    """Say where a setting of Earth curvature changes nothing, and where local coordinates may lack it."""
+    if settings.absolute.earth_curvature == "auto" and inputs.frames and inputs.frames[0].crs == "local":
+        yield from _left_out(inputs, settings, strips)
     if settings.absolute.earth_curvature == "none" and inputs.frames and inputs.frames[0].crs != "local":
         text = (
             "`earth_curvature: none` has no effect here: the coordinates go through geocentric space, where the Earth "
             "is curved"
         )
         yield Note("curvature-in-frames", text, severity="note")
+
+
+def _left_out(inputs: Inputs, settings: Settings, strips: Sequence[StripResult]) -> Iterator[Note]:
+    """Say by how much plane map coordinates would bend what is measured, where that is more than a height's error."""
+    control = inputs.control
+    plan = control.enu[control.use[:, 0] & ~control.check, :2]
+    if len(plan) < 2 or not strips:
+        return
+    reach = float(np.hypot(*(plan - (plan.max(axis=0) + plan.min(axis=0)) / 2.0).T).max())
+    fall = float(curvature_correction(reach, settings.absolute.earth_radius))
+    if LEFT_BY_A_LEVEL_FIT * fall > min(strip.precision[1] for strip in strips):
+        text = (
+            f"local coordinates are taken as they are: if they are plane map coordinates with heights, the Earth's "
+            f"curvature is left out, {fall:.2f} m at {reach / 1000.0:.1f} km from the middle of the control; "
+            "`earth_curvature: model` takes it into account, `earth_curvature: none` says that there is none"
+        )
+        yield Note("curvature-left-out", text, severity="note", key="processing.earth_curvature")

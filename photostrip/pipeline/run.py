@@ -90,7 +90,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
             notes=(
                 *(photo.interior.notes if photo.interior is not None else ()),
                 *adjusted.notes,
-                *curvature_notes(inputs, settings),
+                *curvature_notes(inputs, settings, adjusted.strips),
                 *datum_notes(inputs, ground),
                 *unchecked_control_notes(adjusted, settings.bundle.power),
             ),
