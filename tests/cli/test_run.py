@@ -93,6 +93,13 @@ def test_strict_refuses_what_nothing_verifies(tmp_path: Path, capsys: pytest.Cap
     assert run(capsys, "report", tmp_path / "out")[0] == 0
     assert run(capsys, "report", tmp_path / "out", "--strict")[0] == 1
     assert run(capsys, "run", project, "--strict", "--compare-methods")[0] == 2
+    code, out, _ = run(capsys, "run", project, "--strict", "--cross-validate", "-o", tmp_path / "turned")
+    assert (code, out.splitlines()[3].split(":")[0]) == (0, "GOOD")
+    assert out.count("── Cross-validation ──") == 1
+    text = run(capsys, "report", tmp_path / "turned", "--section", "cross-validation")[1]
+    document = json.loads((tmp_path / "turned" / "result.json").read_text(encoding="utf-8"))
+    assert text.count("\nG") == document["cross_validation"]["plan"]["count"]
+    assert "cross_validation: true" in (tmp_path / "turned" / "project.resolved.yaml").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from photostrip.pipeline import Inputs, Settings
 from photostrip.pipeline.cross_validation import FOLDS
 from photostrip.pipeline.strips import forming
 from photostrip.pipeline.strips.photos import form_strip
+from photostrip.report import sections_of
 from photostrip.result.verdict import GOOD, LOOK, UNVERIFIED
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Models
@@ -125,3 +126,12 @@ def test_independent_models_too() -> None:
     document = solved(inputs, TURNED).document
     assert document["cross_validation"]["plan"]["count"] == 9
     assert 0.4 < document["cross_validation"]["height"]["ratio"] < 2.0
+
+
+def test_without_standard_deviations_nothing_is_predicted_but_differences_are_there() -> None:
+    document = solved(without_checks(), replace(TURNED, precision=False)).document
+    block = document["cross_validation"]
+    assert (block["p"], block["plan"]["count"], block["height"]["ratio"]) == (None, 9, None)
+    assert 0.0 < block["plan"]["rms"] < 1.0
+    assert document["verdict"]["verified"] is True
+    assert any(each.title == "Cross-validation" for each in sections_of(document))
