@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.notes import counted
 
 if TYPE_CHECKING:
     from photostrip.planning.ideal_strip import IdealStrip
@@ -74,7 +75,7 @@ def _stations(layout: ControlLayout, last: int) -> list[int]:
         return sorted({*range(0, last + 1, layout.every), last})
     count = layout.bands
     if not 1 <= count <= last + 1:
-        message = f"{count} bands do not fit {last + 1} photos"
+        message = f"{counted(count, 'band')} cannot be placed on {last + 1} photos"
         raise InputError(Fault(message, "plan-place", key="layouts", expected=f"1 to {last + 1} bands"))
     return sorted({round(place) for place in np.linspace(0, last, count).tolist()}) if count > 1 else [last // 2]
 
@@ -82,7 +83,7 @@ def _stations(layout: ControlLayout, last: int) -> list[int]:
 def across(count: int, rows: int) -> list[int]:
     """Rows of the points of a band, spread evenly: the middle one, both edges, and so on."""
     if not 1 <= count <= rows:
-        message = f"a band of {count} points does not fit {rows} rows of pass points"
+        message = f"a band of {counted(count, 'point')} does not fit {counted(rows, 'row')} of pass points"
         raise InputError(Fault(message, "plan-place", key="layouts", expected=f"1 to {rows} points"))
     return [rows // 2] if count == 1 else sorted({round(place) for place in np.linspace(0, rows - 1, count).tolist()})
 

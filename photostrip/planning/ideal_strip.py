@@ -12,6 +12,7 @@ import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.geometry.similarity import Similarity
+from photostrip.notes import counted
 from photostrip.simulate import Control, Flight, Ground, Image, Points, Simulation, Spec, Terrain, simulate
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors, differentiate_strip
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_pairs
@@ -104,7 +105,7 @@ class IdealStrip:
 def ideal_strip(geometry: StripGeometry) -> IdealStrip:
     """Simulate a strip without errors and form it; photos that do not overlap enough are refused."""
     if geometry.photos < LEAST_PHOTOS:
-        message = f"{geometry.photos} photos are no strip; a single model is planned by `plan model`"
+        message = f"{counted(geometry.photos, 'photo')} cannot make a strip; a single model is planned by `plan model`"
         raise InputError(Fault(message, "plan-photos", key="photos", expected=f"{LEAST_PHOTOS} or more"))
     simulation = geometry.simulated()
     observed = simulation.observations

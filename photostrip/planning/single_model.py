@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.notes import counted
 from photostrip.planning.element_errors import free_influence
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def _plan_operator(where: Floats, control: ModelControl) -> tuple[Floats, Floats
     """Parts of Hx = Hy' along and across a misclosure, shape (q, control points in plan) each."""
     xy = control.points[control.plan, :2]
     if len(xy) < 2:
-        message = f"{len(xy)} control points in plan do not determine position, azimuth and scale; two are needed"
+        message = f"{counted(len(xy), 'control point')} in plan cannot give position, azimuth and scale; two are needed"
         raise GeometryError(message, code="plan-control")
     center = xy.mean(axis=0)
     control_xy, point_xy = xy - center, where[:, :2] - center
@@ -104,7 +105,7 @@ def _height_operator(where: Floats, control: ModelControl) -> Floats:
     """Hz, shape (q, control points in height)."""
     xy = control.points[control.height, :2]
     if len(xy) < 3:
-        message = f"{len(xy)} control points in height do not determine height and tilts; three are needed"
+        message = f"{counted(len(xy), 'control point')} in height cannot give height and tilts; three are needed"
         raise GeometryError(message, code="plan-control")
     center = xy.mean(axis=0)
     control_xy, point_xy = xy - center, where[:, :2] - center

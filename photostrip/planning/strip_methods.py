@@ -14,6 +14,7 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geodesy.tying import tie_frames
+from photostrip.notes import counted
 from photostrip.planning.control_layout import USES, ControlLayout, Spot, Triple, numbers_of
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
@@ -88,7 +89,7 @@ def accuracy(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], 
         return _bundle(strip, layout, spots, control)
     plan, height = int(control.use[:, 0].sum()), int(control.use[:, 2].sum())
     if plan < 2 or height < 3:
-        message = f"{plan} control points in plan and {height} in height do not orient a strip"
+        message = f"{counted(plan, 'control point')} in plan and {height} in height cannot orient a strip"
         raise GeometryError(message, code="plan-control")
     fit = _oriented(strip, np.array(numbers_of(strip, spots), np.intp), control)
     return _predicted(strip, fit) if method == COVARIANCE else _fitted(strip, fit, method)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.notes import counted
 from photostrip.points import ControlPoints, PointTable
 from photostrip.simulate.draws import Draws, Purpose
 
@@ -46,7 +47,8 @@ def roles(spec: Spec, placed: Placed, rays: Numbers) -> Roles:
     free = order[(rays[order] >= 2) & ~np.isin(order, control)]
     check = min(CHECK_POINTS, len(free) // 2) if spec.control.check is None else spec.control.check
     if len(free) < check:
-        message = f"{check} check points are asked for, but only {len(free)} points are left for them"
+        asked, left = counted(check, "check point is", "check points are"), counted(len(free), "point is", "points are")
+        message = f"{asked} asked for, but only {left} left for them"
         raise InputError(Fault(message, code="simulation-points", key="control.check", fix="add extra_per_model"))
     return Roles(control, use, np.sort(free[:check]))
 
@@ -92,7 +94,8 @@ def _random(spec: Spec, placed: Placed, rays: Numbers, order: Numbers) -> Number
     for j in range(spec.flight.strips):
         of_strip = order[(placed.home[order] // spec.flight.photos == j) & (rays[order] >= 2)]
         if len(of_strip) < spec.control.count:
-            message = f"{spec.control.count} control points are asked for, but a strip has only {len(of_strip)} points"
+            asked = counted(spec.control.count, "control point is", "control points are")
+            message = f"{asked} asked for, but a strip has only {counted(len(of_strip), 'point')}"
             raise InputError(Fault(message, code="simulation-points", key="control.count"))
         chosen.append(np.sort(of_strip[: spec.control.count]))
     return np.concatenate(chosen)

@@ -11,6 +11,7 @@ import numpy as np
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
+from photostrip.notes import counted
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, PointTable
 from photostrip.simulate.control import Roles, given_coordinates, roles
 from photostrip.simulate.draws import Draws, Purpose
@@ -184,7 +185,7 @@ def _check_overlap(spec: Spec, photos: Photos, photo: Numbers, point: Numbers) -
         common = np.intersect1d(on[k], on[k + 1], assume_unique=True)
         names = f"{photos.ids[k]} and {photos.ids[k + 1]}"
         if len(common) < LEAST_COMMON:
-            faults.append(f"photos {names} show only {len(common)} common points, {LEAST_COMMON} are needed")
+            faults.append(f"photos {names} show only {counted(len(common), 'common point')}; {LEAST_COMMON} are needed")
         elif k % n < n - 2 and not np.isin(common, on[k + 2], assume_unique=True).any():
             faults.append(f"no point lies on photos {photos.ids[k]}, {photos.ids[k + 1]} and {photos.ids[k + 2]}")
     if faults:

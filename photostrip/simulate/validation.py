@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault
+from photostrip.notes import counted
 from photostrip.simulate.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES, Spec
 from photostrip.triangulation.image_coordinates import lens_distortion
 
@@ -76,9 +77,9 @@ def _camera(spec: Spec) -> Iterator[Fault]:
 def _flight(spec: Spec) -> Iterator[Fault]:
     flight = spec.flight
     if flight.photos < 2:
-        yield _fault("flight.photos", f"{flight.photos} photos make no strip", "two or more")
+        yield _fault("flight.photos", f"{counted(flight.photos, 'photo')} cannot make a strip", "two or more")
     if flight.strips < 1:
-        yield _fault("flight.strips", f"{flight.strips} strips are none", "one or more")
+        yield _fault("flight.strips", f"{counted(flight.strips, 'strip')} cannot be simulated", "one or more")
     if flight.photos * flight.strips > MOST_PHOTOS:
         number = flight.photos * flight.strips
         yield _fault("flight.photos", f"{number} photos are too many", f"at most {MOST_PHOTOS} in all strips")

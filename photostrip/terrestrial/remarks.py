@@ -56,9 +56,7 @@ def _stable_points(result: Monitoring) -> Iterator[Note]:
     """Which stable points moved, and where they do not fit together."""
     for number, name in result.rejected:
         epoch = result.series.epochs[number]
-        message = (
-            f"epoch {epoch}: point {name} is given as stable and does not fit to the others; it was not used as such"
-        )
+        message = f"epoch {epoch}: point {name} is given as stable and does not fit the others; it was not used as such"
         yield Note("not-stable", message, points=(name,))
     for state in result.cameras:
         turn = state.turn

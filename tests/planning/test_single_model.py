@@ -390,7 +390,7 @@ def test_covariance_of_the_adjusted_model_is_its_scatter() -> None:
 @pytest.mark.parametrize(
     ("xy", "message"),
     [
-        ([[0.0, 0.0]], "1 control points in plan"),
+        ([[0.0, 0.0]], "1 control point in plan"),
         ([[3.0, 4.0], [3.0, 4.0], [3.0, 4.0]], "lie at one place"),
         ([[0.0, 0.0], [50.0, 10.0]], "2 control points in height"),
         ([[0.0, 0.0], [50.0, 10.0], [100.0, 20.0]], "on one line"),

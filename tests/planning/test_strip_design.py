@@ -48,7 +48,7 @@ def test_the_ideal_strip_is_what_was_asked_for() -> None:
     assert (strip.station >= 0).sum() == 6 * 5
     with pytest.raises(InputError, match="has no pass point in row 9"):
         strip.at(0, 8)
-    with pytest.raises(InputError, match="no strip"):
+    with pytest.raises(InputError, match="cannot make a strip"):
         ideal_strip(StripGeometry(FILM, 2))
 
 
@@ -325,5 +325,5 @@ def test_a_whole_design() -> None:
 
 def test_three_photos_are_the_shortest_strip() -> None:
     assert len(strip_of(3).centers) == 3
-    with pytest.raises(InputError, match="2 photos are no strip"):
+    with pytest.raises(InputError, match="2 photos cannot make a strip"):
         strip_of(2)

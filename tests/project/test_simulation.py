@@ -172,7 +172,7 @@ def test_keys_can_be_set_and_files_extended(tmp_path: Path) -> None:
             "`kind` is missing; expected `image`, `control` or `swap`",
         ),
         ("refraction: perhaps", "2:13: refraction", "`perhaps` is neither true nor false; expected true or false"),
-        ("flight: {photos: 0}", "2:18: flight.photos", "0 photos make no strip; expected two or more"),
+        ("flight: {photos: 0}", "2:18: flight.photos", "0 photos cannot make a strip; expected two or more"),
         ("control: {use: {xz: 1}}", "2:21: control.use.xz", "'xz' is no set of coordinates; expected xyz | xy | z"),
         (
             "gross_errors:\n  - {kind: image, axis: z}",

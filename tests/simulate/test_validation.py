@@ -30,9 +30,9 @@ NAN = float("nan")
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        (Spec(flight=Flight(photos=0)), "flight.photos: 0 photos make no strip; expected two or more"),
-        (Spec(flight=Flight(photos=1)), "flight.photos: 1 photos make no strip"),
-        (Spec(flight=Flight(strips=0)), "flight.strips: 0 strips are none"),
+        (Spec(flight=Flight(photos=0)), "flight.photos: 0 photos cannot make a strip; expected two or more"),
+        (Spec(flight=Flight(photos=1)), "flight.photos: 1 photo cannot make a strip"),
+        (Spec(flight=Flight(strips=0)), "flight.strips: 0 strips cannot be simulated"),
         (Spec(flight=Flight(photos=10**9)), "flight.photos: 1000000000 photos are too many; expected at most 20000"),
         (Spec(flight=Flight(photos=200, strips=200)), "flight.photos: 40000 photos are too many"),
         (

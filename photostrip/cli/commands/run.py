@@ -52,6 +52,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.cli.stderr import Messages
     from photostrip.formats.output.result_files import refined_csv, result_files
     from photostrip.formats.text.writing import make_rule, write_files, write_text
+    from photostrip.notes import counted
     from photostrip.project.loading import adjust_project, load_project
     from photostrip.report.page.progress import progress
     from photostrip.result.document import document_of
@@ -72,10 +73,12 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             check_html()
         waiting.at(f"reading {project}")
         loaded = load_project(project, assignments)
-        messages.step(f"read {len(loaded.files)} files, {len(loaded.inputs.observations)} image points")
-        waiting.at(f"adjusting {sum(len(strip.photos) for strip in loaded.inputs.strips)} photos")
+        messages.step(
+            f"read {counted(len(loaded.files), 'file')}, {counted(len(loaded.inputs.observations), 'image point')}"
+        )
+        waiting.at(f"adjusting {counted(sum(len(strip.photos) for strip in loaded.inputs.strips), 'photo')}")
         result = loaded.result(adjust_project(loaded))
-        messages.step(f"adjusted {len(result.points.number)} points")
+        messages.step(f"adjusted {counted(len(result.points.number), 'point')}")
         document = document_of(result, loaded.remarks)
         waiting.at("writing the result")
         if trace is not None:

@@ -228,7 +228,7 @@ def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     ("change", "code", "message"),
     [
         ("--set=layouts.a=bunds=3", 2, "did you mean `bands`"),
-        ("--set=layouts.a=bands=30", 2, "30 bands do not fit 11 photos"),
+        ("--set=layouts.a=bands=30", 2, "30 bands cannot be placed on 11 photos"),
         ("--set=layouts.a={layout: points, points: [[12, 1]]}", 2, "no row 1 at photo 12"),
         ("--set=methods=[cubic]", 2, "`cubic` is not known"),
         ("--set=place={points: 2, into: nowhere}", 2, "no layout `nowhere`"),
@@ -236,7 +236,7 @@ def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Pat
         ("--set=points.extra_per_model=201", 2, "201 is out of range; expected 0 to 200 points"),
         ("--overlap=30", 2, "error: --overlap: an end lap of 30 %"),
         ("--control=bunds", 2, "error: --control: `bunds` is not known"),
-        ("--control=bands=12", 2, "error: --control: 12 bands do not fit 11 photos"),
+        ("--control=bands=12", 2, "error: --control: 12 bands cannot be placed on 11 photos"),
         ("--required=a,0.1", 2, "error: --required: `a` is not a number"),
         ("--into=corners", 2, "Invalid value for --into: nothing is to be placed"),
         ("--set=layouts.a={bands: 3, every: 4}", 2, "layouts.a.every: the number of bands and their distance"),
@@ -272,7 +272,7 @@ def test_every_layout_with_and_without_perspective_centres(capsys: pytest.Captur
 
 def test_too_little_control_stands_in_the_table(capsys: pytest.CaptureFixture[str]) -> None:
     options = ("--models", "4", "--set", "layouts.one={layout: points, points: [[1, 1]]}", "--methods", "similarity")
-    assert "do not orient a strip" in answer(capsys, "plan", "strip", *options)
+    assert "cannot orient a strip" in answer(capsys, "plan", "strip", *options)
 
 
 def test_a_rule_for_make(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

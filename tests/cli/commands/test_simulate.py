@@ -64,7 +64,7 @@ def test_the_same_command_writes_the_same_bytes(spec: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ("flight.photos=0", "error: --set: flight.photos: 0 photos make no strip; expected two or more\n"),
+        ("flight.photos=0", "error: --set: flight.photos: 0 photos cannot make a strip; expected two or more\n"),
         ("flight.end_lap_percent=-5", "error: --set: flight.end_lap_percent: an end lap of -5 % cannot be simulated"),
         ("flights.photos=3", "the key `flights` is not known; did you mean `flight`?"),
         ("flight.photos=99999999999", "error: --set: flight.photos: 99999999999 photos are too many"),
