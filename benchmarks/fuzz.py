@@ -5,6 +5,9 @@ one to four things were done: characters and bytes put in, values, lines and col
 as other programs do. Half of them are checked, half are run with a result. The exit code is 1 when a case ends with a
 traceback, another exit code than 0, 1, 2 and 3, a changed input, half a result, or takes longer than 10 s.
 
+``python benchmarks/fuzz.py blocks [cases] [seed]`` does the same to bundles: two strips, camera positions, given
+orientations, strips of single photos; 5000 cases.
+
 ``python benchmarks/fuzz.py results [cases] [seed]`` gives edited results to ``report`` and ``compare`` instead, 2000 of
 them: each is printed, or refused with the name of its file, and no control character reaches the terminal.
 """
@@ -23,7 +26,7 @@ from random import Random
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
 from tests.edited_results import COMMANDS, edited, faults_of
-from tests.fuzzing import damaged, emptied, projects, tried
+from tests.fuzzing import blocks, damaged, emptied, projects, tried
 from tests.reports import RESULT, saved
 
 CASES, SEED = 10_000, 1
@@ -52,13 +55,15 @@ def main(arguments: list[str]) -> int:
     """Try the cases and print the table."""
     if arguments[:1] == ["results"]:
         return edited_results(arguments[1:])
+    of_blocks = arguments[:1] == ["blocks"]
+    arguments = arguments[of_blocks:]
     number, seed = (int(each) for each in (*arguments, *(str(each) for each in (CASES, SEED)[len(arguments) :])))
     codes: Counter[tuple[str, int]] = Counter()
     seconds: list[float] = []
     wrong: list[str] = []
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory() as place:
-        right = projects(Path(place) / "right")
+        right = (blocks if of_blocks else projects)(Path(place) / "right")
         for each in range(number):
             random = Random(f"{seed} {each}")  # noqa: S311 (no secret: the same cases every time)
             case, command = damaged(right, random), random.choice(["run", "check"])

@@ -8,10 +8,11 @@ import json
 import re
 import shutil
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from photostrip.cli.main import main
+from photostrip.simulate.spec import Gnss
 from tests.project.samples import FILES, MARKED_FILES
 from tests.results import spec, write_project
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 LONGEST = 10.0  # seconds of the processor that one case may take
 CODES = {0, 1, 2, 3}
-RESULT = 8  # at most so many files in a result
+RESULT = 10  # at most so many files in a result
 TEXTS = [
     "",
     " ",
@@ -158,10 +159,45 @@ def projects(folder: Path) -> list[dict[str, bytes]]:
     """Give the files of right projects: two that are read, one of them with marks, and two that run."""
     found = [{name: text.encode() for name, text in each.items()} for each in (FILES, MARKED_FILES)]
     for frame in ("north first", "local"):
-        path = write_project(folder / frame, spec(frame))
-        files = {each.name: each.read_bytes() for each in path.parent.iterdir() if each.name != "truth.json"}
+        files = _files_of(write_project(folder / frame, spec(frame)))
         found += [files, files]
     return found
+
+
+def blocks(folder: Path) -> list[dict[str, bytes]]:
+    """Give the files of right bundles: two strips, with camera positions, with given orientations, single photos."""
+    two, one = spec("local", strips=2), spec("local")
+    bundle = "processing: {adjustment: bundle}\n"
+    strips = _files_of(write_project(folder / "strips", two, bundle))
+    positions = _files_of(write_project(folder / "positions", replace(two, gnss=Gnss(use=True)), bundle))
+    path = write_project(folder / "single", one, bundle)
+    with contextlib.redirect_stdout(io.StringIO()):
+        code = main(["run", str(path), "-o", str(folder / "found"), "--quiet"])
+    if code:
+        raise RuntimeError("the right block does not run")
+    given = {"photos.csv": (folder / "found" / "photos.csv").read_bytes()}
+    files = {name: data for name, data in _files_of(path).items() if name in {"observations.csv", "control.csv"}}
+    project = path.read_text(encoding="utf-8")
+    listed = re.search(r"  - id: .*\n    camera: (.*)\n    photos: \[(.*)\]\n", project)
+    if listed is None:
+        raise RuntimeError("the project lists no photos")
+    table = '  file: photos.csv\n  crs: "local"\n  axes: [east, north, up]\n'
+    observed = f"orientations:\n{table}  role: observed\n  sigma: [0.1, 0.1, 0.1]\n  sigma_angles: [0.01, 0.01, 0.01]\n"
+    single = "".join(
+        f"  - {{id: S{number}, camera: {listed[1]}, photos: [{photo}]}}\n"
+        for number, photo in enumerate(listed[2].split(", "))
+    )
+    alone = project.replace(listed[0], single) + f"orientations:\n{table}  role: approximate\n"
+    return [
+        strips,
+        positions,
+        {**files, **given, "project.yaml": (project + observed).encode()},
+        {**files, **given, "project.yaml": alone.encode()},
+    ]
+
+
+def _files_of(path: Path) -> dict[str, bytes]:
+    return {each.name: each.read_bytes() for each in path.parent.iterdir() if each.name != "truth.json"}
 
 
 def damaged(projects: list[dict[str, bytes]], random: Random) -> Case:
@@ -271,9 +307,73 @@ def number_moved(data: bytes, random: Random) -> bytes:
     return data[: match.start()] + random.choice(ways) + data[match.end() :]
 
 
+def made_noise(data: bytes, random: Random) -> bytes:
+    """Put noise in place of some numbers, or all of them, of a table, or add it."""
+    share, size = random.choice([0.02, 0.3, 1.0]), 10.0 ** random.randint(-2, 6)
+    keep = random.choice([0.0, 1.0])
+
+    def noisy(match: re.Match[bytes]) -> bytes:
+        if random.random() > share:
+            return match[0]
+        return f"{keep * float(match[0]) + random.uniform(-size, size):.4f}".encode()
+
+    return re.sub(rb"-?\d+\.\d+", noisy, data)
+
+
+def column_scaled(data: bytes, random: Random) -> bytes:
+    """Multiply a column of a table: kilometres, millimetres, nothing at all, an overflow."""
+    lines = data.splitlines()
+    width = min((line.count(b",") for line in lines), default=0)
+    if width < 1:
+        return data
+    column, factor = random.randint(1, width), random.choice([0.0, 1e-3, 1e3, 1e-9, 1e9, -1.0, 1e150])
+    found = []
+    for line in lines:
+        fields = line.split(b",")
+        with contextlib.suppress(ValueError):
+            fields[column] = f"{float(fields[column]) * factor:.6g}".encode()
+        found.append(b",".join(fields))
+    return b"\n".join(found) + b"\n"
+
+
+def column_permuted(data: bytes, random: Random) -> bytes:
+    """Deal the values of a column out again: ids permuted, or points numbered anew."""
+    lines = [line.split(b",") for line in data.splitlines()]
+    width = min(map(len, lines), default=0)
+    if width < 2:
+        return data
+    column = random.randrange(width)
+    values = [line[column] for line in lines[1:]]
+    random.shuffle(values)
+    for line, value in zip(lines[1:], values, strict=True):
+        line[column] = value
+    return b"\n".join(map(b",".join, lines)) + b"\n"
+
+
+def on_one_line(data: bytes, random: Random) -> bytes:
+    """Bring the points of a table of coordinates onto one line, or to one place, with noise."""
+    lines = [line.split(b",") for line in data.splitlines()]
+    if min(map(len, lines), default=0) < 4:
+        return data
+    noise, step = random.choice([0.0, 0.1, 20.0, 200.0]), random.choice([0.0, 1.0, 500.0])
+    for number, line in enumerate(lines[1:]):
+        line[1:4] = [f"{number * step * k + random.gauss(0.0, noise):.3f}".encode() for k in (1.0, 0.3, 0.1)]
+    return b"\n".join(map(b",".join, lines)) + b"\n"
+
+
+def keys_permuted(data: bytes, random: Random) -> bytes:
+    """Exchange the words before two colons."""
+    found = list(re.finditer(rb"[\w]+(?=:)", data))
+    if len(found) < 2:
+        return data
+    one, two = sorted(random.sample(found, 2), key=lambda each: each.start())
+    return data[: one.start()] + two[0] + data[one.end() : two.start()] + one[0] + data[two.end() :]
+
+
 HARMS = [
     text_put_in, text_put_in, value_replaced, value_replaced, bytes_put_in, cut_off, line_removed, line_repeated,
-    lines_exchanged, fields_exchanged, written_otherwise, number_moved, number_moved,
+    lines_exchanged, fields_exchanged, written_otherwise, number_moved, number_moved, made_noise, made_noise,
+    column_scaled, column_permuted, on_one_line, keys_permuted,
 ]  # fmt: skip
 
 

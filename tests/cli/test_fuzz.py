@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.fuzzing import HARMS, Case, damaged, projects, tried
+from tests.fuzzing import HARMS, Case, blocks, damaged, projects, tried
 from tests.source_tree import ROOT
 
 
@@ -31,6 +31,27 @@ def test_a_damaged_project_ends_well(right: list[dict[str, bytes]], seed: int, c
     case = damaged(right, Random(seed))
     with tempfile.TemporaryDirectory() as folder:
         assert tried(case, Path(folder), command).faults == (), case.done
+
+
+@pytest.fixture(scope="module")
+def right_blocks(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, bytes]]:
+    return blocks(tmp_path_factory.mktemp("blocks"))
+
+
+@pytest.mark.slow
+@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
+@given(seed=st.integers(0, 2**32), command=st.sampled_from(["check", "run"]))
+def test_a_damaged_block_ends_well(right_blocks: list[dict[str, bytes]], seed: int, command: str) -> None:
+    case = damaged(right_blocks, Random(seed))
+    with tempfile.TemporaryDirectory() as folder:
+        assert tried(case, Path(folder), command).faults == (), case.done
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_right_blocks_are_right(right_blocks: list[dict[str, bytes]], tmp_path: Path, number: int) -> None:
+    outcome = tried(Case(right_blocks[number]), tmp_path, "run")
+    assert outcome.code in {0, 1}
+    assert outcome.faults == ()
 
 
 @pytest.mark.slow
@@ -53,8 +74,8 @@ def test_right_projects_are_right(right: list[dict[str, bytes]], tmp_path: Path,
 @pytest.mark.parametrize("harm", HARMS, ids=lambda harm: harm.__name__)
 def test_every_harm_does_some(right: list[dict[str, bytes]], harm: object) -> None:
     assert callable(harm)
-    data = right[-1]["observations.csv"]
-    assert any(harm(data, Random(seed)) != data for seed in range(20))
+    project = right[-1]
+    assert any(harm(data, Random(seed)) != data for seed in range(20) for data in project.values())
     assert isinstance(harm(b"", Random(1)), bytes)
 
 

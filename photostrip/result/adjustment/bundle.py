@@ -187,7 +187,8 @@ def image_fit(found: Bundle) -> Document:
 def _group(group: reliability.Group, shift: float, kind: Kind) -> Document:
     """Sum up the redundancy of one kind of observations; effects of errors of those that others check."""
     given = np.isfinite(group.sigma)
-    share, controlled = group.redundancy[given], group.redundancy[given] >= reliability.UNCONTROLLED
+    controlled = group.redundancy[given] >= reliability.UNCONTROLLED
+    share = group.redundancy[given] if given.any() else np.zeros(1)  # where all of the group was rejected
     nothing = np.array([np.nan])
     detectable = group.detectable(shift)[given][controlled] * kind.factor if controlled.any() else nothing
     external = group.external(shift)[given][controlled] if controlled.any() else nothing

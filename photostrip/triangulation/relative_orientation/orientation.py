@@ -124,11 +124,21 @@ def orient_unchecked(pairs: Pairs) -> tuple[Orientation, Flags]:
     return assess_pairs(solved.elements, pairs, solved.iterations), solved.converged
 
 
-def orient_again(orientation: Orientation, weight: Floats, numbers: Numbers) -> Orientation:
-    """Orient pairs whose weights changed, given by ascending numbers, again; `weight` (m,) is that of all rows."""
+def orient_again(
+    orientation: Orientation, weight: Floats, numbers: Numbers, lost_before: Flags | None = None
+) -> Orientation:
+    """Orient pairs whose weights changed, given by ascending numbers, again; `weight` (m,) is that of all rows.
+
+    A pair whose iteration does not converge is solved from nothing; one of ``lost_before`` (p,), which marks those,
+    keeps its elements instead.
+    """
     pairs = replace(orientation.pairs, weight=weight)
     part = pairs.take(numbers)
     elements, converged, steps = solution.iterate_elements(orientation.elements[numbers], part)
+    if lost_before is not None:
+        kept = ~converged & lost_before[numbers]
+        elements[kept], converged[kept] = orientation.elements[numbers[kept]], True
+        lost_before[numbers[~converged]] = True
     if not converged.all():
         lost = np.flatnonzero(~converged)
         elements[lost], _, steps[lost] = solution.solve_elements(part.take(lost))

@@ -4,6 +4,10 @@ Only pairs that fail the test are touched. They are oriented with falling weight
 three points is taken out whose removal lets the pair pass. Where no such set exists, what lies beyond three standard
 deviations of the robust start goes, then one point after the other, until a set of up to three explains the rest.
 
+The work is bounded: a pair that does not converge is solved from nothing once in a search, points go one after the
+other only as long as half of them are left, and nothing is searched for where all pairs scatter by more than any
+measurement does.
+
 Nothing is taken back: in a strip of three photos or more the rays are tested all again, along the strip; in pairs of 12
 to 30 points of which up to a fifth is wrong 0.1 % of the good ones are lost.
 
@@ -31,6 +35,8 @@ if TYPE_CHECKING:
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 
+# of the principal distance: y parallaxes that scatter by more are no measurements of the same points
+LARGEST_SCATTER = 0.01
 AT_ONCE = 64  # pairs, for the sake of memory; it changes no result
 
 
@@ -73,7 +79,7 @@ def search(
     if not len(failed):
         scatter = ParallaxScatter.of(given, stated, spoiled)
         return PairSearch(orientation=given, removed=(), scatter=scatter, test=GlobalTest.of(scatter.by_pair))
-    part, part_test, log = given.take(failed), test.take(failed), _Log([])
+    part, part_test, log = given.take(failed), test.take(failed), _Log([], np.zeros(len(failed), bool))
     found = orient_robustly(part.pairs, part_test.sigma, deletion.LARGEST)
     robust = assess_pairs(found.elements, part.pairs, part.iterations)
     if start:
@@ -85,12 +91,15 @@ def search(
     # pairs that a few points explain speak for the scatter; of the others, what the robust start leaves
     cleaned = given.with_pairs(failed, part.with_pairs(todo, _agreeing(robust, found).take(todo)))
     scatter = ParallaxScatter.of(cleaned, stated, spoiled)
+    if scatter.found > LARGEST_SCATTER * given.pairs.focal:
+        return PairSearch(orientation=given, removed=(), scatter=replace(scatter, found=np.nan), test=test)
     if not np.isnan(scatter.found):
         again = search(given, scatter.found, doubtful, start=start, sets=sets, spoiled=1.0)
         return again if not np.isnan(again.scatter.found) else replace(again, scatter=scatter)
     if start:
         part = log.without_beyond(part, part_test, todo)
-    while len(todo := todo[part_test.failing(part)[todo]]):
+    least = given.points_used[failed] // 2  # with more points wrong than right nobody can tell which are which
+    while len(todo := todo[(part_test.failing(part) & (part.points_used >= least))[todo]]):
         before = len(log.removed)
         part = log.without_sets(part, part_test, todo, deletion.LARGEST if sets else 1, worst=True)
         if len(log.removed) == before:
@@ -106,6 +115,7 @@ class _Log:
     """Points taken out so far, and the ways to take out more."""
 
     removed: list[Rejection]
+    lost: Flags  # (p,): pairs that were solved from nothing once, which is worth no second attempt within a search
 
     def without_sets(
         self,
@@ -140,7 +150,7 @@ class _Log:
                     if spare[row] and size[row] > most[pair]:
                         self._remove(weight, np.array([row]), "residual", float(size[row]), float(most[pair]))
         changed = np.unique(pairs[weight != part.pairs.weight])
-        return orient_again(part, weight, changed)
+        return orient_again(part, weight, changed, self.lost)
 
     def without_beyond(self, part: Orientation, test: GlobalTest, todo: Numbers) -> Orientation:
         """Take all points out that lie far from the robust elements, the farthest first, as long as support lasts."""
@@ -157,7 +167,7 @@ class _Log:
                 support.counts[pair, support.zone[row] - 1] -= 1
                 value, limit = size[row] / test.sigma[pair], TUNING * scale[pair] / test.sigma[pair]
                 self._remove(weight, np.array([row]), "robust", float(value), float(limit))
-        return orient_again(part, weight, todo)
+        return orient_again(part, weight, todo, self.lost)
 
     def _remove(self, weight: Floats, rows: Numbers, test: str, value: float, limit: float) -> None:
         weight[rows] = 0.0

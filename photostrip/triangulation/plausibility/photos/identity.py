@@ -148,12 +148,12 @@ def find_double_ids_in_images(observations: PhotoPoints, rows: Numbers, strip_id
         return
     o = observations
     reach = SAME_IMAGE_SIGMAS * float(np.median(o.sigma[rows])) * np.sqrt(2.0)
-    photos = len(np.unique(o.photo[rows]))
-    area = float(np.prod(np.ptp(o.xy[rows], axis=0)))
-    pairs = len(rows) ** 2 / photos / 2.0  # of points on one photo, each counted on two photos at least
-    if pairs / LEAST_RAYS * (2.0 * reach) ** 2 / max(area, TINY) > MOST_BY_CHANCE:
-        return
     rows = rows[np.lexsort((o.xy[rows, 0], o.photo[rows]))]
+    first = np.flatnonzero(np.diff(o.photo[rows], prepend=-1))
+    extent = np.maximum.reduceat(o.xy[rows], first) - np.minimum.reduceat(o.xy[rows], first)
+    pairs = np.diff(first, append=len(rows)) ** 2 / 2.0  # of points on one photo, each counted on two photos at least
+    if (pairs / LEAST_RAYS * (2.0 * reach) ** 2 / np.maximum(extent.prod(axis=1), TINY)).sum() > MOST_BY_CHANCE:
+        return
     near: dict[tuple[int, int], list[float]] = {}
     for lag in range(1, len(rows)):
         step = np.abs(o.xy[rows[lag:]] - o.xy[rows[:-lag]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.triangulation.gross_errors.pairs import deletion, screening
+from photostrip.triangulation.gross_errors.pairs import deletion, pair_search, screening
 from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest, ParallaxScatter
-from photostrip.triangulation.relative_orientation import robust
-from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked
+from photostrip.triangulation.relative_orientation import robust, solution
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_again, orient_unchecked
 from photostrip.triangulation.robust import falling_weights
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, TruePairs, batch, true_pairs
@@ -24,6 +24,7 @@ from tests.vectors import Vector, cases
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
     Floats = NDArray[np.float64]
@@ -192,6 +193,31 @@ def test_errors_that_cannot_be_found_are_suspected() -> None:
     found = examined(spoiled(flown, errors))
     assert found.orientation.used.all()
     assert found.masked.tolist() == [True]
+
+
+@pytest.mark.parametrize("wrong", [0.55, 1.0])
+def test_what_no_search_can_put_right_is_given_up(wrong: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    from_nothing, again = list[int](), list[int]()
+    solve, oriented = solution.solve_elements, orient_again
+
+    def counted_solves(pairs: Pairs) -> solution.Solved:
+        from_nothing.append(pairs.size)
+        return solve(pairs)
+
+    def counted_rounds(*arguments: Any) -> Orientation:  # noqa: ANN401 (as they are)
+        again.append(1)
+        return oriented(*arguments)
+
+    monkeypatch.setattr(solution, "solve_elements", counted_solves)
+    monkeypatch.setattr(pair_search, "orient_again", counted_rounds)
+    rng = np.random.default_rng(16)
+    flown = level(16, 3, (20,) * 6)
+    rows = rng.random(len(flown.pairs.left)) < wrong
+    left = np.where(rows[:, None], rng.uniform(-100.0, 100.0, flown.pairs.left.shape), flown.pairs.left)
+    found = examined(replace(flown.pairs, left=left))
+    assert len(from_nothing) <= 8  # 76 times, one for every point that went, with 0.55
+    assert len(again) <= 20
+    assert found.masked.all()
 
 
 # --------------------------------------------------------------------------------------------- what can be seen
