@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.notes import Note
+from photostrip.triangulation.bundle.common_errors import DISTANCE
 from photostrip.triangulation.bundle.quality import reliability
 
 if TYPE_CHECKING:
@@ -54,8 +55,9 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
         )
         yield Note("unit-weight", text, severity="note")
     yield from _given_notes(bundle)
+    unasked = any(each.kind == DISTANCE for each in bundle.screened.common)
     for parameter in bundle.parameters:
-        if not parameter.significant:
+        if not parameter.significant and not (unasked and parameter.name == "principal_distance"):
             text = (
                 f"camera {parameter.camera}: {parameter.name} is {parameter.value:.3g} {parameter.unit} with a "
                 f"standard deviation of {parameter.sigma:.3g}: it does not differ significantly from "
