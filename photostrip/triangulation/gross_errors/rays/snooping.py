@@ -10,7 +10,7 @@ Source: [Baarda 1968], [Pope 1976].
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ from photostrip.triangulation.bundle.common_errors import CommonError, find_comm
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
+from photostrip.triangulation.bundle.quality.reliability import CONTROL, IMAGE
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
@@ -45,9 +46,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.quality.reliability import Limit
     from photostrip.triangulation.bundle.settings import BundleSettings
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
-
-
-MOST_COMMON_TRIALS = 5  # larger errors of single coordinates do not hide a common one from more
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +111,7 @@ def screen_bundle(
     done = search.clean(chosen)
     while (more := search.fitting(done)) is not None:  # a point comes back once only
         done = search.clean(more)
-    log = tuple(search.log(done, begin))
+    log = tuple(search.log(done))
     return replace(done, rejections=log, rounds=search.rounds, common=tuple(search.common))
 
 
@@ -129,13 +127,17 @@ class _Search:
         self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
         self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
         self.spared[images.point[[] if kept is None else kept]] = True
-        self.control = begin.control.copy()  # given coordinates that nothing has rejected
+        self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates not put in yet
+        self.control = begin.control.copy()  # those that were put in, and that nothing has rejected
         self.out: dict[tuple[str, int, int], Rejection] = {}
+        nothing = partial(Rejection, test="start", value=float("nan"), limit=float("nan"))
+        rays, given = np.flatnonzero(~begin.images).tolist(), np.argwhere(self.waiting).tolist()
+        self.began = {(IMAGE, row, 0): nothing(kind=IMAGE, row=row, cause=SEVERAL_RAYS) for row in rays}
+        self.began |= {(CONTROL, row, axis): nothing(kind=CONTROL, row=row, axes=(axis,)) for row, axis in given}
         self.latest: dict[int, Rejection] = {}  # what was last said of rays outside
         self.back: set[int] = set()  # points that came back; what must go again stays out
         self.rounds = 0
         self.common: list[CommonError] = []
-        self.common_trials = MOST_COMMON_TRIALS
 
     def rays_of(self, point: int) -> Numbers:
         """Rows of the rays of a point, in the order of the photos."""
@@ -159,16 +161,14 @@ class _Search:
         images = selection.images.copy()
         images[rows] = False
         for row in rows.tolist():
-            self.out[reliability.IMAGE, row, 0] = Rejection(
-                kind=reliability.IMAGE, row=row, test="robust", value=unknown, limit=unknown
-            )
+            self.out[IMAGE, row, 0] = Rejection(kind=IMAGE, row=row, test="robust", value=unknown, limit=unknown)
         return supported(self.problem, replace(selection, images=images))
 
     def clean(self, selection: Selection) -> ScreenedBundle:
         """Test and take out until nothing is beyond the limit."""
         done = self.adjust(selection)
         while (worst := self._worst(done)) or reliability.sigma0_test(done.solution).too_large:
-            if (not worst or worst[0].kind != reliability.IMAGE) and self._take_up_common(done, *worst):
+            if (not worst or worst[0].kind != IMAGE) and self._take_up_common(done, *worst):
                 done = self.adjust(done.selection)
                 continue
             if not worst:
@@ -178,9 +178,6 @@ class _Search:
 
     def _take_up_common(self, done: ScreenedBundle, worst: Rejection | None = None) -> bool:
         """Take up what a group of observations shares, where that explains more than the worst given coordinate."""
-        self.common_trials -= 1
-        if self.common_trials < 0:
-            return False
         found = find_common_error(self.problem, done.selection, done.solution, done.limit, worst)
         if found is None:
             return False
@@ -191,13 +188,13 @@ class _Search:
     def _without(self, done: ScreenedBundle, worst: list[Rejection]) -> ScreenedBundle:
         """Take observations out; points without which nothing would hold some photos stay, whatever the tests say."""
         selection = done.selection
-        axes = [0 if each.kind == reliability.IMAGE else each.axes[0] for each in worst]
+        axes = [0 if each.kind == IMAGE else each.axes[0] for each in worst]
         for each, axis in zip(worst, axes, strict=True):
             selection = selection.without(each.kind, each.row, axis)
         try:
             found = self.adjust(supported(self.problem, selection))
         except GeometryError:
-            if any(each.kind != reliability.IMAGE for each in worst):
+            if any(each.kind != IMAGE for each in worst):
                 raise
             points = self.problem.images.point[[each.row for each in worst]]
             first = points <= np.sort(points)[(len(points) - 1) // 2]
@@ -210,7 +207,7 @@ class _Search:
             return done
         for each, axis in zip(worst, axes, strict=True):
             self.out[each.kind, each.row, axis] = each
-            if each.kind == reliability.CONTROL:
+            if each.kind == CONTROL:
                 self.control[each.row, axis] = False
         return found
 
@@ -220,7 +217,7 @@ class _Search:
         rays, given = np.zeros(0), None
         for group in reliability.groups_of(done.problem, done.solution, done.precision):
             value = np.abs(np.nan_to_num(group.standardised)) / limit.unit
-            if group.kind == reliability.IMAGE:
+            if group.kind == IMAGE:
                 rays = self._doubtful(done.selection, value.max(axis=1), limit)
                 continue
             row, axis = np.unravel_index(int(value.argmax()), value.shape)
@@ -267,7 +264,7 @@ class _Search:
         axis = np.nan_to_num(np.abs(size)).argmax(axis=1)
         return [
             Rejection(
-                kind=reliability.IMAGE,
+                kind=IMAGE,
                 row=int(rows[place]),
                 axes=(int(axis[place]),),
                 test=self.settings.test,
@@ -325,7 +322,8 @@ class _Search:
                 self.back.add(number)
                 xyz[number] = place
                 images[rows] = ~decision.out | (images[rows] & self.spared[number])
-        self.control |= self._given(done, limit.value * limit.unit)
+        fits = self._given(done, limit.value * limit.unit)
+        self.control, self.waiting = self.control | fits, self.waiting & ~fits
         self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))
         chosen = supported(self.problem, replace(done.selection, images=images, control=self.control))
         same = (chosen.images == done.selection.images).all() and (chosen.control == done.selection.control).all()
@@ -359,35 +357,17 @@ class _Search:
         cofactor = -np.diagonal(done.precision.control_residuals, axis1=1, axis2=2)
         with np.errstate(invalid="ignore"):
             fits = error < limit * np.sqrt(control.sigma**2 + np.maximum(cofactor, 0.0))
-        tested = np.zeros(control.sigma.shape, bool)
-        for kind, row, axis in self.out:
-            if kind == reliability.CONTROL:
-                tested[row, axis] = True
-        return fits & np.isfinite(control.sigma) & ~self.control & ~tested
+        return np.asarray(fits & self.waiting, bool)
 
-    def log(self, done: ScreenedBundle, begin: Selection) -> Iterator[Rejection]:
-        """Return every observation that was out at some time."""
-        limit, unknown = done.limit.value, float("nan")
-        for (kind, row, axis), each in self.out.items():
+    def log(self, done: ScreenedBundle) -> Iterator[Rejection]:
+        """Return every observation that a test took out at some time, and those that began outside and stay there."""
+        holds = done.selection.holds
+        began = {key: each for key, each in self.began.items() if key not in self.out and not holds(*key)}
+        for (kind, row, axis), each in (self.out | began).items():
             found = each
-            if np.isnan(each.value) and kind == reliability.IMAGE and row in self.latest:
-                found = replace(self.latest[row], test=each.test)
-            yield replace(found, readmitted=done.selection.holds(kind, row, axis))
-        known = {row for kind, row, _ in self.out if kind == reliability.IMAGE}
-        for row in np.flatnonzero(~done.selection.images & ~begin.images).tolist():
-            if row not in known:
-                nothing = Rejection(
-                    kind=reliability.IMAGE, row=row, test="start", value=unknown, limit=limit, cause=SEVERAL_RAYS
-                )
-                yield replace(self.latest.get(row, nothing), test="start")
-        for row, axis in np.argwhere(~begin.control & np.isfinite(self.problem.control.sigma)).tolist():
-            if not done.selection.control[row, axis]:
-                yield Rejection(
-                    kind=reliability.CONTROL,
-                    row=row,
-                    axes=(axis,),
-                    test="start",
-                    value=unknown,
-                    limit=limit,
-                    size=tuple((-done.solution.control_residuals[row]).tolist()),
-                )
+            if np.isnan(each.value) and kind == IMAGE:
+                found = replace(self.latest.get(row, each), test=each.test)
+            elif np.isnan(each.value):
+                size = tuple((-done.solution.control_residuals[row]).tolist())
+                found = replace(each, limit=done.limit.value, size=size)
+            yield replace(found, readmitted=holds(kind, row, axis))
