@@ -10,7 +10,7 @@ Source: derived; see docs/independent-models.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,6 +75,34 @@ def differentiate_models(formed: FormedModels, similarity: Similarity) -> ModelE
         share=np.where(formed.used, 1 / formed.node_models[np.maximum(item, 0)], 0.0),
         by_similarity=similarity_derivatives(nodes, origin),
         models=models.count,
+    )
+
+
+def section(errors: ModelErrors, nodes: Numbers) -> ModelErrors:
+    """Errors of the models that hold some nodes, relative to the first of these models.
+
+    What the links before them do moves all the nodes by one similarity. Without it the covariances do not grow with the
+    length of the strip before the section, nor does the work.
+    """
+    model = errors.model[np.isin(errors.item, nodes)]
+    first, last = int(model.min()), int(model.max())
+    rows = np.flatnonzero((errors.model >= first) & (errors.model <= last))
+    entries = np.flatnonzero((errors.link >= first) & (errors.link < last))
+    row, entry = np.full(len(errors.model), -1), np.full(len(errors.link) + 1, -1)
+    row[rows], entry[entries] = np.arange(len(rows)), np.arange(len(entries))  # and entry[-1], none, stays none
+    return replace(
+        errors,
+        covariance=errors.covariance[rows],
+        before=entry[errors.before[rows]],
+        after=entry[errors.after[rows]],
+        gain=errors.gain[entries],
+        link=errors.link[entries] - first,
+        first=row[errors.first[entries]],
+        second=row[errors.second[entries]],
+        model=errors.model[rows] - first,
+        item=errors.item[rows],
+        share=errors.share[rows],
+        models=last - first + 1,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,10 +37,16 @@ def weights(found: Misclosures, rows: Numbers, operator: Floats | None = None) -
 
 
 def covariance(errors: ModelErrors, found: Misclosures, rows: Numbers, factor: float) -> Floats:
-    """Covariance of all misclosures, strip and control together, metres^2, shape (w, w).
+    """Covariance of misclosures, strip and control together, metres^2, shape (w, w), but for a common similarity.
+
+    It is relative to the first model that holds one of the points: an adjustment of the misclosures by a similarity
+    does not depend on that.
 
     rows: (n,), rows of the control points in the points of the strip.
     factor: variance factor of the model coordinates.
     """
-    spread = model_errors.covariance_of_sums(errors, model_errors.sums(errors, *weights(found, rows)))
+    used, point = np.unique(found.point, return_inverse=True)
+    nodes, each = weights(replace(found, point=point), rows[used])
+    part = model_errors.section(errors, nodes)
+    spread = model_errors.covariance_of_sums(part, model_errors.sums(part, nodes, each))
     return np.asarray(spread * factor + np.diag(found.variance), float)

@@ -205,6 +205,28 @@ def test_covariances_are_those_of_a_numerical_jacobian() -> None:
     assert np.abs(model_errors.with_sums(found, sums) - mixed).max() < 1e-3 * np.abs(mixed).max()
 
 
+@pytest.mark.parametrize("beyond", [0, 3])
+def test_a_section_is_as_the_whole_strip_but_for_a_similarity(beyond: int) -> None:
+    """What an adjustment by a similarity makes of its covariance is the same; the models before are not needed."""
+    given = truth(7, 3, 6)
+    measured = given.measured(np.random.default_rng(1).normal(size=(len(given.model), 3)))
+    formed = nodes_of(measured)
+    found = model_errors.differentiate_models(formed, Similarity.from_points(formed.xyz, given.points[formed.point]))
+    last = np.full(len(formed.node), len(formed.node))
+    np.minimum.at(last, found.item, found.model)
+    nodes = np.flatnonzero(last >= beyond)
+    part = model_errors.section(found, nodes)
+    assert part.models == 7 - beyond
+    weights = np.eye(3 * len(nodes)).reshape(-1, len(nodes), 3)
+    whole, alone = (
+        model_errors.covariance_of_sums(each, model_errors.sums(each, nodes, weights)) for each in (found, part)
+    )
+    assert (np.abs(whole - alone).max() > 0.1 * np.abs(alone).max()) == bool(beyond)
+    design = found.by_similarity[nodes].reshape(-1, 7)
+    rest = np.eye(len(design)) - design @ np.linalg.pinv(design)
+    assert np.abs(rest @ (whole - alone) @ rest).max() < 1e-9 * np.abs(whole).max()
+
+
 def test_centers_follow_the_polynomial_as_a_stiff_body() -> None:
     """The rows are the polynomial at the ground, tilted by its slope, stretched by its scale: by differences."""
     rng = np.random.default_rng(3)

@@ -84,9 +84,10 @@ def not_screened(control: ControlPoints) -> ScreenedControl:
 
 def _searched(strip: StripAtControl) -> Found | None:
     """Search for what is wrong in a section; None where its control does not check itself."""
-    covariance = strip.covariance(np.arange(len(strip.coordinates.point)))
-    if len(covariance) <= strip.design.shape[1]:
+    count = len(strip.coordinates.point)
+    if count <= strip.design.shape[1]:
         return None
+    covariance = strip.covariance(np.arange(count))
     found = [_laid(strip, covariance, lambda _: ())]
     if not found[0].left.explained:  # much may be wrong
         found += [_laid(strip, covariance, candidates, bends=bends) for bends in (True, False)]
