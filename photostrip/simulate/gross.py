@@ -83,7 +83,8 @@ def spoil_images(spec: Spec, observations: PhotoPoints) -> tuple[PhotoPoints, tu
     for number, entry in _entries(spec, {"image", "swap"}):
         draws = Draws(spec.seed, Purpose.GROSS, number)
         order = draws.order(len(xy))
-        fits = np.isin(photo, entry.photo or photo) & np.isin(point, entry.point or point)
+        fits = np.ones(len(xy), bool) if entry.photo is None else photo == entry.photo
+        fits &= entry.point is None or point == entry.point
         for _ in range(entry.count):
             row = _take(order[(fits & free)[order]], number, replace(entry, count=1))[0]
             axis, sign, partner = draws.uniform(3)
