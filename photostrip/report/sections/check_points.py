@@ -36,7 +36,7 @@ def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
             else "None. What lies between the control points is not proven by anything in this report."
         )
         return Section("Check points", (Words(text),))
-    text = "Adjusted minus given. These points took no part in anything: they say how good the new points are."
+    text = "Adjusted minus given. These points took no part in the adjustment: they show how good the new points are."
     check = document.get("precision", {}).get("check")
     if check and check["points"] and "p_plan" in check["points"][0]:  # results of older versions have no probabilities
         table = _tested(document, rows, everything=everything, most=most)

@@ -13,6 +13,7 @@ from photostrip.report.sections.overview import MOST_LINES, overview
 from tests.loops import nonempty
 from tests.reports import saved
 from tests.results import FRAMES, Document, case
+from tests.source_tree import ROOT
 
 
 def lines(document: Document) -> list[str]:
@@ -132,3 +133,8 @@ def test_every_section_has_a_name_and_keeps_its_place() -> None:
     assert missing == [
         "findings", "fiducials", "links", "models", "covariance", "bundle", "deformations", "cross-validation"
     ]  # fmt: skip
+
+
+def test_the_manual_names_every_section() -> None:
+    page = (ROOT / "docs/commands/report.md").read_text(encoding="utf-8")
+    assert [name for name in SectionName if f"`{name}`" not in page] == []
