@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.image_coordinates import corrections
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
     from photostrip.triangulation.independent_models.formation import FormedModels
-    from photostrip.triangulation.plausibility.control.stretched_heights import StretchedHeights
+    from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
     from photostrip.triangulation.polynomial import correction as polynomial
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.resection import resection as exterior
@@ -118,7 +118,7 @@ class StripResult:
     notes: tuple[Note, ...]  # what this strip's numbers say beside themselves
     # control coordinates that were not used; ``control`` says so in its ``use``
     screened_control: ScreenedControl
-    stretch: StretchedHeights | None = None  # what all control shares, found before points were tested one by one
+    shared: StretchedHeights | ShiftedList | None = None  # by all control, found before points were tested one by one
     photo_stages: PhotoStages | None = None  # None for independent models
     model_stages: ModelStages | None = None  # None for photos
 

@@ -15,18 +15,15 @@ import numpy as np
 from photostrip.pipeline.plausibility import evidence
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control import control_heights
-from photostrip.triangulation.plausibility.finding import ERROR
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
-    from photostrip.pipeline.results import StripResult
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.plausibility.control.control_heights import HeightStretch
-    from photostrip.triangulation.plausibility.control.stretched_heights import StretchedHeights
     from photostrip.triangulation.plausibility.finding import Evidence
 
     Compare = Callable[[EvidenceStrip], HeightStretch | None]
@@ -92,39 +89,6 @@ def find_distance_without_pairs(
             numbers: Evidence = {"misfit_then": trial.misfit, "pairs_sigma0_then_mm": trial.sigma0}
             return _finding(strip, trial.factor, "can be formed and fits the heights of its control only", numbers)
     return []
-
-
-def find_stretched(strips: Sequence[StripResult], findings: Sequence[Finding]) -> list[Finding]:
-    """Name the strips whose control, all together, asks for another principal distance (P107, P105).
-
-    findings: what was found before: a strip whose distance is named already, or whose control is misread, is not named.
-    """
-    named = {name for each in findings if each.severity == ERROR or each.code == "P107" for name in each.strips}
-    found_now = []
-    for each in strips:
-        stretch, strip = each.stretch, each.of_photos.strip if each.photo_stages else None
-        if stretch is not None and strip is not None and strip.id not in named:
-            found_now.append(_stretched(strip, stretch))
-    return found_now
-
-
-def _stretched(strip: Strip, stretch: StretchedHeights) -> Finding:
-    given, factor = strip.camera.principal_distance, 1.0 / (1.0 + stretch.share)
-    sigma = given * stretch.sigma * factor**2
-    message = (
-        f"the heights of strip {strip.id} are stretched by {100 * stretch.share:+.2f} % against its control, as by a "
-        f"wrong principal distance: {given * factor:.2f} mm would fit (standard deviation {sigma:.2g} mm), "
-        f"{given:g} mm is given; no control was tested by itself"
-    )
-    evidence_: Evidence = {
-        "heights_stretched": stretch.share,
-        "principal_distance_mm": given,
-        "would_fit_mm": given * factor,
-        "standard_deviation_mm": sigma,
-    }
-    code = "P107" if abs(stretch.share) < control_heights.LEAST_SCALE_ERROR else "P105"
-    key = f"cameras.{strip.camera.name}.principal_distance"
-    return found(code, message, "take it from the certificate", evidence_, strips=(strip.id,), key=key)
 
 
 def _middle_sigma0(formed: EvidenceStrip) -> float:

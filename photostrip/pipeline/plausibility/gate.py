@@ -17,10 +17,10 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.plausibility import (
     control_layout,
-    distance_trial,
     evidence,
     given_cameras,
     given_control,
+    shared_control,
     slips,
 )
 from photostrip.pipeline.plausibility.given_control import GivenControl
@@ -88,7 +88,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         from photostrip.pipeline.plausibility import shared_errors  # a strip needs nothing of a bundle
 
         findings += shared_errors.of_bundle(result.bundle, inputs)
-    findings += distance_trial.find_stretched(stages, findings)
+    findings += shared_control.find_shared_errors(stages, findings)
     return accepted(findings, settings.accept)
 
 

@@ -19,7 +19,7 @@ from photostrip.pipeline.inputs import Strip
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay, StripAtControl
-from photostrip.triangulation.plausibility.control.stretched_heights import find_stretch
+from photostrip.triangulation.plausibility.control.shared_by_control import find_shared
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
-    from photostrip.triangulation.plausibility.control.stretched_heights import StretchedHeights
+    from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
     from photostrip.triangulation.polynomial.correction import Polynomial
 
 
@@ -149,7 +149,7 @@ class ScreenedStrip(Generic[Errors]):
 
     oriented: OrientedStrip[Errors]
     screened_control: ScreenedControl
-    stretch: StretchedHeights | None = None  # what all control shares, found before points were tested one by one
+    shared: StretchedHeights | ShiftedList | None = None  # by all control, found before points were tested one by one
 
 
 def orient_on_control(
@@ -189,9 +189,9 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
         covariance=partial(stage.misclosure_covariance, oriented),
         share=1.0,
     )
-    stretch = find_stretch(place) if isinstance(stage.strip, Strip) else None
-    if stretch is not None:  # single points prove nothing then
-        return ScreenedStrip(oriented, control_screening.not_screened(control), stretch)
+    shared = find_shared(place) if isinstance(stage.strip, Strip) else None
+    if shared is not None:  # single points prove nothing then
+        return ScreenedStrip(oriented, control_screening.not_screened(control), shared)
     screened = control_screening.screen_control(place)
     if screened.rejections:
         oriented = to_ground(stage, screened.kept, oriented.control_rows, oriented.frames)

@@ -163,7 +163,7 @@ class FormedPhotos:
                 *notes.covariance_notes(strip, oriented.control, covariance),
             ),
             screened_control=screened.screened_control,
-            stretch=screened.stretch,
+            shared=screened.shared,
             photo_stages=PhotoStages(
                 strip=strip,
                 sigma=self.sigma,

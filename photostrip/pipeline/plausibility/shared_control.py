@@ -1,0 +1,88 @@
+"""What all control of a strip shares, or that of one list: another principal distance, another frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.triangulation.plausibility import found
+from photostrip.triangulation.plausibility.control import control_heights
+from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList
+from photostrip.triangulation.plausibility.finding import ERROR
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from photostrip.notes import Finding
+    from photostrip.pipeline.inputs import Strip
+    from photostrip.pipeline.results import StripResult
+    from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
+    from photostrip.triangulation.plausibility.finding import Evidence
+
+SHOWN_SIGMAS = 4.0  # standard deviations from which a shift in plan is one
+
+
+def find_shared_errors(strips: Sequence[StripResult], findings: Sequence[Finding]) -> Iterator[Finding]:
+    """Name what the control of strips shares (P105, P107, P404, P407).
+
+    findings: what was found before: a strip whose distance is named already, or whose control is misread, is not named.
+    """
+    misread = {name for each in findings if each.severity == ERROR for name in each.strips}
+    named = {name for each in findings if each.code == "P107" for name in each.strips}
+    for each in strips:
+        shared, strip = each.shared, each.of_photos.strip if each.photo_stages else None
+        if shared is None or strip is None or strip.id in misread:
+            continue
+        if isinstance(shared, ShiftedList):
+            yield _shifted(strip, shared, each)
+        elif strip.id not in named:
+            yield _stretched(strip, shared)
+
+
+def _shifted(strip: Strip, shared: ShiftedList, result: StripResult) -> Finding:
+    plan = bool((np.abs(shared.shift) > SHOWN_SIGMAS * shared.sigma)[:2].any())
+    steps = [
+        f"{step:+.2f} m {axis} (standard deviation {sigma:.2g} m)"
+        for step, sigma, axis in zip(shared.shift, shared.sigma, GROUND_AXES, strict=True)
+        if np.isfinite(step)
+    ]
+    control = result.control
+    points = tuple(name for name, number in zip(control.ids, control.frame, strict=True) if number == shared.number)
+    key = f"control[{shared.number}]"
+    message = (
+        f"{key} lies beside the other control of strip {strip.id}, all of it by {', '.join(steps)}; no control was "
+        "tested by itself"
+    )
+    fix = (
+        "is its crs the right one: zone, datum, false easting?"
+        if plan
+        else "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"
+    )
+    evidence: Evidence = {
+        f"offset_{axis}_m": float(step)
+        for step, axis in zip(shared.shift, GROUND_AXES, strict=True)
+        if np.isfinite(step)
+    }
+    code = "P407" if plan else "P404"
+    return found(code, message, fix, evidence, points=points, strips=(strip.id,), key=key)
+
+
+def _stretched(strip: Strip, stretch: StretchedHeights) -> Finding:
+    given, factor = strip.camera.principal_distance, 1.0 / (1.0 + stretch.share)
+    sigma = given * stretch.sigma * factor**2
+    message = (
+        f"the heights of strip {strip.id} are stretched by {100 * stretch.share:+.2f} % against its control, as by a "
+        f"wrong principal distance: {given * factor:.2f} mm would fit (standard deviation {sigma:.2g} mm), "
+        f"{given:g} mm is given; no control was tested by itself"
+    )
+    evidence_: Evidence = {
+        "heights_stretched": stretch.share,
+        "principal_distance_mm": given,
+        "would_fit_mm": given * factor,
+        "standard_deviation_mm": sigma,
+    }
+    code = "P107" if abs(stretch.share) < control_heights.LEAST_SCALE_ERROR else "P105"
+    key = f"cameras.{strip.camera.name}.principal_distance"
+    return found(code, message, "take it from the certificate", evidence_, strips=(strip.id,), key=key)

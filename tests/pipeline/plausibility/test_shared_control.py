@@ -1,0 +1,50 @@
+"""A control list that lies beside the others as a whole is named as such, and none of its points alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.formats.output.simulation import inputs_of, settings_of
+from photostrip.pipeline import triangulate
+from photostrip.simulate import Control, Flight, GrossError, Spec
+from photostrip.simulate.simulation import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.pipeline.results import Result
+
+
+def two_lists(shift: Sequence[float], *errors: GrossError) -> Result:
+    """Adjust a strip of which every third control point stands in a second list, shifted as a whole."""
+    spec = Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4), gross_errors=errors)
+    simulation = simulate(spec)
+    inputs = inputs_of(simulation)
+    control = inputs.control
+    second = np.arange(len(control)) % 3 == 0
+    control = replace(control, frame=second.astype(np.intp), enu=control.enu + np.outer(second, shift))
+    frames = (inputs.frames[0], replace(inputs.frames[0]))
+    return triangulate(replace(inputs, control=control, frames=frames), settings_of(simulation))
+
+
+@pytest.mark.parametrize(("shift", "code"), [((2.0, 1.0, 0.0), "P407"), ((0.0, 0.0, 2.0), "P404")])
+def test_a_list_that_lies_beside_the_others_is_named(shift: tuple[float, float, float], code: str) -> None:
+    """All its points were rejected one by one, and nothing said that they share one error."""
+    result = two_lists(shift)
+    (finding,) = result.findings
+    assert finding.code == code
+    assert finding.key == "control[1]"
+    assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.3)
+    assert result.strips[0].wrong_control == ()
+
+
+def test_lists_that_go_together_share_nothing() -> None:
+    """With single wrong points too."""
+    assert two_lists((0.0, 0.0, 0.0)).findings == ()
+    result = two_lists((0.0, 0.0, 0.0), GrossError("control", count=2, size_m=3.0))
+    assert {each.code for each in result.findings} <= {"P406"}
+    assert len(result.strips[0].wrong_control) == 2
