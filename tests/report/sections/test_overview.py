@@ -79,8 +79,11 @@ def test_each_stage_has_one_line() -> None:
 
 def test_the_worst_check_points_are_shown_and_the_others_counted() -> None:
     document = crowded()
-    for number, row in enumerate(row for row in document["control"] if row["role"] == "check"):
-        row["normalised"] = float(number)
+    checks = [row["id"] for row in document["control"] if row["role"] == "check"]
+    known = document["precision"]["check"]["points"][0]
+    document["precision"]["check"]["points"] = [
+        {**known, "id": name, "plan": float(number), "p_plan": 1.0 / (1 + number)} for number, name in enumerate(checks)
+    ]
     (section,) = (each for each in overview(document) if each.title == "Check points")
     (table,) = (part for part in section.parts if isinstance(part, Table))
     assert [row[0] for row in table.rows[:2]] == ["299", "298"]
