@@ -172,3 +172,15 @@ def test_false_alarms_prints_a_row_for_each_layout() -> None:
     out = printed("false_alarms.py", "--count", "1", "--first", "7", "corners", "GNSS")
     assert len(re.findall(r"^(?:corners|blocks|strips)[\w ,]+ +1 +0", out, re.MULTILINE)) == 3
     assert re.search(r"^all +3 +0 +0\.00 %$", out, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_verdict_prints_what_is_seen() -> None:
+    out = printed("verdict.py", "--number", "1", "--first", "3")
+    rows = re.findall(
+        r"^(.{28})(check points|left out) +(\d) +(\d) +(\d) +(\d) +(\d) +\d\.\d\d +\d\.\d\d", out, re.MULTILINE
+    )
+    assert [row[1] for row in rows] == ["check points", "left out"] * 3
+    assert all(sum(map(int, row[2:6])) == 1 for row in nonempty(rows))
+    assert rows[0][2] == rows[1][2] == "1"  # the sound ones are good
+    assert rows[4][6] == rows[5][6] == "1"  # control ten times worse than stated is seen
