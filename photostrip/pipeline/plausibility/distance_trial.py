@@ -32,6 +32,7 @@ LEAST_MISFIT = 2.5  # times what makes sense: heights that fit better need no ot
 LEFT_SHARE = 0.4  # of that misfit, left with another principal distance that is reported
 MOST_SIGMA0_RATIO = 1.1  # times the sigma0 of the pairs
 BETTER_SIGMA0_RATIO = 0.7  # times that sigma0: pairs that ask for the other distance themselves
+BEND_POWER = 1.5  # of the number of photos: so does the bend of a strip grow, which is a small part of that
 TRIALS = 3  # of forming a strip anew
 GIVEN_UP_MISFIT = 60.0  # misfit after two of them
 MOST_PHOTOS = 40  # photos: a longer strip would take too long
@@ -61,13 +62,15 @@ def find_wrong_distance(
     if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
         return []
     sigma0, stated = _middle_sigma0(formed), formed.strip.median_sigma(observations)
-    if first.in_relief * LEFT_SHARE < 1.0 and sigma0 * BETTER_SIGMA0_RATIO < stated:
+    no_bend = first.misfit > len(formed.strip.photos) ** BEND_POWER
+    if not no_bend and first.in_relief * LEFT_SHARE < 1.0 and sigma0 * BETTER_SIGMA0_RATIO < stated:
         return []  # neither heights nor pairs could be so much better
     for start in (first.ratio, *FIRST_FACTORS):
         trial = _followed(formed.strip, observations, settings, compare, start)
         if trial is None or trial.misfit > LEFT_SHARE * first.misfit or trial.sigma0 > MOST_SIGMA0_RATIO * sigma0:
             continue
-        if trial.in_relief < LEFT_SHARE * first.in_relief or trial.sigma0 < BETTER_SIGMA0_RATIO * sigma0:
+        in_relief = no_bend or trial.in_relief < LEFT_SHARE * first.in_relief
+        if in_relief or trial.sigma0 < BETTER_SIGMA0_RATIO * sigma0:
             break  # else a bend of the strip explains it
     else:
         return []

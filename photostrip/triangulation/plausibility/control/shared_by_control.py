@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control.control_deletion import JointAdjustment
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
+EARTH_RADIUS = 6.37e6  # metres
 MORE_THAN_ALONE = 1.0 + 1e-6  # of what one point explains: a list may have one point only
 FALSE_ALARM = 1e-5  # probability of an error of all where there is none
 
@@ -65,9 +66,29 @@ def find_shared(strip: StripAtControl) -> StretchedHeights | ShiftedList | None:
 
 def _stretch(strip: StripAtControl, whole: JointAdjustment, alone: float) -> StretchedHeights | None:
     place = strip.coordinates
-    height = strip.placed[:, HEIGHT] - strip.placed[:, HEIGHT].mean()
-    tested = _tested(whole, (place.direction[:, HEIGHT] * height[place.point])[:, None], alone)
-    return None if tested is None else StretchedHeights(float(tested.value[0]), float(tested.sigma[0]), tested.gain)
+    of_strip = strip.placed[:, HEIGHT] - strip.placed[:, HEIGHT].mean()
+    # a strip that bends has heights where the ground has none, and wrong heights are none of the strip
+    tested, also = (
+        _tested(whole, (place.direction[:, HEIGHT] * height[place.point])[:, None], alone)
+        for height in (_relief(strip, whole.w), of_strip)
+    )
+    if tested is None or also is None:
+        return None
+    return StretchedHeights(float(tested.value[0]), float(tested.sigma[0]), tested.gain)
+
+
+def _relief(strip: StripAtControl, w: Floats) -> Floats:
+    """Heights of the ground at the control (n,), against their mean, metres.
+
+    They are those given, without what the curvature of the Earth takes from a plane: the photos follow it.
+    """
+    height, place = strip.placed[:, HEIGHT].copy(), strip.coordinates
+    rows = np.flatnonzero(place.axis == HEIGHT)
+    height[place.point[rows]] -= w[rows]
+    if strip.frames[0].kind != "local":
+        d = strip.placed[:, :HEIGHT] - strip.placed[:, :HEIGHT].mean(axis=0)
+        height += (d**2).sum(axis=1) / (2.0 * EARTH_RADIUS)
+    return np.asarray(height - height.mean(), float)
 
 
 def _shifts(strip: StripAtControl, whole: JointAdjustment, alone: float) -> list[ShiftedList]:
