@@ -377,10 +377,10 @@ def dense(seed: int) -> Sound:
     def draw(rng: Rng) -> Spec:
         spec = in_block(rng)
         flight = replace(spec.flight, strips=int(rng.integers(1, 4)), end_lap_percent=float(rng.uniform(60, 82)))
-        points = Points(rows=5, extra_per_model=int(rng.integers(100, 400)))
+        points = Points(rows=5, extra_per_model=int(rng.integers(60, 250)))
         return replace(spec, camera=DIGITAL, flight=flight, points=points)
 
-    return replace(sound_of(made(rng, seed, draw), str(rng.choice(METHODS[1:]))))
+    return sound_of(made(rng, seed, draw), "bundle")
 
 
 LAYOUTS: dict[str, Callable[[int], Sound]] = {

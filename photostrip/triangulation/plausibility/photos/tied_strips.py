@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 LEAST_TIES = 1 + LEAST_REDUNDANCY  # a shift fits one tie
 TWO_RAYS = 2
+MANY_RAYS_SHARE = 0.002  # of the flying height: of thousands of ties some are worse than the others
 ONE_RAY_SHARE = 0.01  # of the flying height: an image coordinate along the base that is off by a millimetre moves less
 
 
@@ -50,8 +51,9 @@ def find_shared_ids_of_strips(ties: TiesOfStrips) -> Iterator[Finding]:
     columns = [np.ones_like(local), local, np.conj(local), local**2, np.abs(local) ** 2, np.conj(local) ** 2]
     _, fit = fit_simplest(columns, 1, off, np.ones(len(off), bool), ties.sigma)
     far = np.abs(fit.residual)
+    least = np.where(ties.rays > TWO_RAYS, MANY_RAYS_SHARE, ONE_RAY_SHARE)
     one, other = ties.strips
-    for row in np.flatnonzero(fit.odd & ((ties.rays > TWO_RAYS) | (far > ONE_RAY_SHARE * ties.depth))).tolist():
+    for row in np.flatnonzero(fit.odd & (far > least * ties.depth)).tolist():
         message = (
             f"point {ties.names[row]} stands for two points: strip {other} puts it {far[row]:.4g} m away from where "
             f"strip {one} puts it; half of the other common points agree within {_others(far, row):.2g} m"
