@@ -1,6 +1,7 @@
 """A result that is read again, checked against the description of its keys: a user may have edited the file.
 
-Every value is of the kind that its key is described with, every number is finite and every text can be written.
+A key that is missing is told where it is asked for, with the keys that lead to it: a baseline holds a part only. Every
+value is of the kind that its key is described with, every number is finite and every text can be written.
 """
 
 from __future__ import annotations
@@ -35,6 +36,27 @@ def faults_of(document: dict[str, Any], file: str) -> list[Fault]:
 
 
 Wrong = tuple[str, str, str]  # key, what is wrong with it, what is expected there
+
+
+class Located(dict[str, Any]):
+    """A block of a result that knows which keys lead to it, and says so of a key that it lacks."""
+
+    path: str
+
+    def __missing__(self, key: str) -> Any:  # noqa: ANN401 (it never returns)
+        raise KeyError(f"{self.path}.{key}" if self.path else key)
+
+
+def located(value: Any, path: str = "") -> Any:  # noqa: ANN401 (any part of a document)
+    """Give the blocks of a document the keys that lead to them."""
+    if isinstance(value, list):
+        numbers = bool(value) and not isinstance(value[0], dict | list)
+        return value if numbers else [located(each, f"{path}[{place}]") for place, each in enumerate(value)]
+    if not isinstance(value, dict):
+        return value
+    block = Located({key: located(each, f"{path}.{key}" if path else key) for key, each in value.items()})
+    block.path = path
+    return block
 
 
 def _wrong(block: dict[str, Any], table: Table, path: str) -> Iterator[Wrong]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from random import Random
 from typing import TYPE_CHECKING
 
@@ -65,6 +66,19 @@ def test_a_wrong_value_is_refused_with_file_and_key(key: str, text: str, words: 
     assert (fault.code, fault.file) == ("result-value", str(file))
     assert fault.key == ("settings.relative[0]" if key == "settings.relative" else key)
     assert words in str(fault)
+
+
+@pytest.mark.parametrize(("command", "key"), [("report", "models[1].left"), ("compare", "models[1].left")])
+def test_a_missing_key_is_told_with_all_that_lead_to_it(
+    command: str, key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = json.loads(RESULT.read_text(encoding="utf-8"))
+    block, number, last = re.split(r"\[|\]\.", key)
+    del document[block][int(number)][last]
+    file = tmp_path / "result.json"
+    file.write_text(to_json(document), encoding="utf-8")
+    assert main([command, str(file), *([str(RESULT)] if command == "compare" else [])]) == 2
+    assert f"key '{key}' is missing" in capsys.readouterr().err
 
 
 def test_digits_by_the_thousand_are_refused(tmp_path: Path) -> None:

@@ -79,6 +79,16 @@ def test_every_harm_does_some(right: list[dict[str, bytes]], harm: object) -> No
     assert isinstance(harm(b"", Random(1)), bytes)
 
 
+def test_ids_that_no_table_shares_are_told(right_blocks: list[dict[str, bytes]], tmp_path: Path) -> None:
+    files = dict(right_blocks[-1])  # of single photos
+    rows = files["observations.csv"].splitlines()
+    files["observations.csv"] = b"\n".join(
+        [rows[0], *(row.replace(b",", b",%d-" % n, 1) for n, row in enumerate(rows[1:]))]
+    )
+    outcome = tried(Case(files), tmp_path, "run")
+    assert (outcome.code, outcome.faults) == (3, ())
+
+
 # ------------------------------------------------------------------------------------------ the judge can condemn
 
 

@@ -339,7 +339,7 @@ def test_a_damaged_result_is_refused_in_words(result: Path, tmp_path: Path, caps
     code, out, err = run(capsys, "report", file)
     assert (code, out) == (2, "")
     assert err == (
-        f"error: {file}: cannot be reported: key 'sigma0_um' is missing; expected a whole result.json; "
+        f"error: {file}: cannot be reported: key 'models[0].sigma0_um' is missing; expected a whole result.json; "
         "run the project again\n"
     )
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
-from photostrip.result.reading import faults_of
+from photostrip.result.reading import faults_of, located
 from photostrip.visible import visible_json
 
 if TYPE_CHECKING:
@@ -76,4 +76,5 @@ def read_result(file: str) -> Document:
         refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
     if faults:
         raise InputError(faults)
-    return document
+    whole: Document = located(document)
+    return whole

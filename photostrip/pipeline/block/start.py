@@ -172,6 +172,9 @@ def _together(
     centers = np.array([oriented[name][0] for name in names])
     rotations = np.array([oriented[name][1] for name in names])
     points = _rest(inputs, observations, (centers, rotations), _with_control(points, observations, known))
+    if np.isnan(points[:, 0]).all():
+        message = "no point stands on two photos or is given; do the ids of points in the tables agree?"
+        raise GeometryError(message, code="bundle-rays")
     return BlockStart(
         strips=strips,
         photos=names,

@@ -36,6 +36,9 @@ BEND_POWER = 1.5  # of the number of photos: so does the bend of a strip grow, w
 TRIALS = 3  # of forming a strip anew
 GIVEN_UP_MISFIT = 60.0  # misfit after two of them
 MOST_PHOTOS = 40  # photos: a longer strip would take too long
+MOST_POINTS = (
+    20_000  # image points of all strips formed for trials: of 20 photos with 200 points two starts are followed
+)
 FACTOR_RANGE = (0.2, 5.0)  # of the principal distance given
 FIRST_FACTORS = (1.4, 0.7, 2.0, 0.5)  # tried when the pairs cannot be oriented at all
 
@@ -65,7 +68,7 @@ def find_wrong_distance(
     no_bend = first.misfit > len(formed.strip.photos) ** BEND_POWER
     if not no_bend and first.in_relief * LEFT_SHARE < 1.0 and sigma0 * BETTER_SIGMA0_RATIO < stated:
         return []  # neither heights nor pairs could be so much better
-    for start in (first.ratio, *FIRST_FACTORS):
+    for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(formed.strip, observations)]:
         trial = _followed(formed.strip, observations, settings, compare, start)
         if trial is None or trial.misfit > LEFT_SHARE * first.misfit or trial.sigma0 > MOST_SIGMA0_RATIO * sigma0:
             continue
@@ -86,12 +89,19 @@ def find_distance_without_pairs(
     strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare
 ) -> list[Finding]:
     """Try other principal distances on a strip whose pairs cannot be oriented (P105, at most one)."""
-    for start in FIRST_FACTORS if len(strip.photos) <= MOST_PHOTOS else ():
+    most = _most_starts(strip, observations) if len(strip.photos) <= MOST_PHOTOS else 0
+    for start in FIRST_FACTORS[:most]:
         trial = _followed(strip, observations, settings, compare, start)
         if trial is not None and trial.misfit < LEAST_MISFIT:
             numbers: Evidence = {"misfit_then": trial.misfit, "pairs_sigma0_then_mm": trial.sigma0}
             return _finding(strip, trial.factor, "can be formed and fits the heights of its control only", numbers)
     return []
+
+
+def _most_starts(strip: Strip, observations: PhotoPoints) -> int:
+    """Count the starts that a strip with so many points allows."""
+    points = int((strip.positions(observations) >= 0).sum())
+    return max(MOST_POINTS // (TRIALS * max(points, 1)), 1)
 
 
 def _middle_sigma0(formed: EvidenceStrip) -> float:

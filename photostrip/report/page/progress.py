@@ -149,7 +149,7 @@ class BatchTable:
     def say(self, text: str) -> None:
         """Say something, above the table where there is one."""
         if self._live is not None:
-            self._live.console.print(text, soft_wrap=True)
+            self._live.console.print(visible(text), soft_wrap=True)
         else:
             self.stream.write(f"{visible(text)}\n")
             self.stream.flush()
@@ -180,7 +180,7 @@ class BatchTable:
         page.add_column(justify="right")
         page.add_column(no_wrap=True, overflow="ellipsis")
         for project, begin in running[:ROWS]:
-            page.add_row(clock(now - begin), project)
+            page.add_row(clock(now - begin), visible(project))
         if len(running) > ROWS:
             page.add_row("", f"and {len(running) - ROWS} more")
         return page

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
-from photostrip.notes import counted
 from photostrip.triangulation.bundle.normal_equations import datum, defects
 from photostrip.triangulation.bundle.normal_equations.reduced import (
     control_residuals,
@@ -89,9 +87,7 @@ def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> tuple[Par
         if damping > LARGEST_DAMPING:
             break
         best = reduce(prepared, state, damping)
-    raise GeometryError(
-        f"the bundle adjustment did not converge in {counted(len(steps), 'step')}", code="bundle-diverged"
-    )
+    raise defects.diverged(prepared, state, len(steps))
 
 
 def _still_to_come(steps: list[IterationStep]) -> float:

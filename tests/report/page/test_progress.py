@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.report.page import progress as module
 from photostrip.report.page.layout import cells
-from photostrip.report.page.progress import WIPE, Progress, progress, wanted
+from photostrip.report.page.progress import WIPE, Progress, batch_table, progress, wanted
 
 
 class Terminal(io.StringIO):
@@ -91,3 +91,15 @@ def test_a_terminal_that_is_gone_stops_nothing(monkeypatch: pytest.MonkeyPatch) 
 
 def _broken(_text: str) -> int:
     raise OSError
+
+
+def test_the_table_of_a_batch_shows_control_characters_and_sends_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    stream = Terminal()
+    with batch_table(stream, 2) as table:
+        table.begun("a\x1b]0;title\x07/project.yaml")
+        assert table._live is not None
+        table._live.refresh()
+        table.say("b\x1b]0;title\x07: faulty")
+    assert "\x1b]" not in stream.getvalue()
+    assert stream.getvalue().count("\\x1b]0;title\\x07") >= 2

@@ -322,6 +322,35 @@ def test_parameters_of_a_camera_that_cannot_be_told_apart_are_named() -> None:
         solve(replace(problem, cameras=unused, camera_ids=("first", "second")))
 
 
+@pytest.mark.parametrize(
+    ("breadth", "off", "words"),
+    [
+        (0.0, 0.0, "step$"),
+        (0.02, 0.0, r"lie within .* m \(rms\) of a line of .* m .*; give control beside the line"),
+        (
+            0.0,
+            5.0,
+            r"control point .* is .* m off, .* times its standard deviation; are its coordinates or its id wrong",
+        ),
+    ],
+)
+def test_steps_without_end_say_what_is_wrong_with_the_control(
+    breadth: float, off: float, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, _ = simulated(6, 1)
+    xyz = problem.control.xyz.copy()
+    if breadth:
+        middle = xyz - xyz.mean(axis=0)
+        axis = np.linalg.svd(middle)[2][0]
+        along = np.outer(middle @ axis, axis)
+        xyz = xyz.mean(axis=0) + along + breadth * (middle - along)
+    xyz[0, 0] += off
+    monkeypatch.setattr("photostrip.triangulation.bundle.solve.MOST_STEPS", 1)
+    with pytest.raises(GeometryError, match=words) as caught:
+        solve(replace(problem, control=replace(problem.control, xyz=xyz)))
+    assert caught.value.code == "bundle-diverged"
+
+
 def test_steps_without_end_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, _ = simulated(6, 1)
     monkeypatch.setattr("photostrip.triangulation.bundle.solve.MOST_STEPS", 1)

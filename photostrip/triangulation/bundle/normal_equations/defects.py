@@ -9,9 +9,9 @@ import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.similarity import similarity_derivatives
-from photostrip.notes import named
+from photostrip.notes import counted, named
 from photostrip.triangulation.bundle.normal_equations import datum
-from photostrip.triangulation.bundle.normal_equations.reduced import Reduced, factored, given_at
+from photostrip.triangulation.bundle.normal_equations.reduced import Reduced, control_residuals, factored, given_at
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ ALIKE = 0.95  # part of a named movement that lies among the undetermined ones
 ALONG = 0.94  # cosine of 20 degrees: a line counts as the flight line
 LEFT_OVER = 1e-11  # part of its information that the other parameters leave a common parameter
 STRAIGHT = 1e-3  # breadth of control on one line, as part of its length
+NARROW = 0.2  # rms distance of what is given from one line over that of all points, told where nothing converges
+FAR_OFF = 10.0  # standard deviations of a control coordinate that is told then
 ITERATIONS = 3
 SHARE = 0.5  # of the largest element of a null vector: what is named with it
 TINY = 1e-9
@@ -94,6 +96,44 @@ def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
             whole = "" if len(parts) == 1 else f" of {named('photo', names)}"
             message = f"what is given does not determine {_moves(state, held, loose)}{whole}: {_reason(held)}"
             raise GeometryError(message, photos=() if len(parts) == 1 else names, code="bundle-rank")
+
+
+def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> GeometryError:
+    """Say that an adjustment does not converge (``bundle-diverged``), and what speaks against it.
+
+    That is control nearly on one line, whose errors turn the block about it; else the control that is farthest off.
+    """
+    message = f"the bundle adjustment did not converge in {counted(steps, 'step')}"
+    control = prepared.problem.control
+    given = np.concatenate([_held(prepared, state, photos).control for photos in _parts(prepared)])
+    length, breadth = _extent(given)
+    points = prepared.problem.start.points
+    _, of_points = _extent(points[np.isfinite(points).all(axis=1)])
+    with np.errstate(invalid="ignore"):
+        off = np.nan_to_num(np.abs(control_residuals(prepared, state)) / control.sigma)
+    if len(given) > 1 and breadth < NARROW * of_points:
+        message += (
+            f": all control and camera positions lie within {breadth:.0f} m (rms) of a line of {length:.0f} m and "
+            "hardly determine the rotation about it; give control beside the line"
+        )
+    elif off.max(initial=0.0) > FAR_OFF:
+        row, axis = np.unravel_index(int(off.argmax()), off.shape)
+        point = prepared.problem.point_name(int(control.point[row]))
+        metres = off[row, axis] * control.sigma[row, axis]
+        message += (
+            f": control point {point} is {metres:.3g} m off, {off[row, axis]:.3g} times its standard deviation; are "
+            "its coordinates or its id wrong?"
+        )
+    return GeometryError(message, code="bundle-diverged")
+
+
+def _extent(places: Floats) -> tuple[float, float]:
+    """Length of given positions along the line that fits them best, and rms distance from it."""
+    if len(places) < 2:
+        return 0.0, 0.0
+    middle = places - places.mean(axis=0)
+    _, spread, axes = np.linalg.svd(middle, full_matrices=False)
+    return float(np.ptp(middle @ axes[0])), float(np.sqrt((spread[1:] ** 2).sum() / len(places)))
 
 
 def _parts(prepared: PreparedProblem) -> list[Numbers]:
