@@ -55,14 +55,19 @@ class EvidenceStrip:
     @cached_property
     def up(self) -> Floats:
         """Upwards, of length one: where the cameras look from, or the normal of the ground below an oblique mount."""
-        axis = self.formed.rotations[:, :, 2].mean(axis=0)
-        axis = np.asarray(axis / max(float(np.linalg.norm(axis)), 1e-12), float)
-        points = self.formed.xyz[np.isfinite(self.formed.xyz).all(axis=1)]
+        axis = _mean_direction(self.formed.rotations[:, :, 2])
+        # of a long strip the middle: the Earth's curvature bends 500 km more than a strip is broad
+        pair, models = self.orientation.pairs.pair, self.orientation.pairs.size
+        reach = (STRETCH_PHOTOS if models >= LONG_STRIP else models) / 2
+        first, last = max(0, round(models / 2 - reach)), round(models / 2 + reach)
+        near = np.isin(self.formed.point, self.orientation.point[(pair >= first) & (pair < last)])
+        points = self.formed.xyz[near & np.isfinite(self.formed.xyz).all(axis=1)]
         if len(points) < LEAST_OF_PLANE:
             return axis
         _, extent, directions = np.linalg.svd(points - np.median(points, axis=0), full_matrices=False)
-        normal = directions[2] * np.sign(directions[2] @ axis)
-        is_oblique = normal @ axis < np.cos(np.radians(OBLIQUE_DEG)) and extent[2] < FLAT_SHARE * extent[1]
+        looking = _mean_direction(self.formed.rotations[first : last + 1, :, 2])
+        normal = directions[2] * np.sign(directions[2] @ looking)
+        is_oblique = normal @ looking < np.cos(np.radians(OBLIQUE_DEG)) and extent[2] < FLAT_SHARE * extent[1]
         return np.asarray(normal, float) if is_oblique else axis
 
     @property
@@ -112,6 +117,11 @@ class EvidenceStrip:
             home=np.zeros(0, np.intp),  # serves precision, which is not asked of evidence
         )
         return replace(self, formed=whole)
+
+
+def _mean_direction(axes: Floats) -> Floats:
+    mean = axes.mean(axis=0)
+    return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-12), float)
 
 
 def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> EvidenceStrip | None:

@@ -98,10 +98,10 @@ def decided_notes(
         )
         error = each.error
         text = (
-            f"photo {photo}: its pass points contradict each other in the scale of the models, and the control decides: "
-            f"with {', '.join(wrong)} the strip behind it was {abs(error.value):.2%} too "
-            f"{'large' if error.value > 0 else 'small'} (test value {error.test:.1f}, limit {error.limit:.1f}); they are "
-            f"not used, the models are joined by {', '.join(right)}; measure them again"
+            f"photo {photo}: its pass points contradict each other in the scale of the models, and the control "
+            f"decides: with {', '.join(wrong)} the strip behind it was {abs(error.value):.2%} too "
+            f"{'large' if error.value > 0 else 'small'} (test value {error.test:.1f}, limit {error.limit:.1f}); they "
+            f"are not used, the models are joined by {', '.join(right)}; measure them again"
         )
         yield Note("decided-joint", text, strip=strip.id, photos=(photo,), points=wrong)
 
