@@ -55,17 +55,18 @@ class EvidenceStrip:
     @cached_property
     def up(self) -> Floats:
         """Upwards, of length one: where the cameras look from, or the normal of the ground below an oblique mount."""
-        axis = _mean_direction(self.formed.rotations[:, :, 2])
-        # of a long strip the middle: the Earth's curvature bends 500 km more than a strip is broad
-        pair, models = self.orientation.pairs.pair, self.orientation.pairs.size
-        reach = (STRETCH_PHOTOS if models >= LONG_STRIP else models) / 2
-        first, last = max(0, round(models / 2 - reach)), round(models / 2 + reach)
-        near = np.isin(self.formed.point, self.orientation.point[(pair >= first) & (pair < last)])
-        points = self.formed.xyz[near & np.isfinite(self.formed.xyz).all(axis=1)]
+        rotations, inside = self.formed.rotations, np.isfinite(self.formed.xyz).all(axis=1)
+        axis = looking = _mean_direction(rotations[:, :, 2])
+        if len(rotations) > LONG_STRIP:  # its middle: the Earth's curvature bends 500 km more than a strip is broad
+            first = (len(rotations) - STRETCH_PHOTOS) // 2
+            pair = self.orientation.pairs.pair
+            near = self.orientation.point[(pair >= first) & (pair < first + STRETCH_PHOTOS - 1)]
+            inside = inside & np.isin(self.formed.point, near)
+            looking = _mean_direction(rotations[first : first + STRETCH_PHOTOS, :, 2])
+        points = self.formed.xyz[inside]
         if len(points) < LEAST_OF_PLANE:
             return axis
         _, extent, directions = np.linalg.svd(points - np.median(points, axis=0), full_matrices=False)
-        looking = _mean_direction(self.formed.rotations[first : last + 1, :, 2])
         normal = directions[2] * np.sign(directions[2] @ looking)
         is_oblique = normal @ looking < np.cos(np.radians(OBLIQUE_DEG)) and extent[2] < FLAT_SHARE * extent[1]
         return np.asarray(normal, float) if is_oblique else axis

@@ -44,6 +44,12 @@ def test_the_bend_of_a_long_strip_is_no_stretch_of_its_heights(photos: int, came
     assert told(inputs_of(made), settings_of(made)) == []
 
 
+def test_a_strip_that_the_earth_bends_more_than_it_is_broad_is_sound() -> None:
+    """550 km: the bend of 6 km is no breadth, and the breadth of 2 km no height."""
+    made = simulate(Spec(seed=13, flight=Flight(photos=600), control=Control(every=15, per_band=3)))
+    assert told(inputs_of(made), replace(settings_of(made), adjustment="covariance")) == []
+
+
 def test_strips_of_a_bundle_hold_each_other() -> None:
     """One line of control is weak for a strip by itself, and for a block that nothing else holds."""
     made = simulate(BLOCK)

@@ -79,7 +79,9 @@ def scale_error(
         return None
     value = float(column @ left) / information
     unit = max(1.0, float(left @ left - value**2 * information) / redundancy)
-    variance = max(1 / information - doubt**2, 0.0)
+    variance = 1 / information - doubt**2
+    if variance <= UNKNOWN * doubt**2:
+        return None  # lost in rounding
     return ScaleError(value, float(np.sqrt(unit * variance)), normal_quantile(1 - ALPHA / (2 * junctions)))
 
 
