@@ -116,7 +116,7 @@ class FormedPhotos:
             return self
         aside = junction_scale.aside(self.orientation, self.formed, decided)
         wrong = junction_scale.wrong_rays(self.orientation, decided, self.wrong_rays)
-        rays = _strip_rays(self.strip, self.observations, self.screened, kept)
+        rays = _strip_rays(self.strip, self.observations, self.screened, self.orientation.pairs.weight, kept)
         formed = form_again(self.orientation, rays, self.strip.photos, settings.formation, aside, wrong)
         return replace(self, formed=formed, wrong_rays=wrong, decided=tuple(decided))
 
@@ -289,7 +289,8 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     if settings.relative.screening == "none":
         formed = form_from_pairs(oriented, settings.formation, strip.photos, scatter)
     else:  # the strip decides what its pairs could not
-        rays = _strip_rays(strip, observations, screened, overruling.rows(settings.relative.keep, observations))
+        kept_rows = overruling.rows(settings.relative.keep, observations)
+        rays = _strip_rays(strip, observations, screened, pairs.weight, kept_rows)
         readmit = settings.relative.screening in screening.SEARCHES
         oriented, formed, wrong = form_screened(oriented, rays, strip.photos, settings.formation, readmit=readmit)
         rejections = with_readmitted(screened.rejections, oriented.used)
@@ -304,12 +305,14 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     )
 
 
-def _strip_rays(strip: Strip, observations: PhotoPoints, screened: screening.ScreenedPairs, kept: Numbers) -> StripRays:
+def _strip_rays(
+    strip: Strip, observations: PhotoPoints, screened: screening.ScreenedPairs, weight: Floats, kept: Numbers
+) -> StripRays:
     return StripRays(
         observations=observations,
         position=strip.positions(observations),
         sigma=screened.scatter.by_pair,
-        weight=screened.orientation.pairs.weight,
+        weight=weight,
         stated=strip.median_sigma(observations),
         kept=kept,
     )
