@@ -88,4 +88,4 @@ def test_exit_codes(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     kept = [line for line in lines if not (line.startswith("M3,") and line.split(",")[1] in shared - {"1003"})]
     table.write_text("\n".join(kept) + "\n", encoding="utf-8")
     assert main(["run", str(project), "--quiet"]) == 3
-    assert "models M2 and M3 have 1 points in common" in capsys.readouterr().err
+    assert "models M2 and M3 have 1 point in common" in capsys.readouterr().err

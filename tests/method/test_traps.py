@@ -303,8 +303,8 @@ def test_points_seen_once_are_listed_and_change_nothing() -> None:
     )
     before, after = triangulate(inputs, Settings()), triangulate(more, Settings())
     assert after.not_determined == {
-        "once": "measured on one photo",
-        "apart": "on no two neighbouring photos of one strip",
+        "once": "measured on one photo only",
+        "apart": "not on two neighbouring photos of one strip",
     }
     np.testing.assert_array_equal(before.points.number, after.points.number)
     np.testing.assert_array_equal(before.points.cartesian, after.points.cartesian)

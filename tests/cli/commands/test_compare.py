@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from pathlib import Path
 from typing import Any
@@ -191,10 +190,9 @@ def test_a_baseline_that_cannot_be_written_stays_whole(files: Path, monkeypatch:
     def full(*_: object) -> int:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_bytes", full)
-    assert main(["compare", "result", "other.json", "--update"]) == 2
-    monkeypatch.undo()
-    os.chdir(files)
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "write_bytes", full)
+        assert main(["compare", "result", "other.json", "--update"]) == 2
     assert (files / "other.json").read_bytes() == before
     assert sorted(path.name for path in files.iterdir()) == ["other.json", "result", "same.json"]
 

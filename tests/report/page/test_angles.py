@@ -46,9 +46,10 @@ def tables(found: Document) -> list[Table]:
 @pytest.mark.parametrize("unit", PER_DEGREE)
 def test_every_angle_of_every_table_has_the_unit(unit: str, adjustment: str) -> None:
     columns = 0
-    for degrees, others in zip(tables(document("deg", adjustment)), tables(document(unit, adjustment)), strict=True):
-        assert all("deg" not in column.unit for column in nonempty(others.columns))
-        for number, column in enumerate(nonempty(degrees.columns)):
+    in_degrees, in_unit = (tables(document(each, adjustment)) for each in ("deg", unit))
+    for degrees, others in nonempty(zip(in_degrees, in_unit, strict=True)):
+        assert all("deg" not in column.unit for column in others.columns)
+        for number, column in enumerate(degrees.columns):
             if column.unit != "deg":
                 continue
             assert others.columns[number].unit == unit

@@ -67,7 +67,7 @@ def test_a_polynomial_is_told_of_the_alternative() -> None:
         told = [note["message"] for note in known.document["notes"] if note["code"] == "covariance-proposed"]
         assert len(told) == asked
         text = " ".join(to_text(title_of(known.document), sections_of(known.document), 100).split())
-        assert ("`processing.adjustment: covariance` distributes" in text) == asked
+        assert ("`processing.adjustment: covariance` comes within" in text) == asked
 
 
 def test_exchanged_image_points_do_not_stop_it() -> None:
