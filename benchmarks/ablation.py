@@ -91,7 +91,7 @@ def without_control() -> None:
 
 def without_readmission() -> None:
     """Take nothing back."""
-    home = f"{search.__name__}.rays.screened_formation"
+    home = "photostrip.pipeline.strips.screened_formation"
     uses = pkgutil.resolve_name(f"{home}:_uses")
     put(home, "_uses", lambda *given, **_: uses(*given, readmit=False))
     put(f"{search.__name__}.rays.snooping:_Search", "fitting", lambda *_: None)

@@ -188,7 +188,7 @@ pipeline = import_module("photostrip.pipeline.run")  # the module; the package g
 # functions imported by name are timed where they are called
 of_strips = import_module("photostrip.pipeline.strips.photos")
 common = import_module("photostrip.pipeline.common_points")
-screened_formation = import_module("photostrip.triangulation.gross_errors.rays.screened_formation")
+screened_formation = import_module("photostrip.pipeline.strips.screened_formation")
 strip_network = import_module("photostrip.triangulation.gross_errors.rays.strip_network")
 STAGES = (
     ("image coordinates", corrections, "refine"),

@@ -12,12 +12,12 @@ from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
+from photostrip.pipeline.strips.screened_formation import form_again, form_screened, with_readmitted
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.gross_errors.control import junction_scale
 from photostrip.triangulation.gross_errors.control.junction_scale import DecidedJunction, ScaleError, scale_error
 from photostrip.triangulation.gross_errors.control.strip_at_control import LARGEST, ControlRay
 from photostrip.triangulation.gross_errors.pairs import screening
-from photostrip.triangulation.gross_errors.rays.screened_formation import form_again, form_screened, with_readmitted
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs

@@ -2,9 +2,9 @@
 
 Errors that hide each other are found by no test of single points. So plan and height of every point, and every bend of
 the strip, get a variance of their own beside the covariance of the misclosures. All begin as large as the largest
-misclosure, and each is multiplied by its own test value, the root of (M w)_K^T (M w)_K / tr M_KK, again and again:
-those of wrong coordinates stay, the others fade away. What stays is a candidate; the tests decide. Multiplied by the
-square, as in the source, they fade faster and into worse sets.
+misclosure, and each is multiplied by its own test value, the root of (M w)_K^T (M w)_K / tr M_KK, as often as there are
+parts: those of wrong coordinates stay, the others fade away. What stays is a candidate; the tests decide. Multiplied by
+the square, as in the source, they fade faster and into worse sets.
 
 Source: [Förstner 1979].
 """
@@ -21,16 +21,13 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
 
 
-ROUNDS = 60
-
-
 def candidates(whole: JointAdjustment) -> Columns:
     """Columns whose own variance exceeds that with which all others predict them; as many as leave a check."""
     part = np.concatenate([np.full(len(columns), number) for number, columns in enumerate(whole.parts)])
     columns = np.concatenate([np.array(columns) for columns in whole.parts])
     errors = whole.errors[:, columns]
     variance = np.full(len(whole.parts), float(np.abs(whole.w).max() ** 2 + whole.covariance.max()))
-    for _ in range(ROUNDS):
+    for _ in whole.parts:
         covariance = whole.covariance + (errors * variance[part]) @ errors.T
         projector = projected(covariance, whole.design)
         squares = np.bincount(part, (errors.T @ (projector @ whole.w)) ** 2)

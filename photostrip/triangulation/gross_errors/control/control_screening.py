@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import PhotostripError
-from photostrip.triangulation.gross_errors.control.control_components import ROUNDS, candidates
+from photostrip.triangulation.gross_errors.control.control_components import candidates
 from photostrip.triangulation.gross_errors.control.control_deletion import adjust
 from photostrip.triangulation.gross_errors.control.control_rejections import (
     WRONG_IMAGE,
@@ -110,7 +110,7 @@ def _laid(
 ) -> Found:
     """Search, lay the strip on what is kept, and search from what was found, until the same is found."""
     kept, out = strip.control.use, None
-    for _ in range(ROUNDS):
+    for _ in strip.coordinates.point:
         whole = adjust(strip, strip.misclosures(kept), covariance, bends=bends)
         out = whole.shrunk(whole.grown(whole.shrunk(start(whole) if out is None else out)))
         found = Found(whole, out)

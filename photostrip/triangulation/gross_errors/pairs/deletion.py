@@ -77,17 +77,12 @@ def search(residuals: Floats, matrix: Floats, target: Floats, forbidden: Flags |
     total = (residuals**2).sum(axis=1)
     found = [np.zeros(0, np.intp) for _ in range(len(residuals))]
     todo = np.arange(len(residuals))
-    v = residuals
-    if forbidden is not None:
-        # a point that may not go gains nothing in any set
-        v = np.where(forbidden, 0.0, residuals)
-    sets: Numbers = subsets(residuals.shape[1], 1)
     for k in range(1, len(target) + 1):
         if not len(todo) or residuals.shape[1] < k:
             break
-        if k > 1:
-            sets = subsets(residuals.shape[1], k) if k < LARGEST else _triples(v[todo], matrix[todo])
-        gain = gains(v[todo], matrix[todo], sets)
+        v, m = residuals[todo], matrix[todo]
+        sets = subsets(residuals.shape[1], k) if k < LARGEST else _triples(v, m)
+        gain = gains(v, m, sets)
         if forbidden is not None:
             place = np.broadcast_to(sets, (len(todo), *sets.shape[-2:]))
             gain[forbidden[todo][np.arange(len(todo))[:, None, None], place].any(axis=2)] = -np.inf

@@ -1,6 +1,6 @@
 """Gross errors of rays: measurements that a strip or block as a whole contradicts.
 
-``screened_formation`` forms a strip, has all its rays tested and forms it again; ``strip_network`` makes a bundle of
-them, ``snooping`` adjusts and tests a bundle, ``point_decisions`` finds the fewest rays of a point without which the
-others agree. Source: [Baarda 1968], [Pope 1976]; the decisions are derived, see docs/sources.md.
+``strip_network`` makes a bundle of all rays of a formed strip, ``snooping`` adjusts and tests a bundle,
+``point_decisions`` finds the fewest rays of a point without which the others agree. Source: [Baarda 1968], [Pope 1976];
+the decisions are derived, see docs/sources.md.
 """

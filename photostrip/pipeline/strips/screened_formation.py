@@ -94,24 +94,17 @@ def _uses(of_pairs: Orientation, found: Sequence[Rejection], *, readmit: bool) -
     """Rows of the pairs' table that orient their pair, and those of them that must not place their point.
 
     Where it cannot be told which of several rays is wrong, those pairs that found nothing wrong keep the point: its
-    y parallaxes are good, its place is not.
+    y parallaxes are good, its place is not. Pairs that would lose too many points keep those of their own search.
     """
     wrong, unclear = np.zeros((2, int(of_pairs.rows.max()) + 1), bool)
     wrong[[each.row for each in found]] = True
     unclear[[each.row for each in found if each.cause == SEVERAL_RAYS]] = True
     gone, aside = (np.asarray(each[of_pairs.rows].any(axis=1), bool) for each in (wrong, unclear))
     used = np.where(aside | (not readmit), of_pairs.used & (aside | ~gone), ~gone)
-    return _supported(of_pairs, used), aside
-
-
-def _supported(of_pairs: Orientation, used: Flags) -> Flags:
-    """Let pairs that would lose too many points keep those of their own search."""
     pairs = of_pairs.pairs
-    left = pairs.sums(used.astype(float))
-    had = pairs.sums(of_pairs.used.astype(float))
+    left, had = (pairs.sums(each.astype(float)) for each in (used, of_pairs.used))
     poor = (left < np.minimum(MINIMUM_LEFT, had))[pairs.pair]
-    result: Flags = np.where(poor, of_pairs.used, used)
-    return result
+    return np.where(poor, of_pairs.used, used), aside
 
 
 def with_readmitted(rejections: Sequence[Rejection], used: Flags) -> tuple[Rejection, ...]:
