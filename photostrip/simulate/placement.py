@@ -138,6 +138,9 @@ def _moved_inwards(
         for column in wanted.T:
             good &= (column < 0) | sees(spec, photos, np.maximum(column, 0), xyz)
         found = good if number else np.ones_like(good)
+        if number:  # a point of another row may have been moved to the same place
+            settled = np.setdiff1d(np.arange(len(along)), open_)
+            found &= ~np.isin(np.round(s + 1j * t, 3), np.round(along[settled] + 1j * across[settled], 3))
         along[open_[found]], across[open_[found]] = s[found], t[found]
         open_ = open_[~good]
         if not len(open_):

@@ -54,14 +54,21 @@ class DistanceTrial(NamedTuple):
 
 
 def find_wrong_distance(
-    formed: EvidenceStrip, observations: PhotoPoints, settings: Settings, compare: Compare
+    formed: EvidenceStrip,
+    as_given: HeightStretch | None,
+    observations: PhotoPoints,
+    settings: Settings,
+    compare: Compare,
 ) -> list[Finding]:
     """Try other principal distances on a strip that does not fit the heights of its control (P105, at most one).
 
-    `compare` compares a formed strip with those heights.
+    as_given: how the strip fits those heights as it was formed, where that is known.
+    `compare` compares a formed strip with them.
     """
+    if len(formed.strip.photos) > MOST_PHOTOS:
+        return []
     # of a badly wrong distance, most control may have been dropped
-    first = compare(formed) or compare(formed.whole) if len(formed.strip.photos) <= MOST_PHOTOS else None
+    first = as_given or compare(formed) or compare(formed.whole)
     if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
         return []
     sigma0, stated = _middle_sigma0(formed), formed.strip.median_sigma(observations)

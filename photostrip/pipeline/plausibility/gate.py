@@ -168,7 +168,7 @@ def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, direc
         return []
     findings = [*control.findings]
     for held in model_evidence.model_strips(models, control.points, settings):
-        findings += control.compared(held.rows, held.on_strip)
+        findings += control.compared(held.rows, held.on_strip).findings
         findings += flight.find_odd_centers(held.centers, held.depth, model_evidence.UP, held.photos, held.strip.id)
         findings += control_layout.weak_layout_of_models(held, control)
     return [finding for finding in findings if finding.code not in OF_CAMERAS]

@@ -61,12 +61,12 @@ class GivenControl:
             axes_are_right=sure.pop() if len(sure) == 1 else None,
         )
 
-    def compared(self, rows: Numbers, on_strip: StripPoints) -> list[Finding]:
+    def compared(self, rows: Numbers, on_strip: StripPoints) -> control_reading.Reading:
         """Compare the given points of some rows with the same points in a strip."""
         points = self.points.take(rows)
         given = given_points.level(points, self.frames, as_written=self.as_written)
         if given is None:
-            return []
+            return control_reading.Reading([])
 
         def exchanged() -> GivenPoints | None:
             order = [1, 0, 2]
@@ -93,30 +93,36 @@ def by_strip(
     """
     findings: list[Finding] = []
     for strip, each in zip(strips, formed, strict=True):
-        of_strip = _of_strip(strip, each, images, control)
+        readings = _of_strip(strip, each, images, control)
+        of_strip = [finding for reading in readings for finding in reading.findings]
         if trials and not any(finding.is_error for finding in of_strip):
+            whole = readings[0].heights if len(readings) == 1 and not control.as_written else None
             # where the distance is wrong, single points prove nothing
-            of_strip = _of_distance(strip, each, images, control) or of_strip
+            of_strip = _of_distance(strip, each, control_heights.stretch_of(whole), images, control) or of_strip
         findings += of_strip
     return findings
 
 
 def _of_strip(
     strip: Strip, formed: EvidenceStrip | None, images: ImageEvidence, control: GivenControl
-) -> list[Finding]:
+) -> list[control_reading.Reading]:
     if formed is None:
         held = evidence.mosaic_points(strip, images.observations, control.points, images.steps)
-        return [] if held is None else control.compared(*held)
+        return [] if held is None else [control.compared(*held)]
     rows, on_strip = evidence.strip_points(formed, images.observations, control.points, images.steps)
-    return [finding for part in evidence.stretches(rows, on_strip) for finding in control.compared(*part)]
+    return [control.compared(*part) for part in evidence.stretches(rows, on_strip)]
 
 
 def _of_distance(
-    strip: Strip, formed: EvidenceStrip | None, images: ImageEvidence, control: GivenControl
+    strip: Strip,
+    formed: EvidenceStrip | None,
+    stretch: control_heights.HeightStretch | None,
+    images: ImageEvidence,
+    control: GivenControl,
 ) -> list[Finding]:
     compare = partial(_compared_in_height, images=images, control=control)
     if formed is not None:
-        return distance_trial.find_wrong_distance(formed, images.observations, images.settings, compare)
+        return distance_trial.find_wrong_distance(formed, stretch, images.observations, images.settings, compare)
     if images.findings:
         return []
     return distance_trial.find_distance_without_pairs(strip, images.observations, images.settings, compare)

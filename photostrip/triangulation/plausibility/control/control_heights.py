@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -64,16 +64,19 @@ class HeightComparison:
     relief: Floats
     floor: float  # smallest standard deviation that makes sense, metres
 
-    @cached_property
+    @property
     def columns(self) -> Floats:
         """Tilt and, where it is needed, bending, shape (n, c); a wrong scale must not pass for a bending strip."""
-        taken, _ = fit_simplest([self.deviation, *self.whole], 4, self.value, self.in_fit, self.floor)
-        return np.asarray(taken[:, 1:])
+        return np.asarray(self._with_scale[0][:, 1:])
+
+    @property
+    def scaled(self) -> RobustFit:
+        """Fit with the scale of the heights free; its first coefficient is that scale minus one."""
+        return self._with_scale[1]
 
     @cached_property
-    def scaled(self) -> RobustFit:
-        """Fit with the scale of the heights free; its last coefficient is that scale minus one."""
-        return fit_robustly(np.column_stack([self.columns, self.deviation]), self.value, self.in_fit, self.floor)
+    def _with_scale(self) -> tuple[Floats, RobustFit]:
+        return fit_simplest([self.deviation, *self.whole], 4, self.value, self.in_fit, self.floor)
 
 
 def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: Flags) -> HeightComparison | None:
@@ -101,12 +104,41 @@ def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: F
     )
 
 
-class HeightStretch(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class HeightStretch:
     """How a strip fits the heights of its control."""
 
-    ratio: float  # heights given over heights in the strip
-    misfit: float  # what is left of the heights as they are, in units of what makes sense
-    in_relief: float  # the same of what is left when the strip may bend
+    heights: HeightComparison
+
+    @cached_property
+    def ratio(self) -> float:
+        """Heights given over heights in the strip."""
+        return 1.0 + float(self._fit([*self._tilt, self.heights.deviation]).coefficient[-1])
+
+    @cached_property
+    def misfit(self) -> float:
+        """What is left of the heights as they are, in units of what makes sense."""
+        return self._misfit(self._tilt)
+
+    @cached_property
+    def in_relief(self) -> float:
+        """The same of what is left when the strip may bend."""
+        return self._misfit(self.heights.whole)
+
+    @property
+    def _tilt(self) -> list[Floats]:
+        return self.heights.whole[:LEAST_POINTS]
+
+    def _fit(self, columns: list[Floats]) -> RobustFit:
+        h = self.heights
+        return fit_robustly(np.column_stack(columns), h.value, h.in_fit, h.floor)
+
+    def _misfit(self, columns: list[Floats]) -> float:
+        """Rms of what a fit leaves; what is far off counts less."""
+        size = np.abs(self._fit(columns).residual[self.heights.in_fit])
+        freedom = max(len(size) - len(columns), 1)
+        rms = float(np.sqrt((np.minimum(size, KEPT_SIGMAS * np.median(size)) ** 2).sum() / freedom))
+        return max(rms / self.heights.floor, 1.0)
 
 
 def height_stretch(given: GivenPoints, on_strip: StripPoints) -> HeightStretch | None:
@@ -123,21 +155,14 @@ def height_stretch(given: GivenPoints, on_strip: StripPoints) -> HeightStretch |
     )
     fitted = straighten(given, level, on_strip.floor, in_fit)
     heights = compare_heights(given, fitted, np.ones(len(w), bool))
+    return stretch_of(heights)
+
+
+def stretch_of(heights: HeightComparison | None) -> HeightStretch | None:
+    """Give the stretch of compared heights; None where too few are given."""
     if heights is None or heights.in_fit.sum() < LEAST_POINTS + LEAST_REDUNDANCY:
         return None
-    tilt = np.column_stack(heights.whole[:LEAST_POINTS])
-    plain = fit_robustly(tilt, heights.value, heights.in_fit, fitted.floor[1])
-    free = fit_robustly(np.column_stack([tilt, heights.deviation]), heights.value, heights.in_fit, fitted.floor[1])
-    bent = fit_robustly(np.column_stack(heights.whole), heights.value, heights.in_fit, fitted.floor[1])
-    misfit, in_relief = (_misfit(fit, heights.in_fit) / fitted.floor[1] for fit in (plain, bent))
-    return HeightStretch(1.0 + float(free.coefficient[-1]), max(misfit, 1.0), max(in_relief, 1.0))
-
-
-def _misfit(fit: RobustFit, in_fit: Flags) -> float:
-    """Rms of what a fit leaves, metres; what is far off counts less."""
-    size = np.abs(fit.residual[in_fit])
-    freedom = max(len(size) - len(fit.coefficient), 1)
-    return float(np.sqrt((np.minimum(size, KEPT_SIGMAS * np.median(size)) ** 2).sum() / freedom))
+    return HeightStretch(heights)
 
 
 def find_wrong_heights(
@@ -150,7 +175,7 @@ def find_wrong_heights(
     Yields P105, P401, P404, P405, at most one.
     """
     in_fit = heights.in_fit
-    ratio, sigma = 1.0 + float(heights.scaled.coefficient[-1]), float(heights.scaled.sigma[-1])
+    ratio, sigma = 1.0 + float(heights.scaled.coefficient[0]), float(heights.scaled.sigma[0])
     feet = min(abs(ratio * each - 1.0) for each in (FOOT, 1 / FOOT)) < FEET_TOLERANCE
     explains = heights.scaled.sigma0 < (EXPLAINED_SHARE_IN_FEET if feet else EXPLAINED_SHARE) * fit.sigma0
     stretched = explains and _significant(ratio - 1.0, sigma, heights.scaled.freedom, LEAST_SCALE_ERROR)

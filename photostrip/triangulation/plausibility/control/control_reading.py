@@ -9,7 +9,7 @@ the others predict, check points too, but no check point ever takes part in a fi
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags
     from photostrip.notes import Finding
+    from photostrip.triangulation.plausibility.control.control_heights import HeightComparison
     from photostrip.triangulation.plausibility.finding import Evidence
 
     Complex = NDArray[np.complex128]
@@ -48,19 +49,25 @@ MIRRORED_SHARE = 0.15  # of the misclosure of the strip as it is, left when it i
 FIT_SHARE = 0.1  # of the extent of the control: a misclosure above it is no fit
 
 
+class Reading(NamedTuple):
+    """Given points as a strip reads them."""
+
+    findings: list[Finding]  # P103, P105, P401, P403 to P408
+    heights: HeightComparison | None = None  # None where too few go with the strip
+
+
 def find_wrong_readings(
     given: GivenPoints,
     on_strip: StripPoints,
     *,
     axes_are_right: bool | None = None,
     exchanged: Callable[[], GivenPoints | None] = lambda: None,
-) -> list[Finding]:
+) -> Reading:
     """Compare given points with a strip.
 
     axes_are_right: whether the place on the Earth shows the axes of the control to be right (True) or wrong (False).
     exchanged: gives the points with east and north exchanged before anything else is done with them: longitudes read as
         latitudes are no mirror image of the ground, a degree of the one being shorter.
-    Returns P103, P105, P401, P403 to P408.
     """
     turn = upright(on_strip.axes)
     s = upright_coordinates(on_strip.xyz, turn)
@@ -68,7 +75,7 @@ def find_wrong_readings(
     in_fit = given.use[:, 0] & ~given.check & np.isfinite(given.plan) & np.isfinite(w)
     normal, mirror = (fit_similarity(w[in_fit], given.plan[in_fit], mirrored=each) for each in (False, True))
     if normal is None or mirror is None:
-        return []
+        return Reading([])
     findings: list[Finding] = []
     extent = float(np.abs(given.plan[in_fit] - given.plan[in_fit].mean()).max())
     best = normal
@@ -76,7 +83,7 @@ def find_wrong_readings(
         best = mirror
         findings.append(_mirror(on_strip, normal, mirror, extent, axes_are_right=axes_are_right))
     elif normal.median > FIT_SHARE * extent:
-        return _columns(given, exchanged(), on_strip, w, in_fit, normal)
+        return Reading(_columns(given, exchanged(), on_strip, w, in_fit, normal))
     level = turn_level(
         given, LevelStrip(w=w, z=s[:, 2], similarity=best, turn=turn, depth=on_strip.depth), on_strip.floor[1], in_fit
     )
@@ -86,19 +93,19 @@ def find_wrong_readings(
         in_fit = in_fit & ~np.isin(given.group, wrong_lists)
         again = fit_similarity(level.w[in_fit], given.plan[in_fit], mirrored=level.similarity.mirrored)
         if again is None:
-            return findings
+            return Reading(findings)
         level = replace(level, similarity=again)
     fitted = straighten(given, level, on_strip.floor, in_fit)
     consistent = ~np.isin(given.group, wrong_lists)
     heights = control_heights.compare_heights(given, fitted, consistent)
     if heights is None:
         left = Misclosures(fitted.plan, height=None, usable=np.zeros(len(consistent), bool), consistent=consistent)
-        return [*findings, *control_slips.find_plan_slips(given, on_strip, fitted, left)]
+        return Reading([*findings, *control_slips.find_plan_slips(given, on_strip, fitted, left)])
     fit = fit_robustly(heights.columns, heights.value, heights.in_fit, fitted.floor[1])
     left = Misclosures(plan=fitted.plan, height=fit, usable=heights.usable, consistent=consistent)
     findings += control_slips.find_plan_slips(given, on_strip, fitted, left)
     whole = list(control_heights.find_wrong_heights(given, on_strip, heights, fit, fitted.floor[1]))
-    return findings + (whole or list(control_slips.find_height_slips(given, on_strip, fitted, left)))
+    return Reading(findings + (whole or list(control_slips.find_height_slips(given, on_strip, fitted, left))), heights)
 
 
 def _mirror(

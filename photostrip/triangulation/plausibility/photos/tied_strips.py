@@ -47,13 +47,16 @@ def find_shared_ids_of_strips(ties: TiesOfStrips) -> Iterator[Finding]:
     if len(ties.names) < LEAST_TIES:
         return
     place, off = ties.plan[:, 0] + 1j * ties.plan[:, 1], ties.difference[:, 0] + 1j * ties.difference[:, 1]
+    least = np.where(ties.rays > TWO_RAYS, MANY_RAYS_SHARE, ONE_RAY_SHARE) * ties.depth
+    middle = complex(np.median(off.real), np.median(off.imag))
+    if (np.abs(off - middle) <= least).all():
+        return  # none is far from the others even if the strips share no bend
     local = (place - place.mean()) / max(float(np.abs(place - place.mean()).max()), 1e-9)
     columns = [np.ones_like(local), local, np.conj(local), local**2, np.abs(local) ** 2, np.conj(local) ** 2]
     _, fit = fit_simplest(columns, 1, off, np.ones(len(off), bool), ties.sigma)
     far = np.abs(fit.residual)
-    least = np.where(ties.rays > TWO_RAYS, MANY_RAYS_SHARE, ONE_RAY_SHARE)
     one, other = ties.strips
-    for row in np.flatnonzero(fit.odd & (far > least * ties.depth)).tolist():
+    for row in np.flatnonzero(fit.odd & (far > least)).tolist():
         message = (
             f"point {ties.names[row]} stands for two points: strip {other} puts it {far[row]:.4g} m away from where "
             f"strip {one} puts it; half of the other common points agree within {_others(far, row):.2g} m"
