@@ -163,7 +163,7 @@ def _slips(
     `difference` is given minus predicted in the level frame, `spread` its standard deviation and largest value by
     chance; a slip leaves the point's other coordinates right.
     """
-    by_axis = given.axes[row] @ difference
+    by_axis = given.steps.axes[row] @ difference
     for axis in columns:
         others = [each for each in columns if each != axis]
         off = float(by_axis[axis])
@@ -183,7 +183,7 @@ def slip_in(
     off: given minus predicted along the axis as it is written, metres.
     spread: its standard deviation and its largest value by chance, metres.
     """
-    written, unit = float(given.written[row, axis]), float(given.unit[row, axis])
+    written, unit = float(given.written[row, axis]), float(given.steps.unit[row, axis])
     if not np.isfinite(written):
         return None
     near = spread[1] + SCALE_CHANGE * abs(off)

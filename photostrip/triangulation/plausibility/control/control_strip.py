@@ -6,7 +6,8 @@ In plan the bending is taken out by a conformal polynomial, with as few terms as
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,13 @@ LEAST_AHEAD = 0.1  # of the distance of a point from a photo, along its axis: wi
 AXES = ("east", "north", "up")
 
 
+class WrittenAxes(NamedTuple):
+    """What a step of a written coordinate is in the level frame."""
+
+    unit: Floats  # (n, 3): metres in a unit of the written coordinates
+    axes: Floats  # (n, 3, 3): directions of the written axes, as rows
+
+
 @dataclass(frozen=True, eq=False)
 class GivenPoints:
     """Given points that a strip shows."""
@@ -50,14 +58,18 @@ class GivenPoints:
     group: Numbers  # (n,): control list of each
     # (n, 3): the coordinates as they are written, east, north, up; NaN where slips of the pen cannot be sought in them
     written: Floats
-    unit: Floats  # (n, 3): metres in a unit of the written coordinates
-    axes: Floats  # (n, 3, 3): directions of the written axes in the level frame, as rows
+    written_axes: Callable[[], WrittenAxes]  # what a step of them is; worked out for points that stand out only
     sigma: tuple[float, float]  # usual standard deviation of the given coordinates in plan and in height, metres
 
     @property
     def plan(self) -> Complex:
         """Given places E + iN, metres."""
         return np.asarray(self.xyz[:, 0] + 1j * self.xyz[:, 1])
+
+    @cached_property
+    def steps(self) -> WrittenAxes:
+        """What a step of the written coordinates is."""
+        return self.written_axes()
 
 
 @dataclass(frozen=True, eq=False)

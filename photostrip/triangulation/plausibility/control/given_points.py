@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.triangulation.plausibility.control.control_strip import GivenPoints
+from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, WrittenAxes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.points import ControlPoints
 
+    _LevelPoints = tuple[Floats, Callable[[], WrittenAxes]]  # (n, 3) in the level frame; what the written axes are
 
 USUAL_SIGMA = 0.1  # metres, of coordinates without one
 
@@ -32,7 +33,7 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
     written = np.where(control.use, control.enu, np.nan)
     filled = _filled(written, control.frame)
     decoded = None if as_written else _decoded(filled, control, frames, plan)
-    points = decoded or _plain(filled, control, frames, plan)
+    xyz, written_axes = decoded or _plain(filled, control, frames, plan)
     known = np.column_stack([plan, plan, height])
     sigma = np.where(known & (control.sigma > 0), control.sigma, np.nan)
     usual = [
@@ -40,31 +41,26 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
     ]
     return GivenPoints(
         ids=control.ids,
-        xyz=np.where(known, points.xyz, np.nan),
+        xyz=np.where(known, xyz, np.nan),
         use=known,
         check=control.check,
         group=control.frame,
         written=written,
-        unit=points.unit,
-        axes=points.axes,
+        written_axes=written_axes,
         sigma=(usual[0], usual[1]),
     )
 
 
-class _LevelPoints(NamedTuple):
-    """Given points in the level frame."""
-
-    xyz: Floats  # (n, 3)
-    unit: Floats  # (n, 3): metres in a unit of the written coordinates
-    axes: Floats  # (n, 3, 3): directions of the written axes, as rows
-
-
 def _plain(filled: Floats, control: ControlPoints, frames: Sequence[GroundFrame], plan: Flags) -> _LevelPoints:
     """Take the numbers as they are written, in the units of their frames as far as these have one."""
+    written = _plain_axes(control, frames)
+    return (filled - np.mean(filled[plan], axis=0)) * written.unit, lambda: written
+
+
+def _plain_axes(control: ControlPoints, frames: Sequence[GroundFrame]) -> WrittenAxes:
     unit = np.array([[frame.plan_factor, frame.plan_factor, frame.height_factor] for frame in frames])
     unit = np.where(unit > 0, unit, 1.0)[control.frame]
-    axes = np.tile(np.eye(3), (len(control), 1, 1))
-    return _LevelPoints((filled - np.mean(filled[plan], axis=0)) * unit, unit, axes)
+    return WrittenAxes(unit, np.tile(np.eye(3), (len(control), 1, 1)))
 
 
 def _filled(written: Floats, lists: Numbers) -> Floats:
@@ -84,13 +80,11 @@ def _filled(written: Floats, lists: Numbers) -> Floats:
 
 def _decoded(filled: Floats, control: ControlPoints, frames: Sequence[GroundFrame], plan: Flags) -> _LevelPoints | None:
     """Bring the points through their frames; None where the frames refuse."""
-    cartesian, axes, unit = np.empty_like(filled), np.empty((len(filled), 3, 3)), np.ones_like(filled)
+    cartesian = np.empty_like(filled)
     try:
         for number in np.unique(control.frame).tolist():
-            rows, frame = control.frame == number, frames[number]
-            cartesian[rows] = frame.cartesian_from_ground(filled[rows])
-            axes[rows] = frame.axes_at(cartesian[rows])
-            unit[rows] = _metres(frame, filled[rows])
+            rows = control.frame == number
+            cartesian[rows] = frames[number].cartesian_from_ground(filled[rows])
         middle = np.median(cartesian[plan], axis=0)
         first = frames[int(control.frame[int(np.argmax(plan))])]
         turn = first.level_axes_at(middle[None, :])[0]
@@ -98,16 +92,27 @@ def _decoded(filled: Floats, control: ControlPoints, frames: Sequence[GroundFram
         return None
     if not np.isfinite(cartesian).all():
         return None
-    xyz = (cartesian - middle) @ turn.T
-    geocentric = np.array([frames[number].kind == "geocentric" for number in control.frame.tolist()])
-    if geocentric.any():  # their coordinates are no plan and no height
-        unit = np.where(geocentric[:, None], 1.0, unit)
-    return _LevelPoints(xyz, unit, axes @ turn.T)
+    return (cartesian - middle) @ turn.T, lambda: _axes_through_frames(filled, cartesian, turn, control, frames)
+
+
+def _axes_through_frames(
+    filled: Floats, cartesian: Floats, turn: Floats, control: ControlPoints, frames: Sequence[GroundFrame]
+) -> WrittenAxes:
+    axes, unit = np.empty((len(filled), 3, 3)), np.ones_like(filled)
+    try:
+        for number in np.unique(control.frame).tolist():
+            rows, frame = control.frame == number, frames[number]
+            axes[rows] = frame.axes_at(cartesian[rows])
+            if frame.kind != "geocentric":  # whose coordinates are no plan and no height
+                unit[rows] = _metres(frame, filled[rows])
+    except (GeometryError, InputError):  # at the edge of a projection
+        return _plain_axes(control, frames)
+    return WrittenAxes(unit, axes @ turn.T)
 
 
 def _metres(frame: GroundFrame, enu: Floats) -> Floats:
     """Metres on the ground in a unit of each coordinate: a map has a scale of its own."""
-    if frame.kind in {"local", "geocentric"}:
+    if frame.kind == "local":
         return np.broadcast_to([frame.plan_factor, frame.plan_factor, frame.height_factor], enu.shape)
     step = 1e-5 if frame.kind == "geographic" else 1.0
     start = frame.cartesian_from_ground(enu)
