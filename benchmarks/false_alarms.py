@@ -11,6 +11,7 @@ import argparse
 import sys
 from collections import Counter
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,6 +44,7 @@ METHODS = ("polynomial", "covariance", "bundle")
 FREE = ("principal_distance", "principal_point", "k1", "k2")
 OBLIQUE_DEG = (15.0, 42.0)
 SOME, HALF, MOST = 0.3, 0.5, 0.7
+LEAST_COMMON = 6
 EDGE = 112.0  # mm from the centre of a photo
 SYSTEMATIC = 0.005  # mm, largest
 
@@ -219,7 +221,9 @@ def gnss_strip(seed: int) -> Sound:
         return replace(spec, gnss=Gnss(use=True), control=control)
 
     simulation = made(rng, seed, draw)
-    return Sound(with_gnss(simulation), replace(settings_of(simulation), adjustment="bundle"), simulation.spec)
+    # points at random may lie below the line of the cameras
+    allowed = frozenset({"P502"} if simulation.spec.control.layout == "random" else ())
+    return Sound(with_gnss(simulation), replace(settings_of(simulation), adjustment="bundle"), simulation.spec, allowed)
 
 
 def plain_block(seed: int) -> Sound:
@@ -255,8 +259,17 @@ def oblique(seed: int) -> Sound:
         control = replace(spec.control, every=int(rng.integers(3, 11)))
         return replace(spec, camera=WIDE, points=Points(rows=5, extra_per_model=25), control=control)
 
-    simulation = made(rng, seed, draw)
-    inputs = inputs_of(simulation)
+    for attempt in range(ATTEMPTS):
+        simulation = made(rng, seed + attempt, draw)
+        inputs = aside(rng, inputs_of(simulation))
+        if common_points(inputs) >= LEAST_COMMON:  # else it could not be run
+            break
+    settings = replace(settings_of(simulation), adjustment=str(rng.choice(METHODS)))
+    return Sound(inputs, settings, simulation.spec, frozenset(WEAK))  # not all control is seen
+
+
+def aside(rng: Rng, inputs: Inputs) -> Inputs:
+    """Turn the cameras of vertical photos aside; what they do not see then is left out."""
     tilt = np.radians(rng.uniform(*OBLIQUE_DEG)) * rng.choice([-1.0, 1.0])
     turn = from_angles(np.array([[tilt, 0.0, 0.0] if rng.random() < MOST else [0.0, tilt, 0.0]]), "omega-phi-kappa")[0]
     focal = float(rng.choice([88.0, 120.0]))
@@ -267,9 +280,14 @@ def oblique(seed: int) -> Sound:
     kept = replace(o, photo=o.photo[rows], point=o.point[rows], xy=xy[rows], sigma=o.sigma[rows])
     camera = replace(inputs.strips[0].camera, principal_distance=focal)
     strips = tuple(replace(each, camera=camera) for each in inputs.strips)
-    inputs = replace(inputs, observations=kept, strips=strips)
-    settings = replace(settings_of(simulation), adjustment=str(rng.choice(METHODS)))
-    return Sound(inputs, settings, simulation.spec, frozenset(WEAK))  # not all control is seen
+    return replace(inputs, observations=kept, strips=strips)
+
+
+def common_points(inputs: Inputs) -> int:
+    """Count the points that two photos that follow each other have in common, at least."""
+    o = inputs.observations
+    on = [set(o.point[o.photo == o.photo_ids.index(photo)].tolist()) for photo in inputs.strips[0].photos]
+    return min(len(one & other) for one, other in pairwise(on))
 
 
 def calibrating(seed: int) -> Sound:

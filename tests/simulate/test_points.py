@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,25 @@ def test_gruber_points_stand_where_they_should() -> None:
     expected = {(0.0, 92.0), (0.0, 0.0), (0.0, -92.0)}  # 80 % of 115 mm
     assert {(round(x, 6) + 0.0, round(y, 6) + 0.0) for x, y in own} == expected
     assert Counter(Counter(done.observations.point.tolist()).values()) == {3: 24, 2: 6}
+
+
+def test_no_two_points_are_moved_to_one_place() -> None:
+    # 1020-1 and 1020-2 stood at one place: two ids for one point, as the gate rightly said
+    flight = Flight(
+        photos=22,
+        end_lap_percent=59.62081181608995,
+        scale=10022.362276306998,
+        heading_deg=66.03939775455235,
+        attitude_sigma_deg=(2.0, 2.0, 2.0),
+    )
+    camera = replace(FILM, principal_distance=305.0)
+    points = Points(rows=5, extra_per_model=5)
+    ground = Ground("EPSG:32719", center_deg=(-68.0, -33.0))
+    spec = Spec(seed=100520, camera=camera, ground=ground, flight=flight, terrain=Terrain(relief=0.0),
+                points=points)  # fmt: skip
+    xyz = simulate(spec).truth.points.xyz
+    one, other = np.triu_indices(len(xyz), 1)
+    assert np.linalg.norm(xyz[one] - xyz[other], axis=1).min() > 0.01
 
 
 def test_ids_are_unique_and_say_where_a_point_is() -> None:

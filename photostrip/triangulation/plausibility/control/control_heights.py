@@ -75,6 +75,11 @@ class HeightComparison:
         return self._with_scale[1]
 
     @cached_property
+    def as_given(self) -> RobustFit:
+        """Fit of tilt and bending, the scale being right."""
+        return fit_robustly(self.columns, self.value, self.in_fit, self.floor)
+
+    @cached_property
     def _with_scale(self) -> tuple[Floats, RobustFit]:
         return fit_simplest([self.deviation, *self.whole], 4, self.value, self.in_fit, self.floor)
 
@@ -118,12 +123,17 @@ class HeightStretch:
     @cached_property
     def misfit(self) -> float:
         """What is left of the heights as they are, in units of what makes sense."""
-        return self._misfit(self._tilt)
+        return self._left(self._fit(self._tilt))
 
     @cached_property
     def in_relief(self) -> float:
         """The same of what is left when the strip may bend."""
-        return self._misfit(self.heights.whole)
+        return self._left(self._fit(self.heights.whole))
+
+    @cached_property
+    def in_relief_at_most(self) -> float:
+        """The same with the bend that the heights need: no larger bend leaves more."""
+        return self._left(self.heights.as_given)
 
     @property
     def _tilt(self) -> list[Floats]:
@@ -133,10 +143,10 @@ class HeightStretch:
         h = self.heights
         return fit_robustly(np.column_stack(columns), h.value, h.in_fit, h.floor)
 
-    def _misfit(self, columns: list[Floats]) -> float:
+    def _left(self, fit: RobustFit) -> float:
         """Rms of what a fit leaves; what is far off counts less."""
-        size = np.abs(self._fit(columns).residual[self.heights.in_fit])
-        freedom = max(len(size) - len(columns), 1)
+        size = np.abs(fit.residual[self.heights.in_fit])
+        freedom = max(len(size) - len(fit.coefficient), 1)
         rms = float(np.sqrt((np.minimum(size, KEPT_SIGMAS * np.median(size)) ** 2).sum() / freedom))
         return max(rms / self.heights.floor, 1.0)
 
@@ -166,15 +176,14 @@ def stretch_of(heights: HeightComparison | None) -> HeightStretch | None:
 
 
 def find_wrong_heights(
-    given: GivenPoints, on_strip: StripPoints, heights: HeightComparison, fit: RobustFit, floor: float
+    given: GivenPoints, on_strip: StripPoints, heights: HeightComparison, floor: float
 ) -> Iterator[Finding]:
     """Find heights of another unit or sense, and groups of heights that are off by a constant.
 
-    fit: what is left of the heights, tilt and bending taken out.
     floor: smallest standard deviation that makes sense, metres.
     Yields P105, P401, P404, P405, at most one.
     """
-    in_fit = heights.in_fit
+    in_fit, fit = heights.in_fit, heights.as_given
     ratio, sigma = 1.0 + float(heights.scaled.coefficient[0]), float(heights.scaled.sigma[0])
     feet = min(abs(ratio * each - 1.0) for each in (FOOT, 1 / FOOT)) < FEET_TOLERANCE
     explains = heights.scaled.sigma0 < (EXPLAINED_SHARE_IN_FEET if feet else EXPLAINED_SHARE) * fit.sigma0

@@ -17,7 +17,6 @@ from photostrip.triangulation.plausibility.control import control_heights, contr
 from photostrip.triangulation.plausibility.control.control_fit import (
     LEAST_POINTS,
     PlanSimilarity,
-    fit_robustly,
     fit_similarity,
     upright,
 )
@@ -101,10 +100,9 @@ def find_wrong_readings(
     if heights is None:
         left = Misclosures(fitted.plan, height=None, usable=np.zeros(len(consistent), bool), consistent=consistent)
         return Reading([*findings, *control_slips.find_plan_slips(given, on_strip, fitted, left)])
-    fit = fit_robustly(heights.columns, heights.value, heights.in_fit, fitted.floor[1])
-    left = Misclosures(plan=fitted.plan, height=fit, usable=heights.usable, consistent=consistent)
+    left = Misclosures(plan=fitted.plan, height=heights.as_given, usable=heights.usable, consistent=consistent)
     findings += control_slips.find_plan_slips(given, on_strip, fitted, left)
-    whole = list(control_heights.find_wrong_heights(given, on_strip, heights, fit, fitted.floor[1]))
+    whole = list(control_heights.find_wrong_heights(given, on_strip, heights, fitted.floor[1]))
     return Reading(findings + (whole or list(control_slips.find_height_slips(given, on_strip, fitted, left))), heights)
 
 

@@ -59,7 +59,7 @@ class PhotoLinks:
     @cached_property
     def index(self) -> dict[tuple[int, int], int]:
         """Row of each link by its two photos."""
-        return {(int(a), int(b)): row for row, (a, b) in enumerate(self.photo)}
+        return {(a, b): row for row, (a, b) in enumerate(self.photo.tolist())}
 
     def toward(self, of: int, other: int) -> complex:
         """Centre of another photo as it would lie on a photo; NaN without a link."""
