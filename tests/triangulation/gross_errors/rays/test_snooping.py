@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.errors import GeometryError
 from photostrip.simulate import Flight, Points, Spec
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle.selection import Selection
@@ -81,3 +82,12 @@ def test_control_that_began_outside_with_its_rays_tells_which_is_wrong(problem: 
     assert done.selection.images[good]
     assert not done.selection.images[wrong]
     assert [each.cause for each in done.rejections if each.row == wrong and each.kind == "image"] == [WRONG_RAY]
+
+
+def test_redundancy_numbers_beyond_their_range_are_no_adjustment(problem: BundleProblem) -> None:
+    """A strip that hangs free at a photo was factored all the same: |r| of 254, and 141 points were taken for wrong."""
+    done = snooping.ScreenedBundle.of(problem, Selection.everything(problem), BundleSettings())
+    snooping._require_regular(done)
+    broken = replace(done.precision, image_residuals=done.precision.image_residuals * 4.0)
+    with pytest.raises(GeometryError, match="singular but for rounding"):
+        snooping._require_regular(replace(done, precision=broken))
