@@ -32,7 +32,8 @@ def candidates(whole: JointAdjustment) -> Columns:
         projector = projected(covariance, whole.design)
         squares = np.bincount(part, (errors.T @ (projector @ whole.w)) ** 2)
         expected = np.bincount(part, np.einsum("ij,ij->j", errors, projector @ errors))
-        variance *= np.sqrt(squares / np.maximum(expected, 1e-300))
+        # of what nothing checks, rounding leaves less than nothing
+        variance *= np.sqrt(np.divide(squares, expected, out=np.ones_like(squares), where=expected > 0.0))
     predicted = np.bincount(part, (whole.matrix.diagonal() * whole.size**2)[columns]) / np.bincount(part)
     share = variance * predicted
     found: list[int] = []

@@ -189,14 +189,20 @@ class JointAdjustment:
         cofactor = self.cofactor(out)
         told = np.abs(np.diagonal(cofactor @ self.matrix[np.ix_(rows, rows)]) - 1) < ROUNDING
         error = cofactor @ self.pull[rows]
-        left, found = self.squares - float(self.pull[rows] @ error), []
-        for part in [part for part in self.parts if set(part) <= set(out)]:
-            place = [out.index(column) for column in part]
-            gain = float(error[place] @ np.linalg.pinv(cofactor[np.ix_(place, place)], hermitian=True) @ error[place])
-            gain = gain if told[place].all() else -np.inf
-            freedom = self.freedom - len(out) + len(part)
-            found.append(Deletion(columns=part, gain=gain, squares=left + gain, freedom=freedom))
-        return found
+        left, freedom, found = self.squares - float(self.pull[rows] @ error), self.freedom - len(out), []
+        place = {column: number for number, column in enumerate(out)}
+        parts = [part for part in self.parts if set(part) <= set(out)]
+        for count in sorted({len(part) for part in parts}):  # all of one size at once
+            same = [part for part in parts if len(part) == count]
+            at = np.array([[place[column] for column in part] for part in same], np.intp)
+            weight = np.linalg.pinv(cofactor[at[:, :, None], at[:, None, :]], hermitian=True)
+            gain = np.einsum("ni,nij,nj->n", error[at], weight, error[at])
+            gain[~told[at].all(axis=1)] = -np.inf
+            found += [
+                Deletion(columns=part, gain=each, squares=left + each, freedom=freedom + count)
+                for part, each in zip(same, gain.tolist(), strict=True)
+            ]
+        return sorted(found, key=lambda each: each.columns)
 
     def test(self, out: Columns, part: Columns) -> Deletion:
         """Test a part against what stays, whether it was deleted or not."""

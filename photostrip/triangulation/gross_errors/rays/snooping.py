@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 
+OUT_TO_ONE_MORE = 8
+
+
 @dataclass(frozen=True, eq=False)
 class ScreenedBundle:
     """A solution and how it was cleaned."""
@@ -145,6 +148,7 @@ class _Search:
         self.back: set[int] = set()  # points that came back; what must go again stays out
         self.rounds = 0
         self.common: list[CommonError] = []
+        self.next_trial = 0  # given coordinates that are out when a common error, tried in vain, is tried again
 
     def rays_of(self, point: int) -> Numbers:
         """Rows of the rays of a point, in the order of the photos."""
@@ -175,7 +179,7 @@ class _Search:
         """Test and take out until nothing is beyond the limit."""
         done = self.adjust(selection)
         while (worst := self._worst(done)) or reliability.sigma0_test(done.solution).too_large:
-            if (not worst or worst[0].kind != IMAGE) and self._take_up_common(done, *worst):
+            if (not worst or worst[0].kind != IMAGE) and self._take_up_common(done, *worst[:1]):
                 done = self.adjust(done.selection)
                 continue
             if not worst:
@@ -185,8 +189,11 @@ class _Search:
 
     def _take_up_common(self, done: ScreenedBundle, worst: Rejection | None = None) -> bool:
         """Take up what a group of observations shares, where that explains more than the worst given coordinate."""
+        if worst and self._given_out() < self.next_trial:
+            return False
         found = find_common_error(self.problem, done.selection, done.solution, done.limit, worst)
         if found is None:
+            self.next_trial = 2 * self._given_out() + 1
             return False
         self.common.append(found)
         self.problem = taken_up(self.problem, found)
@@ -204,7 +211,9 @@ class _Search:
             _require_regular(found)
         except GeometryError:
             self.problem = before
-            if any(each.kind != IMAGE for each in worst):
+            if worst[0].kind != IMAGE:
+                if len(worst) > 1:
+                    return self._without(done, worst[:1])
                 raise
             points = self.problem.images.point[[each.row for each in worst]]
             first = points <= np.sort(points)[(len(points) - 1) // 2]
@@ -222,29 +231,37 @@ class _Search:
         return found
 
     def _worst(self, done: ScreenedBundle) -> list[Rejection]:
-        """Return the worst rays of every neighbourhood, or the worst given coordinate where that is worse."""
+        """Return the worst rays of every neighbourhood, or the worst given coordinates where they are worse.
+
+        The more of these are out, the more go at a time: the work grows with the logarithm of their number.
+        """
         limit = done.limit
-        rays, given = np.zeros(0), None
+        rays, given = np.zeros(0), []
         for group in reliability.groups_of(done.problem, done.solution, done.precision):
             value = np.abs(np.nan_to_num(group.standardised)) / limit.unit
             if group.kind == IMAGE:
                 rays = self._doubtful(done.selection, value.max(axis=1), limit)
                 continue
-            row, axis = np.unravel_index(int(value.argmax()), value.shape)
-            if value[row, axis] > (given.value if given else limit.value):
-                given = Rejection(
+            given += [
+                Rejection(
                     kind=group.kind,
-                    row=int(row),
-                    axes=(int(axis),),
+                    row=row,
+                    axes=(axis,),
                     test=self.settings.test,
                     value=float(value[row, axis]),
                     limit=limit.value,
                     size=tuple(group.gross[row].tolist()),
                 )
-        if given and given.value >= rays.max(initial=0.0):
-            return [given]
+                for row, axis in np.argwhere(value > limit.value).tolist()
+            ]
+        given.sort(key=lambda each: -each.value)
+        if given and given[0].value >= rays.max(initial=0.0):
+            return given[: 1 + self._given_out() // OUT_TO_ONE_MORE]
         points = np.flatnonzero(self._worst_nearby(done.selection, rays))
         return [each for point in points.tolist() for each in self._wrong_rays(done, point, limit)]
+
+    def _given_out(self) -> int:
+        return sum(kind != IMAGE for kind, _, _ in self.out)
 
     def _doubtful(self, selection: Selection, value: Floats, limit: Limit) -> Floats:
         """Test values of points, by the worst of their rays; 0 where it is within the limit, or the user keeps one."""

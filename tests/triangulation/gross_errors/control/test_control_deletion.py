@@ -21,6 +21,7 @@ from photostrip.result.document import document_of
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.gross_errors.control import control_screening, strip_at_control
+from photostrip.triangulation.gross_errors.control.control_components import candidates
 from photostrip.triangulation.gross_errors.control.control_deletion import adjust
 from photostrip.triangulation.gross_errors.control.control_rejections import Found, reliability
 from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
@@ -281,3 +282,13 @@ def test_two_fifths_of_the_control_are_found_wrong(seed: int) -> None:
     """Suspected on the way: more than half, or a set that explains the misclosures not quite."""
     wrong, named, others, failed = much_wrong_run(seed)
     assert (named, others, failed) == (wrong, 0, 0)
+
+
+def test_variance_components_say_nothing_of_what_nothing_checks() -> None:
+    """A similarity takes the first point whatever is wrong: what rounding leaves of it is no candidate."""
+    for seed in range(20):
+        strip = drawn(seed, points=4)
+        design = strip.design.copy()
+        design[:, :3] = np.eye(len(design), 3)
+        whole = adjust(replace(strip, design=design), strip.w, strip.covariance(np.arange(len(strip.w))))
+        assert not {0, 1, 2} & set(candidates(whole))
