@@ -101,6 +101,19 @@ class PhotoPoints:
         """Return the number of image points."""
         return len(self.photo)
 
+    @cached_property
+    def photo_index(self) -> dict[str, int]:
+        """Number of each photo."""
+        return {name: number for number, name in enumerate(self.photo_ids)}
+
+    def places(self, photos: Sequence[str]) -> Numbers:
+        """Place of the photo of every image point among some photos; -1 for the others."""
+        place = np.full(len(self.photo_ids), -1, np.intp)
+        for at, name in enumerate(photos):
+            if name in self.photo_index:
+                place[self.photo_index[name]] = at
+        return place[self.photo]
+
 
 @dataclass(frozen=True, eq=False)
 class ControlPoints:

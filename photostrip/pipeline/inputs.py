@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, locate
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
+    from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 
 ADJUSTMENTS = ("similarity", "polynomial", "covariance", "bundle")
 
@@ -38,7 +38,7 @@ class Strip:
 
     def positions(self, observations: PhotoPoints) -> Numbers:
         """Place in the strip of the photo of every image point; -1 for photos of other strips."""
-        return locate(observations.photo_ids, self.photos)[observations.photo]
+        return observations.places(self.photos)
 
     def oriented(self, centers: Floats, rotations: Floats) -> KnownPhotos:
         """Its photos with their orientations."""

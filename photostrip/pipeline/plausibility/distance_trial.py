@@ -69,14 +69,15 @@ def find_wrong_distance(
         return []
     # of a badly wrong distance, most control may have been dropped
     first = as_given or compare(formed) or compare(formed.whole)
-    if first is None or first.misfit < LEAST_MISFIT:
+    if first is None or first.misfit_at_most < LEAST_MISFIT:
         return []
     sigma0, stated = _middle_sigma0(formed), formed.strip.median_sigma(observations)
-    no_bend = first.misfit > len(formed.strip.photos) ** BEND_POWER
+    most_bend = len(formed.strip.photos) ** BEND_POWER
+    no_bend = first.misfit_at_most > most_bend and first.misfit > most_bend
     bend_fits = first.in_relief_at_most * LEFT_SHARE < 1.0 or first.in_relief * LEFT_SHARE < 1.0
     if not no_bend and bend_fits and sigma0 * BETTER_SIGMA0_RATIO < stated:
         return []  # neither heights nor pairs could be so much better
-    if abs(first.ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
+    if first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
         return []
     for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(formed.strip, observations)]:
         trial = _followed(formed.strip, observations, settings, compare, start)

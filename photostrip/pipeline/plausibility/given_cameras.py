@@ -151,10 +151,10 @@ def _of_strip(strip: Strip, plan: LevelPlan, shown: Shown, photo_ids: Sequence[s
 def _ground_below(photos: Numbers, plan: LevelPlan, shown: Shown) -> tuple[Floats, Floats]:
     """Height of the ground under each photo, and metres on the ground in a millimetre of the photo."""
     height, scale = np.full(len(photos), np.nan), np.full(len(photos), np.nan)
-    for place, number in enumerate(photos.tolist()):
-        rows = np.flatnonzero(shown.photo == number)
-        if not len(rows):
-            continue
+    order = np.argsort(shown.photo, kind="stable")
+    first, last = (np.searchsorted(shown.photo[order], photos, side) for side in ("left", "right"))
+    for place in np.flatnonzero(first < last).tolist():
+        rows = order[first[place] : last[place]]
         ground = plan.control[shown.number[rows]]
         height[place] = np.median(ground[:, 2])
         far = _spread(shown.xy[rows])

@@ -10,6 +10,7 @@ Source: least median of squares (Rousseeuw 1984); derived, see docs/sources.md.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -111,13 +112,18 @@ def _pairs(z: Complex, plan: Complex) -> tuple[Numbers, Numbers]:
         draw = np.random.default_rng(n)  # the same for the same number of points
         i, j = draw.integers(0, n, (2, 20 * MOST_PAIRS))
     else:
-        i, j = np.triu_indices(n, 1)
+        i, j = _each_two(n)
     far = np.abs(z[j] - z[i])
     enough = far > LEAST_PAIR_DISTANCE * far.max(initial=0.0)
     keep = np.flatnonzero(enough & (far > 0) & (np.abs(plan[j] - plan[i]) > TINY))
     if len(keep) > MOST_PAIRS:
         keep = keep[_evenly(len(keep), MOST_PAIRS)]
     return i[keep].astype(np.intp), j[keep].astype(np.intp)
+
+
+@lru_cache(maxsize=8)
+def _each_two(n: int) -> tuple[Numbers, Numbers]:
+    return np.triu_indices(n, 1)
 
 
 def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirrored: bool) -> PlanSimilarity:

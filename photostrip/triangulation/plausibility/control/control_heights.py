@@ -123,17 +123,25 @@ class HeightStretch:
     @cached_property
     def misfit(self) -> float:
         """What is left of the heights as they are, in units of what makes sense."""
-        return self._left(self._fit(self._tilt))
+        return self._left(self._fit(self._tilt).residual, LEAST_POINTS)
 
     @cached_property
     def in_relief(self) -> float:
         """The same of what is left when the strip may bend."""
-        return self._left(self._fit(self.heights.whole))
+        return self._left(self._fit(self.heights.whole).residual, len(self.heights.whole))
 
     @cached_property
     def in_relief_at_most(self) -> float:
         """The same with the bend that the heights need: no larger bend leaves more."""
-        return self._left(self.heights.as_given)
+        fit = self.heights.as_given
+        return self._left(fit.residual, len(fit.coefficient))
+
+    @cached_property
+    def misfit_at_most(self) -> float:
+        """The misfit with the tilt of that fit, which is not the best one without a bend."""
+        h = self.heights
+        tilt = h.as_given.coefficient[:LEAST_POINTS]
+        return self._left(h.value - h.columns[:, :LEAST_POINTS] @ tilt, LEAST_POINTS)
 
     @property
     def _tilt(self) -> list[Floats]:
@@ -143,10 +151,10 @@ class HeightStretch:
         h = self.heights
         return fit_robustly(np.column_stack(columns), h.value, h.in_fit, h.floor)
 
-    def _left(self, fit: RobustFit) -> float:
+    def _left(self, residual: Floats, unknowns: int) -> float:
         """Rms of what a fit leaves; what is far off counts less."""
-        size = np.abs(fit.residual[self.heights.in_fit])
-        freedom = max(len(size) - len(fit.coefficient), 1)
+        size = np.abs(residual[self.heights.in_fit])
+        freedom = max(len(size) - unknowns, 1)
         rms = float(np.sqrt((np.minimum(size, KEPT_SIGMAS * np.median(size)) ** 2).sum() / freedom))
         return max(rms / self.heights.floor, 1.0)
 

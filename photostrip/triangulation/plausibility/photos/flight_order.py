@@ -190,14 +190,17 @@ def turned_back(links: mosaic.PhotoLinks, order: Sequence[int], closer: Toward =
     None is named where a link is missing or doubtful, or where `closer`, which takes tilts into account, contradicts.
     """
     sure = (links.count >= SURE_COUNT) & (links.misfit < SURE_MISFIT * np.abs(links.bases[1]))
+    certain, ways = sure.tolist(), [each.tolist() for each in links.bases]
+
+    def toward(of: int, other: int) -> complex | None:
+        row = links.index.get((min(of, other), max(of, other)))
+        return ways[0 if of < other else 1][row] if row is not None and certain[row] else None
+
     found: list[int] = []
     looked_at = 0
     for before, photo, after in zip(order, order[1:], order[2:], strict=False):
-        rows = [links.index.get((min(photo, other), max(photo, other)), -1) for other in (before, after)]
-        if min(rows) < 0 or not sure[rows].all():
-            continue
-        one, two = links.toward(photo, before), links.toward(photo, after)
-        if not _same_side(one, two):
+        one, two = toward(photo, before), toward(photo, after)
+        if one is None or two is None or not _same_side(one, two):
             continue
         looked_at += 1
         near = [closer(photo, other) for other in (before, after)] if looked_at <= MOST_LOOKED_AT else [None, None]
