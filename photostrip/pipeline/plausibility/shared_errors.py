@@ -8,6 +8,7 @@ import numpy as np
 
 from photostrip.triangulation.bundle.common_errors import ALL, DISTANCE, DRIFT
 from photostrip.triangulation.bundle.observations.given_orientations import drift_columns
+from photostrip.triangulation.bundle.quality.reliability import CONTROL
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control.control_heights import LEAST_SCALE_ERROR
 
@@ -88,6 +89,13 @@ def _finding(
     message += f"; the adjustment continued as with `correction: {correction}`"
     if error.rival:
         message += ". A wrong principal distance would explain it nearly as well"
+    given = int(np.isfinite(bundle.block.problem.control.sigma).sum())
+    rejected = sum(each.kind == CONTROL and not each.readmitted for each in bundle.screened.rejections)
+    if rejected > given / 2:
+        message += (
+            f". Control and camera positions contradict each other: {rejected} of {given} control coordinates were "
+            "rejected all the same, and which of the two is right cannot be told"
+        )
     fix = (
         "look at the datum, the kind of height and the lever arm of the positions, and at the crs of the control; what "
         f"cannot be put right is taken up by `correction: {correction}`"

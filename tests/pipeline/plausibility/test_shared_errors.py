@@ -23,11 +23,16 @@ if TYPE_CHECKING:
 
 
 def adjusted(
-    *, strips: int = 2, shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0), distance: float = 1.0, seed: int = 7
+    *,
+    strips: int = 2,
+    shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+    distance: float = 1.0,
+    seed: int = 7,
+    control: Control | None = None,
 ) -> tuple[Simulation, Result]:
     """Adjust a block whose control stands at both ends, with measured camera positions that are shifted."""
     flight = Flight(photos=10, strips=strips)
-    simulation = simulate(Spec(seed=seed, flight=flight, control=Control(bands=2), gnss=Gnss()))
+    simulation = simulate(Spec(seed=seed, flight=flight, control=control or Control(bands=2), gnss=Gnss()))
     inputs, photos = inputs_of(simulation), simulation.truth.photo_ids
     assert simulation.gnss is not None
     shape = len(photos), 3
@@ -152,3 +157,11 @@ def test_wrong_control_points_are_no_principal_distance() -> None:
     result = on_hills(0.0, GrossError("control", count=2, size_m=3.0))
     assert {each.code for each in result.findings} <= {"P406"}
     assert len(result.strips[0].wrong_control) == 2
+
+
+def test_control_that_contradicts_the_positions_is_told_with_them() -> None:
+    """Control off by 50 m everywhere: a drift of the positions is taken up, and the control rejected all the same."""
+    _, result = adjusted(control=Control(bands=3, noise=(50.0, 50.0, 50.0)))
+    told = [each.message for each in result.findings if each.code == "P208"]
+    assert told
+    assert all("which of the two is right cannot be told" in each for each in told)
