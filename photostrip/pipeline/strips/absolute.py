@@ -76,9 +76,6 @@ class StripStage(Protocol[Errors]):
     def misclosure_covariance(self, oriented: OrientedStrip[Errors], some: Numbers) -> Floats:
         """Covariance of some misclosures at the control, strip and control together, metres^2."""
 
-    def rejoined(self, oriented: OrientedStrip[Errors], settings: Settings) -> StripStage[Errors]:
-        """Return the strip with the scales that the control had to decide; itself where there are none."""
-
     def control_rays(self, oriented: OrientedStrip[Errors]) -> Sequence[ControlRay]:
         """Rays of the control points that stand on two photos."""
 
@@ -156,11 +153,9 @@ class ScreenedStrip(Generic[Errors]):
 
 
 def orient_on_control(
-    stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+    stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame]
 ) -> OrientedStrip[Errors]:
     """Lay a strip on its control: intermediate frame and absolute orientation.
-
-    Where the pass points of a junction contradict each other, the control decides, and the strip is laid on it again.
 
     Raises GeometryError, InputError when the control does not determine the similarity, or strip and control are of
         different hands; the strip is named.
@@ -171,10 +166,7 @@ def orient_on_control(
     except InputError as refusal:
         oriented = to_ground(stage.turned_over(refusal), inside, rows, frames)
     oriented.stage.refuse_other_hand(oriented)
-    stage = oriented.stage.rejoined(oriented, settings)
-    if stage is oriented.stage:
-        return oriented
-    return to_ground(stage, *control_of(stage.formed, control, stage.point_ids), frames)
+    return oriented
 
 
 def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) -> ScreenedStrip[Errors]:

@@ -31,7 +31,7 @@ def adjust_formed(
     stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
 ) -> StripResult:
     """Take a formed strip to the ground with its own control."""
-    return adjust(reject_wrong_control(orient_on_control(stage, control, frames, settings), settings), settings)
+    return adjust(reject_wrong_control(orient_on_control(stage, control, frames), settings), settings)
 
 
 def _polynomial(oriented: OrientedStrip[Errors], settings: Settings) -> polynomial.Polynomial:

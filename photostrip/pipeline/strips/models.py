@@ -86,10 +86,6 @@ class LinkedModels:
         found, rows = oriented.misclosures.take(some), oriented.control_rows
         return model_misclosures.covariance(oriented.errors, found, rows, self.formed.links.factor)
 
-    def rejoined(self, _: Oriented, __: Settings) -> LinkedModels:
-        """Links are screened by themselves."""
-        return self
-
     def control_rays(self, _: Oriented) -> tuple[()]:
         """Models have no rays."""
         return ()

@@ -14,14 +14,13 @@ from photostrip.triangulation.relative_orientation.orientation import CONDITION_
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Iterator
 
     from photostrip.arrays import Floats
     from photostrip.pipeline.inputs import ModelStrip, Strip
     from photostrip.points import ControlPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
-    from photostrip.triangulation.gross_errors.control.junction_scale import DecidedJunction
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
     from photostrip.triangulation.polynomial.correction import Polynomial
     from photostrip.triangulation.resection.resection import Resection
@@ -87,32 +86,11 @@ def wrong_control_notes(strip: Strip | ModelStrip, screened: ScreenedControl) ->
         yield Note("control-rejected", text, strip=strip.id, points=(point,))
 
 
-def decided_notes(
-    strip: Strip, oriented: Orientation, point_ids: Sequence[str], decided: Sequence[DecidedJunction]
-) -> Iterator[Note]:
-    """Say where the control has joined models by other pass points than the strip would have."""
-    for each in decided:
-        photo = strip.photos[each.junction + 1]
-        right, wrong = (
-            tuple(point_ids[number] for number in np.unique(oriented.point[rows])) for rows in (each.right, each.wrong)
-        )
-        error = each.error
-        text = (
-            f"photo {photo}: its pass points contradict each other in the scale of the models, and the control "
-            f"decides: with {', '.join(wrong)} the strip behind it was {abs(error.value):.2%} too "
-            f"{'large' if error.value > 0 else 'small'} (test value {error.test:.1f}, limit {error.limit:.1f}); they "
-            f"are not used, the models are joined by {', '.join(right)}; measure them again"
-        )
-        yield Note("decided-joint", text, strip=strip.id, photos=(photo,), points=wrong)
-
-
-def junction_notes(strip: Strip, formed: FormedStrip, decided: Collection[int] = ()) -> Iterator[Note]:
-    """Say which models are joined doubtfully, unless the control has decided, or weakly."""
+def junction_notes(strip: Strip, formed: FormedStrip) -> Iterator[Note]:
+    """Say which models are joined doubtfully or weakly."""
     junctions = formed.junctions
     count = np.bincount(junctions.junction, junctions.used, len(junctions.factor))
     for number in np.flatnonzero(junctions.doubt).tolist():
-        if number in decided:
-            continue
         photo = strip.photos[number + 1]
         text = (
             f"photo {photo}: its pass points contradict each other in the scale of the models by "

@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
-from photostrip.pipeline.strips.screened_formation import form_again, form_screened, with_readmitted
+from photostrip.pipeline.strips.screened_formation import form_screened, with_readmitted
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
-from photostrip.triangulation.gross_errors.control import junction_scale
-from photostrip.triangulation.gross_errors.control.junction_scale import DecidedJunction, ScaleError, scale_error
-from photostrip.triangulation.gross_errors.control.strip_at_control import LARGEST, ControlRay
+from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
@@ -48,7 +45,6 @@ class FormedPhotos:
     screened: screening.ScreenedPairs  # the search for gross errors in its pairs
     formed: FormedStrip
     wrong_rays: tuple[Rejection, ...]  # rays that the others of their points contradict
-    decided: tuple[DecidedJunction, ...] = ()  # junctions whose scale the control had to decide
 
     @property
     def orientation(self) -> Orientation:
@@ -103,43 +99,6 @@ class FormedPhotos:
         errors = oriented.errors.with_doubt(self.formed.junctions.doubt / np.sqrt(factor))
         strip = covariances.sums_of(errors, found.rows, np.eye(len(found.point)))
         return strip * factor + np.diag(found.variance)
-
-    def rejoined(self, oriented: Oriented, settings: Settings) -> FormedPhotos:
-        """Join models by the pass points that the control confirms, where those of a junction contradict each other."""
-        if not self.screens_control(settings):
-            return self
-        decided = junction_scale.decide(self.orientation, self.formed, self._scale_errors(oriented))
-        kept = overruling.rows(settings.relative.keep, self.observations)
-        rows = self.orientation.rows
-        decided = [each for each in decided if not np.isin(rows[each.wrong], kept).any()]
-        if not decided:
-            return self
-        aside = junction_scale.aside(self.orientation, self.formed, decided)
-        wrong = junction_scale.wrong_rays(self.orientation, decided, self.wrong_rays)
-        rays = _strip_rays(self.strip, self.observations, self.screened, self.orientation.pairs.weight, kept)
-        formed = form_again(self.orientation, rays, self.strip.photos, settings.formation, aside, wrong)
-        return replace(self, formed=formed, wrong_rays=wrong, decided=tuple(decided))
-
-    def _scale_errors(self, oriented: Oriented) -> dict[int, ScaleError]:
-        """Errors of the scales of the doubtful junctions, by the control near each."""
-        found, doubt = oriented.misclosures, self.formed.junctions.doubt
-        at = oriented.at_control[found.point]
-        gaps = oriented.targets.misclosures(oriented.at_control)[found.point, found.axis]
-        centers = oriented.absolute.similarity(self.formed.centers)
-        doubtful, errors = np.flatnonzero(doubt), {}
-        for junction in doubtful.tolist():
-            center = centers[junction + 1]
-            some = np.sort(np.argsort(np.abs(at[:, 0] - center[0]), kind="stable")[:LARGEST])
-            arm, part = similarity_derivatives(at[some], center), found.take(some)
-            design = np.einsum("wi,wij->wj", part.direction, arm)
-            behind = np.where(part.rows.first > junction, design[:, -1], 0.0)
-            covariance = self.misclosure_covariance(oriented, some)
-            error = scale_error(
-                gaps[some], design, behind, covariance, doubt=float(doubt[junction]), junctions=len(doubtful)
-            )
-            if error is not None:
-                errors[junction] = error
-        return errors
 
     def control_rays(self, oriented: Oriented) -> list[ControlRay]:
         """Rays of the control points that stand on two photos."""
@@ -196,8 +155,7 @@ class FormedPhotos:
                 *notes.screening_notes(strip, self.screened, self.sigma),
                 *notes.wrong_control_notes(strip, screened.screened_control),
                 *notes.pair_notes(strip, self.orientation),
-                *notes.junction_notes(strip, formed, [each.junction for each in self.decided]),
-                *notes.decided_notes(strip, self.orientation, self.point_ids, self.decided),
+                *notes.junction_notes(strip, formed),
                 *notes.control_notes(strip, oriented.absolute),
                 *notes.polynomial_notes(strip, correction, xyz),
                 *([] if correction is None else notes.covariance_proposal(strip, correction)),
@@ -289,8 +247,14 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     if settings.relative.screening == "none":
         formed = form_from_pairs(oriented, settings.formation, strip.photos, scatter)
     else:  # the strip decides what its pairs could not
-        kept_rows = overruling.rows(settings.relative.keep, observations)
-        rays = _strip_rays(strip, observations, screened, pairs.weight, kept_rows)
+        rays = StripRays(
+            observations=observations,
+            position=strip.positions(observations),
+            sigma=scatter,
+            weight=pairs.weight,
+            stated=sigma,
+            kept=overruling.rows(settings.relative.keep, observations),
+        )
         readmit = settings.relative.screening in screening.SEARCHES
         oriented, formed, wrong = form_screened(oriented, rays, strip.photos, settings.formation, readmit=readmit)
         rejections = with_readmitted(screened.rejections, oriented.used)
@@ -302,17 +266,4 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
         screened=screened,
         formed=formed,
         wrong_rays=wrong,
-    )
-
-
-def _strip_rays(
-    strip: Strip, observations: PhotoPoints, screened: screening.ScreenedPairs, weight: Floats, kept: Numbers
-) -> StripRays:
-    return StripRays(
-        observations=observations,
-        position=strip.positions(observations),
-        sigma=screened.scatter.by_pair,
-        weight=weight,
-        stated=strip.median_sigma(observations),
-        kept=kept,
     )

@@ -66,19 +66,6 @@ def form_screened(
     return ScreenedStrip(oriented, _bridged(formed, oriented, rays, photos, found), found)
 
 
-def form_again(
-    oriented: Orientation,
-    rays: StripRays,
-    photos: Sequence[str],
-    settings: StripFormationSettings,
-    aside: Flags,
-    found: Sequence[Rejection],
-) -> FormedStrip:
-    """Form a strip that has been searched without other rows of the pairs' table, `aside`, and other rays, `found`."""
-    formed = form_from_pairs(oriented, settings, photos, rays.sigma, aside, searched=True)
-    return _bridged(without_rows(formed, oriented, aside), oriented, rays, photos, found)
-
-
 def _bridged(
     formed: FormedStrip, oriented: Orientation, rays: StripRays, photos: Sequence[str], found: Sequence[Rejection]
 ) -> FormedStrip:

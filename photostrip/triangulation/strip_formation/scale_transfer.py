@@ -88,10 +88,12 @@ def transfer_scale(
     Raises GeometryError when no point is common to three photos in a row.
     """
     junctions = orientation.pairs.size - 1
-    every = pass_points(orientation, vectors)
+    every = _pass_points(orientation, vectors)
     _require_pass_points(np.bincount(every.junction, minlength=junctions), photos)
     base, _ = orientation.relative
-    ratios = scale_ratios(every, base, vectors)
+    # eq. 139-141: distances from the common centre, before over after
+    ratios = np.linalg.norm(vectors[every.before] - base[every.junction], axis=1)
+    ratios /= np.linalg.norm(vectors[every.after], axis=1)
     joining = _joining(every, junctions, doubtful)
     (junction, before, after), ratio = (each[joining] for each in every), ratios[joining]
     depth = depths(vectors[before], base[junction]), depths(vectors[after], base[junction + 1])
@@ -159,7 +161,7 @@ def _scatter(orientation: Orientation) -> Floats:
     return np.full(orientation.pairs.size, max(value, SMALLEST_SIGMA))
 
 
-def pass_points(orientation: Orientation, vectors: Floats) -> PassPoints:
+def _pass_points(orientation: Orientation, vectors: Floats) -> PassPoints:
     """Points that stand in both models of a junction."""
     rows = np.flatnonzero(orientation.used & np.isfinite(vectors[:, 0]))
     # the table is ordered by pair
@@ -168,12 +170,6 @@ def pass_points(orientation: Orientation, vectors: Floats) -> PassPoints:
     first = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] == pair[:-1] + 1))
     first = first[np.argsort(pair[first], kind="stable")]
     return PassPoints(pair[first], rows[first], rows[first + 1])
-
-
-def scale_ratios(points: PassPoints, base: Floats, vectors: Floats) -> Floats:
-    """Distances of pass points from the common centre, before over after (t,), eq. 139-141; base: (p, 3)."""
-    before = np.linalg.norm(vectors[points.before] - base[points.junction], axis=1)
-    return np.asarray(before / np.linalg.norm(vectors[points.after], axis=1), float)
 
 
 def _joining(points: PassPoints, junctions: int, doubtful: Flags | None) -> Flags:
