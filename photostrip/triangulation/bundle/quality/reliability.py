@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.errors import GeometryError
 from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
 
 if TYPE_CHECKING:
@@ -75,6 +76,13 @@ def groups_of(problem: BundleProblem, solution: BundleSolution, precision: Cofac
         (ATTITUDE, -solution.attitude_residuals, problem.attitudes.sigma, precision.attitude_residuals),
     ]
     return tuple(_group(*each) for each in found if len(each[1]))
+
+
+def require_regular(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> None:
+    """Refuse redundancy numbers far outside 0 to 1: rounding hides that photos hang free (``bundle-rank``)."""
+    for group in groups_of(problem, solution, precision):
+        if (np.abs(np.nan_to_num(group.redundancy, nan=0.5) - 0.5) > 1.0).any():
+            raise GeometryError("the normal matrix is singular but for rounding", code="bundle-rank")
 
 
 def _group(kind: str, error: Floats, sigma: Floats, cofactors: Floats) -> Group:

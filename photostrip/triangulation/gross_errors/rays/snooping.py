@@ -85,13 +85,6 @@ class ScreenedBundle:
         return JointCofactors.of_solution(self.solution)
 
 
-def _require_regular(done: ScreenedBundle) -> None:
-    """Refuse an adjustment whose redundancy numbers, 0 to 1, are beyond that: rounding hides that photos hang free."""
-    for group in reliability.groups_of(done.problem, done.solution, done.precision):
-        if (np.abs(np.nan_to_num(group.redundancy, nan=0.5) - 0.5) > 1.0).any():
-            raise GeometryError("the normal matrix is singular but for rounding", code="bundle-rank")
-
-
 def _established(problem: BundleProblem, selection: Selection) -> int:
     """Count the points with a ray outside."""
     return len(np.unique(problem.images.point[~selection.images]))
@@ -208,7 +201,7 @@ class _Search:
         before = self.problem
         try:
             found = self.adjust(supported(self.problem, selection))
-            _require_regular(found)
+            reliability.require_regular(found.problem, found.solution, found.precision)
         except GeometryError:
             self.problem = before
             if worst[0].kind != IMAGE:

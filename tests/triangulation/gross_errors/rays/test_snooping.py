@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.simulate import Control, Flight, Gnss, Points, Spec
+from photostrip.simulate import Flight, Points, Spec
 from photostrip.statistics import normal_quantile
+from photostrip.triangulation.bundle.quality.reliability import require_regular
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.gross_errors.rays import snooping
@@ -87,22 +88,7 @@ def test_control_that_began_outside_with_its_rays_tells_which_is_wrong(problem: 
 def test_redundancy_numbers_beyond_their_range_are_no_adjustment(problem: BundleProblem) -> None:
     """A strip that hangs free at a photo was factored all the same: |r| of 254, and 141 points were taken for wrong."""
     done = snooping.ScreenedBundle.of(problem, Selection.everything(problem), BundleSettings())
-    snooping._require_regular(done)
+    require_regular(done.problem, done.solution, done.precision)
     broken = replace(done.precision, image_residuals=done.precision.image_residuals * 4.0)
     with pytest.raises(GeometryError, match="singular but for rounding"):
-        snooping._require_regular(replace(done, precision=broken))
-
-
-def test_the_rounds_grow_with_the_logarithm_of_the_wrong_coordinates() -> None:
-    """Control of 5 m beside good camera positions: one coordinate at a time took as many rounds as there are."""
-    spec = replace(BLOCK, control=Control(layout="random", count=24), gnss=Gnss(use=True))
-    result = adjusted(simulate(spec))
-    assert result.bundle is not None
-    problem = result.bundle.block.problem
-    control = problem.control
-    off = np.random.default_rng(7).normal(0.0, 5.0, control.xyz.shape)
-    spoiled = replace(problem, control=replace(control, xyz=control.xyz + off))
-    done = snooping.screen_bundle(spoiled, Selection.everything(spoiled), BundleSettings(test="baarda"))
-    given = [each for each in done.rejections if each.kind != "image" and not each.readmitted]
-    assert len(given) >= 40
-    assert done.rounds < 30
+        require_regular(done.problem, done.solution, broken)
