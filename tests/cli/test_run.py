@@ -66,7 +66,7 @@ def test_the_files_of_the_result(result: Path) -> None:
 def test_talk_goes_to_stderr(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "run", project, "-o", tmp_path / "out")
     assert code == 0
-    assert err == f"wrote 7 files to {tmp_path / 'out'}\n"
+    assert err == f"wrote 8 files to {tmp_path / 'out'}\n"
     assert "wrote" not in out
     _, _, err = run(capsys, "run", project, "-o", tmp_path / "out", "--verbose")
     assert [line.split()[0] for line in err.splitlines()] == ["read", "adjusted", "wrote"]

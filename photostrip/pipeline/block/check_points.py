@@ -42,4 +42,4 @@ def check_errors(
     difference = compared.differences[rows].ravel()
     known = np.flatnonzero(np.isfinite(difference))
     covariance = turned[np.ix_(known, known)] + np.diag(given.sigma[rows].ravel()[known] ** 2)
-    return CheckErrors(given.take(rows).ids, known // 3, difference[known], covariance)
+    return CheckErrors(ids=given.take(rows).ids, point=known // 3, difference=difference[known], covariance=covariance)

@@ -140,7 +140,11 @@ def _followed(
         pairs = _middle_sigma0(again)
         if trial and last.misfit > GIVEN_UP_MISFIT:
             break
-    return None if last is None else DistanceTrial(ratio, last.misfit, last.in_relief, pairs)
+    return (
+        None
+        if last is None
+        else DistanceTrial(factor=ratio, misfit=last.misfit, in_relief=last.in_relief, sigma0=pairs)
+    )
 
 
 def _finding(strip: Strip, ratio: float, how: str, numbers: Evidence) -> list[Finding]:

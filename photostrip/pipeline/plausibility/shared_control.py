@@ -29,6 +29,8 @@ def find_shared_errors(strips: Sequence[StripResult], findings: Sequence[Finding
 
     findings: what was found before: a strip whose distance is named already, or whose control is misread, is not named.
     """
+    if any(each.severity == ERROR and each.key.startswith("control[") for each in findings):
+        return  # a list that is misread
     misread = {name for each in findings if each.severity == ERROR for name in each.strips}
     named = {name for each in findings if each.code == "P107" for name in each.strips}
     for each in strips:

@@ -117,4 +117,9 @@ def _errors(
     covariance = factor * covariances.sums_of(errors, ErrorRows.joined([subtracted.rows, rows]), operator)
     covariance = covariance + (subtracted.operator * subtracted.variance) @ subtracted.operator.T
     covariance = covariance + np.diag(compared.coordinates.variance)
-    return CheckErrors(compared.checks.points.ids, compared.coordinates.point, compared.difference, covariance)
+    return CheckErrors(
+        ids=compared.checks.points.ids,
+        point=compared.coordinates.point,
+        difference=compared.difference,
+        covariance=covariance,
+    )

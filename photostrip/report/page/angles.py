@@ -39,9 +39,9 @@ class AngleUnit(NamedTuple):
 UNITS = {
     unit.name: unit
     for unit in (
-        AngleUnit("deg", 1.0, 0, "″", 1.0),
-        AngleUnit("gon", 10 / 9, 0, "mgon", 10 / 32.4),
-        AngleUnit("rad", 0.017453292519943295, 2, "µrad", 4.84813681109536),
+        AngleUnit(name="deg", per_degree=1.0, more=0, small="″", per_second=1.0),
+        AngleUnit(name="gon", per_degree=10 / 9, more=0, small="mgon", per_second=10 / 32.4),
+        AngleUnit(name="rad", per_degree=0.017453292519943295, more=2, small="µrad", per_second=4.84813681109536),
     )
 }
 

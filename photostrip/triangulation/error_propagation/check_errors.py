@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +29,12 @@ class CheckErrors:
         rows = np.flatnonzero([self.ids[point] not in ids for point in self.point])
         if not len(rows):
             return None
-        return CheckErrors(self.ids, self.point[rows], self.difference[rows], self.covariance[np.ix_(rows, rows)])
+        return replace(
+            self,
+            point=self.point[rows],
+            difference=self.difference[rows],
+            covariance=self.covariance[np.ix_(rows, rows)],
+        )
 
     @property
     def points(self) -> int:

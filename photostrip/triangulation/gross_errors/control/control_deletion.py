@@ -221,7 +221,8 @@ def adjust(strip: StripAtControl, w: Floats, covariance: Floats, *, bends: bool 
     bent = (columns[found.point][:, :, None] * found.direction[:, None, :]).reshape(count, -1)
     rays = [(found.point == ray.point) * (found.direction @ ray.direction) for ray in strip.rays]
     errors = np.column_stack([np.eye(count), bent, *rays])
-    size = np.sqrt(np.einsum("ij,ij->j", errors, np.linalg.solve(covariance, errors)))
+    weight = np.einsum("ij,ij->j", errors, np.linalg.solve(covariance, errors))
+    size = np.sqrt(np.where(weight > 0.0, weight, np.inf))  # to which rounding leaves no weight is not tested
     scaled = errors / size
     projector = projected(covariance, strip.design)
     points = [np.flatnonzero(found.point == point) for point in np.unique(found.point)]
