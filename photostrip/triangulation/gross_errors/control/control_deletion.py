@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.errors import GeometryError
 from photostrip.statistics import chi2_quantile, f_p_value
 from photostrip.triangulation.gross_errors.pairs.deletion import gains
 from photostrip.triangulation.polynomial import terms
@@ -222,7 +223,9 @@ def adjust(strip: StripAtControl, w: Floats, covariance: Floats, *, bends: bool 
     rays = [(found.point == ray.point) * (found.direction @ ray.direction) for ray in strip.rays]
     errors = np.column_stack([np.eye(count), bent, *rays])
     weight = np.einsum("ij,ij->j", errors, np.linalg.solve(covariance, errors))
-    size = np.sqrt(np.where(weight > 0.0, weight, np.inf))  # to which rounding leaves no weight is not tested
+    if not (weight > 0.0).all():
+        raise GeometryError("the strip is too badly determined at its control to be tested against it")
+    size = np.sqrt(weight)
     scaled = errors / size
     projector = projected(covariance, strip.design)
     points = [np.flatnonzero(found.point == point) for point in np.unique(found.point)]
