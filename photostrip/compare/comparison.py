@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
-from typing import TYPE_CHECKING
+from collections import Counter
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 SCHEMA = 1
 # A number of ours, and what the other numbers are made of.
 LEFT_OUT = ("version", "residuals", "parallaxes", "link_residuals")
+RECORDS_IN_SETS = {"photos", "points", "models", "strips", "polynomials"}  # whose records a set counts
 SAME_FRAME = {
     "crs": "the CRS",
     "kind": "the kind of frame",
@@ -44,14 +47,17 @@ def compare_results(
     """Compare a result with a baseline, which may be a short one.
 
     Returns ``status`` (``same``, ``different``); ``kinds``: for each kind of quantity how many were compared and how
-        many differ by more than allowed, and the worst; ``differences``: all of these, worst first; ``sets``: what is
-        missing and new in each set.
+        many differ by more than allowed, and the worst; ``differences``: all of these, worst first; ``lacking``: the
+        quantities that one of the two does not have at all, which is a difference where the result lacks them;
+        ``sets``: what is missing and new in each set.
     Raises InputError when they cannot be compared: other frames, nothing in common, a document that is not whole.
     """
     _require_comparable(document, baseline, files)
     tolerances = tolerances or Tolerances()
     try:
-        rows = list(_compared(document, baseline, tolerances))
+        numbers = _Numbers(_by_place(document), _by_place(baseline))
+        rows = [*_compared(numbers, tolerances), *_located(document, baseline, tolerances)]
+        lacking = list(_lacking(numbers, tolerances))
         sets = [_set(kind, document, baseline, tolerances) for kind in SETS]
         name = document["name"]
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
@@ -59,7 +65,7 @@ def compare_results(
         raise incomplete(error, _at_fault(document, files), "compared", fix) from None
     kinds = [_kind(kind, rows, tolerances) for kind in UNITS]
     differences = sorted((row for row in rows if row["differs"]), key=_rank)
-    different = bool(differences) or any(each["differs"] for each in sets)
+    different = bool(differences) or any(each["differs"] for each in (*lacking, *sets))
     return {
         "photostrip_compare": SCHEMA,
         "result": files[0],
@@ -68,6 +74,7 @@ def compare_results(
         "status": "different" if different else "same",
         "kinds": kinds,
         "sets": sets,
+        "lacking": lacking,
         "differences": [_without_verdict(row) for row in differences],
     }
 
@@ -125,22 +132,66 @@ def _shown(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else "missing" if value is None else str(value)
 
 
-def _compared(document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
-    """Return a row for every number, place and rotation that stands in both."""
-    before = {(q.block, q.id, q.name): q for q in quantities_of(baseline)}
-    for now in quantities_of(document):
-        then = before.get((now.block, now.id, now.name))
-        if then is None or (now.value is None and then.value is None):
-            continue
-        if now.value is None or then.value is None:  # it appeared, or is gone
-            known = then if now.value is None else now
-            yield _row(known._replace(value=now.value), then.value, math.inf, 0.0, tolerances)
+Key = tuple[str, str, str]  # block, id, name
+
+
+class _Numbers(NamedTuple):
+    """The single numbers of two results by their place."""
+
+    now: dict[Key, Quantity]
+    before: dict[Key, Quantity]
+
+
+def _by_place(document: Document) -> dict[Key, Quantity]:
+    return {(q.block, q.id, q.name): q for q in quantities_of(document)}
+
+
+def _compared(numbers: _Numbers, tolerances: Tolerances) -> Iterator[Document]:
+    """Return a row for every number whose place both have; it may be empty in one of them."""
+    for key, now in numbers.now.items():
+        then = numbers.before.get(key)
+        if then is None or now.value is None or then.value is None:
             continue
         # a difference of decimal numbers has noise in its last bits: a tolerance of one digit lets one digit pass
         noise = 4 * sys.float_info.epsilon * max(abs(now.value), abs(then.value))
         allowed = tolerances.allowed(then.kind, then.unit, then.value)
         size = max(abs(now.value - then.value) - noise, 0.0)
         yield _row(then._replace(value=now.value), then.value, size, allowed, tolerances)
+    for key, now in numbers.now.items():
+        if now.value is not None and _is_empty(key, numbers.before):
+            yield _row(now, None, math.inf, 0.0, tolerances)
+    for key, then in numbers.before.items():
+        if then.value is not None and _is_empty(key, numbers.now):
+            yield _row(then._replace(value=None), then.value, math.inf, 0.0, tolerances)
+
+
+def _is_empty(key: Key, other: dict[Key, Quantity]) -> bool:
+    """Whether the other result has nothing at the place of a number, or at a place that would hold it."""
+    block, name, path = key
+    places = [path, *(path[: found.start()] for found in re.finditer(r"[.\[]", path))]
+    return any((found := other.get((block, name, place))) is not None and found.value is None for place in places)
+
+
+def _lacking(numbers: _Numbers, tolerances: Tolerances) -> Iterator[Document]:
+    """Return the quantities that one of the two does not have at all, with how many numbers the other has.
+
+    A record that one of them lacks is not meant: sets tell of those.
+    """
+    for file, own, other in (("result", numbers.before, numbers.now), ("baseline", numbers.now, numbers.before)):
+        records = {(block, name) for block, name, _ in other}
+        absent = [
+            q
+            for key, q in own.items()
+            if q.value is not None and key not in other and not _is_empty(key, other)
+            if q.block not in RECORDS_IN_SETS or (q.block, q.id) in records
+        ]
+        for (kind, block, name), number in Counter((q.kind, q.block, q.name) for q in absent).items():
+            differs = file == "result" and not tolerances.of(kind).ignore
+            yield {"file": file, "kind": kind, "block": block, "name": name, "numbers": number, "differs": differs}
+
+
+def _located(document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
+    """Return a row for every place, difference at a given point and rotation that stands in both."""
     for kind, block, name, size in (
         *_places("points", document, baseline),
         *_places("photos", document, baseline),
@@ -204,24 +255,30 @@ def _places(block: str, document: Document, baseline: Document) -> Iterator[Diff
     """Compare places, in plan and in height; a photo may have no place in both."""
     ids, (now, before) = _shared(document[block], baseline[block], ("x", "y", "z"))
     known = np.flatnonzero(~(np.isnan(now) & np.isnan(before)).all(axis=1))
-    sizes = plan_and_height(baseline["frame"], now[known], before[known])
-    return _sizes(block, [ids[row] for row in known], sizes)
+    for kind, sizes in zip(
+        ("plan", "height"), plan_and_height(baseline["frame"], now[known], before[known]), strict=True
+    ):
+        yield from _sizes(kind, block, [ids[row] for row in known], sizes)
 
 
 def _control(document: Document, baseline: Document) -> Iterator[Difference]:
-    """Compare the differences at control, as far as all three are known."""
+    """Compare the differences at given points, in plan and in height, as far as each counts."""
     ids, (now, before) = _shared(document["control"], baseline["control"], ("dx", "dy", "dz"))
     places = {row["id"]: [row[axis] for axis in "xyz"] for row in baseline["points"]}
-    known = [n for n, name in enumerate(ids) if name in places and not np.isnan(now[n] - before[n]).any()]
+    known = [n for n, name in enumerate(ids) if name in places]
     at = np.array([places[ids[n]] for n in known], float).reshape(-1, 3)
-    sizes = difference_in_plan_and_height(baseline["frame"], now[known] - before[known], at)
-    return _sizes("control", [ids[n] for n in known], sizes)
+    one, other, size = (
+        difference_in_plan_and_height(baseline["frame"], delta, at)
+        for delta in (now[known], before[known], now[known] - before[known])
+    )
+    for k, kind in enumerate(("plan", "height")):
+        there = np.isfinite(one[k]) | np.isfinite(other[k])
+        yield from _sizes(kind, "control", [ids[known[n]] for n in np.flatnonzero(there)], size[k][there])
 
 
-def _sizes(block: str, ids: list[str], sizes: tuple[Floats, Floats]) -> Iterator[Difference]:
-    for kind, column in zip(("plan", "height"), sizes, strict=True):
-        for name, size in zip(ids, column.tolist(), strict=True):
-            yield kind, block, name, size if math.isfinite(size) else math.inf
+def _sizes(kind: str, block: str, ids: list[str], sizes: Floats) -> Iterator[Difference]:
+    for name, size in zip(ids, sizes.tolist(), strict=True):
+        yield kind, block, name, size if math.isfinite(size) else math.inf
 
 
 def _rotations(document: Document, baseline: Document) -> Iterator[Difference]:

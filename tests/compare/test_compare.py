@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +57,67 @@ def test_a_baseline_of_an_older_version_has_the_first_polynomial_twice() -> None
     now, before = documents()
     before["polynomial"] = copy.deepcopy(before["polynomials"][0])
     assert compare_results(now, before)["status"] == "same"
+
+
+def without_precision(document: Document) -> Document:
+    """Give a result whose points and photos have no standard deviations."""
+    found = copy.deepcopy(document)
+    for photo in found["photos"]:
+        photo["sigma"] = None
+    for point in found["points"]:
+        point.update(dict.fromkeys(("sigma_x", "sigma_y", "sigma_z")))
+    return found
+
+
+def test_precision_that_one_of_the_two_lacks_is_a_difference_for_points_and_photos() -> None:
+    now, before = documents()
+    per_photo = 3 + 3  # coordinates, angles
+    expected = {
+        "photos": per_photo * sum(photo["sigma"] is not None for photo in now["photos"]),
+        "points": 3 * sum(point["sigma_x"] is not None for point in now["points"]),
+    }
+    assert all(expected.values())
+    for one, other in ((without_precision(now), before), (now, without_precision(before))):
+        found = compare_results(one, other)
+        assert found["status"] == "different"
+        assert Counter(row["block"] for row in found["differences"]) == expected
+        assert {row["difference"] for row in found["differences"]} == {None}
+        assert found["lacking"] == []
+
+
+def test_a_quantity_that_the_result_lacks_is_a_difference_and_one_that_the_baseline_lacks_is_named() -> None:
+    now, before = documents()
+    del now["summary"]["photo_scale"]
+    photo = now["junctions"].pop()["photo"]
+    lacking = {("summary", "photo_scale"), ("junctions", "factor"), ("junctions", "points_used")}
+    for one, other, file, status in ((now, before, "result", "different"), (before, now, "baseline", "same")):
+        found = compare_results(one, other)
+        assert found["status"] == status
+        assert {row["file"] for row in found["lacking"]} == {file}
+        assert lacking <= {(row["block"], row["name"]) for row in found["lacking"]}
+        assert all(row["numbers"] == 1 for row in nonempty(found["lacking"]))
+        assert photo not in {row["id"] for row in found["differences"]}
+    ignored = replace(Tolerances(), **{name: Tolerance(ignore=True) for name in UNITS})  # type: ignore[arg-type]
+    assert compare_results(now, before, ignored)["status"] == "same"
+
+
+def test_a_record_that_a_set_counts_is_not_told_a_second_time() -> None:
+    now, before = documents()
+    gone = now["points"].pop()["id"]
+    found = compare_results(now, before)
+    assert gone in {row["id"] for each in found["sets"] for row in each["missing"]}
+    assert found["lacking"] == []
+
+
+def test_a_given_point_that_counts_in_plan_only_is_compared_in_plan() -> None:
+    now, before = documents()
+    for document in (now, before):
+        document["control"][0]["dz"] = None
+    now["control"][0]["dx"] += 0.5
+    found = compare_results(now, before)
+    assert [(row["kind"], row["block"]) for row in found["differences"]] == [("plan", "control")]
+    now["control"][0]["dz"] = 0.01  # it appears
+    assert [row["difference"] for row in compare_results(now, before)["differences"]] == [None, 0.5]
 
 
 def test_the_short_form_leaves_out_single_measurements_only() -> None:

@@ -40,6 +40,7 @@ def compare_sections(document: Document, *, quiet: bool = False, everything: boo
         return (Section("", (verdict,)),)
     found = [
         Section("", (verdict, tabulated(document["kinds"], KINDS))),
+        *_lacking(document, everything=everything),
         *_sets(document["sets"], everything=everything),
     ]
     if document["differences"]:
@@ -52,9 +53,17 @@ def headline(document: Document) -> str:
     names = f"{document['result'] or 'the result'} and {document['baseline'] or 'the baseline'}"
     if document["status"] == "same":
         compared = sum(kind["compared"] for kind in document["kinds"] if not kind["ignored"])
-        return f"SAME: {counted(compared, 'number')} of {names} agree within the tolerances."
-    numbers = len(document["differences"])
-    parts = [f"{counted(numbers, 'number')} beyond tolerance"] if numbers else []
+        new = sum(each["numbers"] for each in document["lacking"] if each["file"] == "baseline")
+        rest = f" {counted(new, 'number')} could not be compared: the baseline lacks them." if new else ""
+        return f"SAME: {counted(compared, 'number')} of {names} agree within the tolerances.{rest}"
+    numbers, gone = (
+        len(document["differences"]),
+        sum(each["numbers"] for each in document["lacking"] if each["differs"]),
+    )
+    alone = sum(row["difference"] is None for row in document["differences"])
+    of_these = f", {alone} of them in one of the two only" if alone else ""
+    parts = [f"{counted(numbers, 'number')} beyond tolerance{of_these}"] if numbers else []
+    parts += [f"the result lacks {counted(gone, 'number')} of the baseline"] if gone else []
     parts += [
         f"{NAMES[each['kind']]}: {len(each['missing'])} missing, {len(each['new'])} new"
         for each in document["sets"]
@@ -123,6 +132,26 @@ def _differences(rows: Sequence[Document], *, everything: bool) -> Section:
     rest = len(rows) - len(shown)
     note = f"{rest} more; --verbose prints all" if rest else ""
     return Section("Beyond tolerance", (tabulated(shown, columns, note=note),))
+
+
+def lacking_words(document: Document, row: Document) -> str:
+    """Say which quantity one of the two results does not have."""
+    files = {name: document[name] or f"the {name}" for name in ("result", "baseline")}
+    lacks, has = files[row["file"]], files["baseline" if row["file"] == "result" else "result"]
+    return f"{row['block']}, {row['name']}: {counted(row['numbers'], 'number')} in {has}, none in {lacks}"
+
+
+def _lacking(document: Document, *, everything: bool) -> list[Section]:
+    """Name the quantities that one of the two results does not have."""
+    rows = document["lacking"]
+    shown = rows if everything else rows[:SHOWN]
+    parts: list[Part] = [
+        Words(f"{lacking_words(document, row)}{'' if row['differs'] else ' (not compared)'}", mark=" -")
+        for row in shown
+    ]
+    if len(shown) < len(rows):
+        parts.append(Words(f"{len(rows) - len(shown)} more; --verbose names all", mark=" -"))
+    return [Section("In one of them only", tuple(parts))] if parts else []
 
 
 def _sets(sets: Sequence[Document], *, everything: bool) -> list[Section]:

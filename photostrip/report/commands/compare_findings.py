@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.commands.compare import NAMES, allowed_words, what
+from photostrip.report.commands.compare import NAMES, allowed_words, lacking_words, what
 from photostrip.report.page.junit import Case
 from photostrip.report.page.messages import EMPTY
 from photostrip.report.page.numbers import short, unit
@@ -37,6 +37,9 @@ def _findings(document: Document, line_of: Callable[[str, str], int]) -> Iterato
                 for row in each[name]:
                     line = line_of(row["block"], row["id"])
                     yield _finding(document, line, f"{NAMES[each['kind']]}: {row['what']} is {name}")
+    for row in document["lacking"]:
+        if row["differs"]:
+            yield _finding(document, line_of(row["block"], ""), lacking_words(document, row))
     for row in document["differences"]:
         yield _finding(document, line_of(row["block"], row["id"]), sentence(row))
 
@@ -67,8 +70,11 @@ def compare_cases(document: Document) -> Iterator[Case]:
             yield Case(name, skipped="not compared")
             continue
         rows = [sentence(row) for row in document["differences"] if row["kind"] == kind["kind"]]
-        message = f"{kind['different']} of {kind['compared']} beyond {allowed_words(kind)}"
-        yield Case(name, message, "\n".join(rows)) if kind["different"] else Case(name)
+        gone = [row for row in document["lacking"] if row["kind"] == kind["kind"] and row["differs"]]
+        parts = [f"{kind['different']} of {kind['compared']} beyond {allowed_words(kind)}"] if kind["different"] else []
+        parts += [f"the result lacks {sum(row['numbers'] for row in gone)}"] if gone else []
+        rows += [lacking_words(document, row) for row in gone]
+        yield Case(name, "; ".join(parts), "\n".join(rows)) if parts else Case(name)
     for each in document["sets"]:
         name = NAMES[each["kind"]]
         if each["ignored"]:
