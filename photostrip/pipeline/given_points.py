@@ -43,6 +43,16 @@ def cartesian_of(control: ControlPoints, frames: Sequence[GroundFrame]) -> Float
     return xyz
 
 
+def axes_of(numbers: Numbers, frames: Sequence[GroundFrame], cartesian: Floats, *, level: bool = False) -> Floats:
+    """Ground axes (n, 3, 3) at Cartesian points, each in the ground frame of its number; or its level axes."""
+    axes = np.empty((len(numbers), 3, 3))
+    for number, frame in enumerate(frames):
+        rows = numbers == number
+        if rows.any():
+            axes[rows] = frame.level_axes_at(cartesian[rows]) if level else frame.axes_at(cartesian[rows])
+    return axes
+
+
 @dataclass(frozen=True, eq=False)
 class AtGivenPoints:
     """The result at control and check points."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.pipeline.given_points import compare_with_given
+from photostrip.pipeline.given_points import axes_of, compare_with_given
 from photostrip.triangulation.bundle.quality.joint_points import joint_cofactors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 
@@ -33,9 +33,7 @@ def check_errors(
         rows = rows[np.linspace(0, len(rows) - 1, MOST).round().astype(int)]
     rows = rows[np.argsort(compared.rows[rows], kind="stable")]
     at = compared.rows[rows]
-    axes = np.array(
-        [frames[given.frame[row]].axes_at(points.cartesian[[place]])[0] for row, place in zip(rows, at, strict=True)]
-    )
+    axes = axes_of(given.frame[rows], frames, points.cartesian[at])
     solution = bundle.screened.solution
     joint = joint_cofactors(solution, points.number[at]).reshape(len(at), 3, len(at), 3) * bundle.unit**2
     turned = np.einsum("iap,ipjq,jbq->iajb", axes, joint, axes).reshape(3 * len(at), 3 * len(at))

@@ -11,7 +11,7 @@ from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors, covariances
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows
+from photostrip.triangulation.error_propagation.joint_covariances import after_fit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
+    from photostrip.triangulation.error_propagation.covariances import ParameterCovariances
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 LARGEST = 100  # check points of a strip that are tested together, spread over it
@@ -78,48 +80,31 @@ def compare_with_checks(
     return CheckDifferences(checks, found, targets.misclosures(xyz)[found.point, found.axis])
 
 
-def by_fit(found: Propagation, compared: CheckDifferences, factor: float) -> CheckErrors:
+def by_fit(
+    found: Propagation, compared: CheckDifferences, parameters: ParameterCovariances, factor: float
+) -> CheckErrors:
     """Return the errors at the check points of a strip that was fitted to the control.
 
     factor: variance factor of the image coordinates.
     """
     at = compared.coordinates
-    by_parameters = np.einsum("wi,wit->wt", at.direction, found.influence[compared.checks.rows][at.point])
-    subtracted = _Subtracted(found.control.rows, found.control.variance, by_parameters @ found.fit.operator)
-    return _errors(compared, found.errors, at.rows, subtracted, factor)
+    influence = np.einsum("wi,wit->wt", at.direction, found.influence[compared.checks.rows][at.point])
+    along = covariances.along_strip(found.errors)
+    return _errors(compared, after_fit(found.errors, at.rows, along, parameters, influence), factor)
 
 
 def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> CheckErrors:
     """Return the errors at the check points of a strip that was adjusted with its own covariance."""
     from photostrip.triangulation.covariance_adjustment import prediction  # no other adjustment needs it
 
-    system, at = adjusted.system, compared.coordinates
-    wanted = system.conditions
-    operator = prediction.influence(system, at.rows, np.arange(len(wanted.value)))[:, 0]
-    # the similarities of the models are unknowns of this adjustment, not errors
-    subtracted = _Subtracted(wanted.rows.without_similarity(), wanted.noise, operator)
-    return _errors(compared, system.errors, at.rows.without_similarity(), subtracted, adjusted.factor)
+    return _errors(compared, prediction.joint_covariance(adjusted.system, compared.coordinates.rows), adjusted.factor)
 
 
-class _Subtracted(NamedTuple):
-    """What the adjustment subtracts from check coordinates: errors with their rows and variances, times an operator."""
-
-    rows: ErrorRows
-    variance: Floats
-    operator: Floats
-
-
-def _errors(
-    compared: CheckDifferences, errors: StripErrors, rows: ErrorRows, subtracted: _Subtracted, factor: float
-) -> CheckErrors:
-    """Return all differences; their covariance is that of their rows minus what is subtracted, and of the given."""
-    operator = np.concatenate([-subtracted.operator, np.eye(len(rows.first))], axis=1)
-    covariance = factor * covariances.sums_of(errors, ErrorRows.joined([subtracted.rows, rows]), operator)
-    covariance = covariance + (subtracted.operator * subtracted.variance) @ subtracted.operator.T
-    covariance = covariance + np.diag(compared.coordinates.variance)
+def _errors(compared: CheckDifferences, covariance: Floats, factor: float) -> CheckErrors:
+    """Return all differences; their covariance is that of the adjusted coordinates and of the given ones."""
     return CheckErrors(
         ids=compared.checks.points.ids,
         point=compared.coordinates.point,
         difference=compared.difference,
-        covariance=covariance,
+        covariance=covariance * factor + np.diag(compared.coordinates.variance),
     )

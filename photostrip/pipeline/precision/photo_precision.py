@@ -53,7 +53,7 @@ def of_photos(
         variance=found.control.variance,
         sigma=stated * float(np.sqrt(factor)),
         basis=basis,
-        check=None if compared is None else check_points.by_fit(found, compared, factor),
+        check=None if compared is None else check_points.by_fit(found, compared, parameters, factor),
     )
 
 

@@ -6,7 +6,7 @@ Source: [001] eq. 142-149.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -22,7 +22,7 @@ from photostrip.triangulation.gross_errors.control.strip_at_control import Contr
 from photostrip.triangulation.plausibility.control.shared_by_control import find_shared
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
@@ -73,8 +73,8 @@ class StripStage(Protocol[Errors]):
     def misclosures(self, oriented: OrientedStrip[Errors]) -> Misclosures:
         """Control coordinates that count, with the derivatives of the strip there."""
 
-    def misclosure_covariance(self, oriented: OrientedStrip[Errors], some: Numbers) -> Floats:
-        """Covariance of some misclosures at the control, strip and control together, metres^2."""
+    def misclosure_covariance(self, oriented: OrientedStrip[Errors]) -> Callable[[Numbers], Floats]:
+        """Covariance of any misclosures at the control, strip and control together, metres^2."""
 
     def control_rays(self, oriented: OrientedStrip[Errors]) -> Sequence[ControlRay]:
         """Rays of the control points that stand on two photos."""
@@ -186,7 +186,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
         rays=stage.control_rays(oriented),
         coordinates=found,
         design=np.einsum("wi,wij->wj", found.direction, moved),
-        covariance=partial(stage.misclosure_covariance, oriented),
+        covariance=stage.misclosure_covariance(oriented),
         share=1.0,
     )
     shared = find_shared(place) if isinstance(stage.strip, Strip) else None

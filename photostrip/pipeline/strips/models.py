@@ -23,7 +23,7 @@ from photostrip.triangulation.independent_models import (
 from photostrip.triangulation.independent_models.formation import FormedModels, form_from_models, require_links
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geometry.similarity import Similarity
@@ -81,10 +81,10 @@ class LinkedModels:
         targets, xyz = oriented.targets, oriented.at_control
         return model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, oriented.errors.origin)
 
-    def misclosure_covariance(self, oriented: Oriented, some: Numbers) -> Floats:
-        """Covariance of some misclosures at the control, strip and control together, metres^2."""
-        found, rows = oriented.misclosures.take(some), oriented.control_rows
-        return model_misclosures.covariance(oriented.errors, found, rows, self.formed.links.factor)
+    def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
+        """Covariance of any misclosures at the control, strip and control together, metres^2."""
+        rows, factor = oriented.control_rows, self.formed.links.factor
+        return lambda some: model_misclosures.covariance(oriented.errors, oriented.misclosures.take(some), rows, factor)
 
     def control_rays(self, _: Oriented) -> tuple[()]:
         """Models have no rays."""

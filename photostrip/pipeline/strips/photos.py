@@ -13,6 +13,7 @@ from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.screened_formation import form_screened, with_readmitted
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
+from photostrip.triangulation.error_propagation.joint_covariances import joint_covariance
 from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
@@ -22,6 +23,8 @@ from photostrip.triangulation.resection.resection import Resection, resect, with
 from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from photostrip.arrays import Floats, Numbers
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import Settings, Strip
@@ -91,14 +94,18 @@ class FormedPhotos:
         rows = oriented.control_rows
         return control_errors.misclosures(oriented.errors.points, targets.turned(xyz), rows, targets.axes(xyz))
 
-    def misclosure_covariance(self, oriented: Oriented, some: Numbers) -> Floats:
-        """Covariance of some misclosures at the control, strip and control together, metres^2."""
-        found = oriented.misclosures.take(some)
+    def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
+        """Covariance of any misclosures at the control, strip and control together, metres^2."""
         # image coordinates are taken as good as stated, or as bad as the pairs have proved
         factor = max(1.0, float(np.median(self.screened.scatter.by_pair)) ** 2 / (2 * self.sigma**2))
         errors = oriented.errors.with_doubt(self.formed.junctions.doubt / np.sqrt(factor))
-        strip = covariances.sums_of(errors, found.rows, np.eye(len(found.point)))
-        return strip * factor + np.diag(found.variance)
+        along = covariances.along_strip(errors)
+
+        def of(some: Numbers) -> Floats:
+            found = oriented.misclosures.take(some)
+            return joint_covariance(errors, found.rows, along) * factor + np.diag(found.variance)
+
+        return of
 
     def control_rays(self, oriented: Oriented) -> list[ControlRay]:
         """Rays of the control points that stand on two photos."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
+from photostrip.pipeline.given_points import axes_of
 from photostrip.result.numbers import PER_RADIAN, Document, rms
 from photostrip.result.quantities import record, records
 from photostrip.statistics import binomial_p_value, chi2_quantile, normal_quantile
@@ -257,15 +258,20 @@ def normalised(result: Result) -> tuple[Numbers, Floats]:
     values = np.full((len(rows), 2), np.nan)
     if result.precision is None or not result.frames:  # a free network has nothing to be compared with
         return rows, values
-    for place, row in enumerate(rows.tolist()):
-        frame, point = result.frames[control.frame[row]], result.control_rows[row]
-        axes = frame.axes_at(result.points.cartesian[[point]])
-        covariance = turned(result.precision.points[[point]], axes)[0] + np.diag(np.nan_to_num(control.sigma[row]) ** 2)
-        difference = result.control_differences[row]
-        if frame.kind == "geocentric":
-            level = frame.level_axes_at(result.points.cartesian[[point]])[0] @ axes[0].T
-            difference, covariance = level @ difference, level @ covariance @ level.T
-        if not np.isnan(difference[:2]).any():
-            values[place, 0] = np.sqrt(difference[:2] @ np.linalg.solve(covariance[:2, :2], difference[:2]))
-        values[place, 1] = difference[2] / np.sqrt(covariance[2, 2])
+    numbers, place = control.frame[rows], result.points.cartesian[result.control_rows[rows]]
+    axes = axes_of(numbers, result.frames, place)
+    covariances = turned(result.precision.points[result.control_rows[rows]], axes)
+    covariances += np.nan_to_num(control.sigma[rows] ** 2)[:, :, None] * np.eye(3)
+    differences = result.control_differences[rows]
+    turn = np.flatnonzero([result.frames[number].kind == "geocentric" for number in numbers])
+    if len(turn):
+        level = axes_of(numbers[turn], result.frames, place[turn], level=True) @ axes[turn].transpose(0, 2, 1)
+        differences[turn] = (level @ differences[turn, :, None])[:, :, 0]
+        covariances[turn] = turned(covariances[turn], level)
+    known = np.flatnonzero(~np.isnan(differences[:, :2]).any(axis=1))
+    plan = differences[known, :2]
+    values[known, 0] = np.sqrt(
+        (plan * np.linalg.solve(covariances[known, :2, :2], plan[:, :, None])[:, :, 0]).sum(axis=1)
+    )
+    values[:, 1] = differences[:, 2] / np.sqrt(covariances[:, 2, 2])
     return rows, values

@@ -29,11 +29,12 @@ def stand_out(size: Floats, coordinates: int, ratio: Floats) -> Flags:
     found = np.zeros(len(size), bool)
     known = np.flatnonzero(np.isfinite(size))
     order = known[np.argsort(-np.abs(size[known]), kind="stable")]
-    squares = size[order] ** 2
-    for k in range(1, min(max(1, len(order) // MOST), len(order) - 1) + 1):
-        rest = squares[k:].mean()
-        chance = f_p_value(squares[k - 1] / rest, coordinates, coordinates * (len(order) - k)) if rest else 0.0
-        far = squares[k - 1] > ODD_POINT**2 * rest and ratio[order[k - 1]] > ODD_RATIO
-        if far and chance * (len(order) - k + 1) < LEVEL:
+    count, squares = len(order), size[order] ** 2
+    number = np.arange(1, min(max(1, count // MOST), count - 1) + 1)
+    rest = np.cumsum(squares[::-1])[::-1][number] / (count - number)
+    far = (squares[number - 1] > ODD_POINT**2 * rest) & (ratio[order[number - 1]] > ODD_RATIO)
+    for k, mean in zip(number[far].tolist(), rest[far].tolist(), strict=True):
+        chance = f_p_value(squares[k - 1] / mean, coordinates, coordinates * (count - k)) if mean else 0.0
+        if chance * (count - k + 1) < LEVEL:
             found[order[:k]] = True
     return found

@@ -16,7 +16,12 @@ from photostrip.statistics import normal_quantile
 from photostrip.triangulation.covariance_adjustment import system
 from photostrip.triangulation.covariance_adjustment.block_tridiagonal import InverseRow
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of
-from photostrip.triangulation.error_propagation.covariances import images_with_components, local_covariances
+from photostrip.triangulation.error_propagation import joint_covariances
+from photostrip.triangulation.error_propagation.covariances import (
+    along_strip,
+    images_with_components,
+    local_covariances,
+)
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 
 if TYPE_CHECKING:
@@ -231,6 +236,33 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
         at, values = columns.of_block(number)
         near = solved[number : number + 3].reshape(3 * layout.height, -1)
         result[order[at]] = (values.reshape(len(near), -1).T @ near).reshape(-1, size, len(chosen))
+    return result
+
+
+def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
+    """Covariances (n, n) of what is left of the errors of rows with d = 1: C - b^T K^-1 b, as ``predict`` has them.
+
+    With K eliminated from the first block on, b^T K^-1 b = sum r^T P^-1 r with the reduced columns r of each block.
+    """
+    order = np.argsort(rows.first, kind="stable")
+    rows = rows.take(order)
+    columns, layout, factors = _Columns.of(found, rows), found.layout, found.factors
+    own = rows.without_similarity()  # the similarities of the models are unknowns, not errors
+    covariance = joint_covariances.joint_covariance(found.errors, own, along_strip(found.errors))
+    blocks = [columns.of_block(number) for number in range(layout.blocks)]
+    reduced = np.zeros((layout.height, 0))
+    for number in range(layout.blocks):
+        near = blocks[max(number - 1, 0) : number + 2]
+        reached, shift = near[-1][0].stop, min(number, 1)  # later columns begin in later blocks
+        right = np.zeros((layout.height, reached))
+        for place, (at, values) in enumerate(near):
+            right[:, at] = values[1 + shift - place]
+        if number:
+            right[:, : reduced.shape[1]] -= factors.shares[number - 1].T @ reduced
+        reduced = right
+        covariance[:reached, :reached] -= reduced.T @ (factors.inverses[number] @ reduced)
+    result = np.empty_like(covariance)
+    result[np.ix_(order, order)] = covariance
     return result
 
 

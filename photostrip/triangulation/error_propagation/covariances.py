@@ -102,13 +102,6 @@ def of_parameters(
     )
 
 
-def sums_of(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Floats:
-    """Covariances (t, t) of sums of rows, ``operator`` (t, n), for a variance factor of 1 of the image coordinates."""
-    sums = _sums(errors, rows, operator)
-    found = sums.products(sums.by_image + _by_photo(errors, sums.by_component, sums.image))
-    return np.asarray((found + found.T) / 2, float)
-
-
 def by_images(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
     """Coefficients (k, 2) of all image coordinates in a weighted sum of rows with d = 1."""
     by_component = _summed_components(errors, rows, weights[:, None])
@@ -193,7 +186,7 @@ def covariances(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances,
     for start, stop in _slices(rows):
         part, phi = rows.part(start, stop), influence[start:stop]
         formed = _formed(errors, part, along)
-        mixed = _with_parameters(part, fit) @ phi.transpose(0, 2, 1)
+        mixed = with_parameters(part, fit) @ phi.transpose(0, 2, 1)
         result[start:stop] = formed - mixed - mixed.transpose(0, 2, 1) + phi @ fit.parameters @ phi.transpose(0, 2, 1)
     return result
 
@@ -261,7 +254,7 @@ def local_covariances(errors: StripErrors, rows: ErrorRows, with_components: Flo
     return result
 
 
-def _with_parameters(rows: ErrorRows, fit: ParameterCovariances) -> Floats:
+def with_parameters(rows: ErrorRows, fit: ParameterCovariances) -> Floats:
     """C: covariances of the rows with the fitted parameters, shape (n, d, t)."""
     result: Floats = rows.by_similarity @ fit.similarities[rows.first]
     for slot in range(rows.by_component.shape[1]):

@@ -102,6 +102,16 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
             assert moved == pytest.approx(own[thing] @ images.ravel(), abs=1e-9)
             covariance = own[thing] @ own[thing].T - column.T @ inverse @ column
             assert seen.covariance[thing] == pytest.approx(covariance, abs=1e-8 * np.abs(covariance).max())
+    some = np.random.default_rng(1).permutation(len(errors.points.first))
+    rows = errors.points.take(some).along(np.full((len(some), 3), 3**-0.5))
+    own = written_out(rows.without_similarity(), errors)[:, 0]
+    columns = np.zeros((len(whole), len(some)))
+    columns[: len(by_images)] = by_images @ own.T
+    for thing, model in enumerate(rows.first.tolist()):
+        columns[len(by_images) + 7 * model :, thing][:7] = rows.by_similarity[thing, 0] @ wanted.local.to_common[model]
+    expected = own @ own.T - columns.T @ inverse @ columns
+    joint = prediction.joint_covariance(solved, rows)
+    assert joint == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
 
 
 def test_blocks_are_eliminated_like_any_system() -> None:

@@ -14,6 +14,7 @@ Source: derived; data snooping with correlated observations.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,12 +92,12 @@ class JointAdjustment:
         """Number of given coordinates, which are the first columns."""
         return len(self.w)
 
-    @property
+    @cached_property
     def hypotheses(self) -> list[Columns]:
         """Columns of plan, of height and of all coordinates of every point."""
         return sorted({*self.points, *(part for part in self.parts if part[0] < self.coordinates)})
 
-    @property
+    @cached_property
     def level(self) -> float:
         """Level of a single test: its share of that of all."""
         return self.alpha / max(len(self.hypotheses), 1)

@@ -87,14 +87,21 @@ def reliability(strip: StripAtControl, found: Found) -> tuple[Floats, Floats]:
     left, place = found.left, strip.coordinates
     share = (left.matrix / np.outer(1 / left.size, 1 / left.size))[: left.coordinates, : left.coordinates]
     redundancy[place.point, place.axis] = np.einsum("ij,ji->i", share, left.covariance)
-    for part in ((column,) for column in range(left.coordinates)):
-        tested = found.whole.test(found.out, part)
-        where = place.point[part[0]], place.axis[part[0]]
-        others = found.whole.without([column for column in found.out if column not in part])
+    stay = [column for column in range(left.coordinates) if column not in found.coordinates]
+    gone = [
+        (found.whole.without([other for other in found.out if other != column]), [column])
+        for column in found.coordinates
+    ]
+    for others, columns in [(left, stay), *gone]:
+        where = place.point[columns], place.axis[columns]
+        tested = others.deletions([(column,) for column in columns])
+        spread = np.array([each.spread if np.isfinite(each.gain) else np.inf for each in tested])
         detectable[where] = np.inf
-        if np.isfinite(tested.gain) and np.isfinite(tested.spread):
-            limit = _limit(tested, found.whole, 1) + normal_quantile(POWER)
-            detectable[where] = limit * np.sqrt(tested.spread) * _deviations(others, part)[0]
+        if np.isfinite(spread).any():
+            limit = _limit(tested[0], found.whole, 1) + normal_quantile(POWER)
+            with np.errstate(divide="ignore", invalid="ignore"):  # where nothing checks the coordinate
+                deviation = np.sqrt(1.0 / others.matrix[columns, columns]) / others.size[columns]
+            detectable[where] = np.where(np.isfinite(spread), limit * np.sqrt(spread) * deviation, np.inf)
     return redundancy, detectable
 
 
