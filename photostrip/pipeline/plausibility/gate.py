@@ -66,7 +66,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     if inputs.models is not None:
         of_models = _of_models(inputs, inputs.models, settings, directory)
         given = _given_control(inputs, directory)
-        return accepted(of_models if given is None else slips.judged(of_models, result, given), settings.accept)
+        confirmed = of_models if given is None else slips.confirmed(of_models, slips.predict(result), given)
+        return accepted(confirmed, settings.accept)
     points = result.refined.observations
     photo = PhotoCoordinates(result.measured, result.interior)
     images = replace(of_images(inputs, settings, photo), observations=points)
@@ -75,9 +76,11 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     formed = [
         evidence.EvidenceStrip(each.strip, each.orientation, each.formed) for each in (s.of_photos for s in stages)
     ]
-    strips = tuple(each.strip for each in formed)  # a photo that is a strip of its own forms nothing
-    of_control = _of_control(control, images, strips, formed)
-    findings = [*images.findings, *(of_control if control is None else slips.judged(of_control, result, control))]
+    predicted = slips.predict(result)
+    doubtful = [each for each in formed if slips.is_doubtful(each, result, predicted)]
+    strips = tuple(each.strip for each in doubtful)  # a photo that is a strip of its own forms nothing
+    of_control = _of_control(control, images, strips, doubtful, trials=not slips.fits_measurements(result))
+    findings = [*images.findings, *(of_control if control is None else slips.confirmed(of_control, predicted, control))]
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each in formed:
         findings += _of_formed(each, points)

@@ -1,7 +1,8 @@
-"""Slips of the pen by the adjustment: what it predicts of a given coordinate, and how well.
+"""Given coordinates by the adjustment: what it predicts of them, and how well.
 
 The gate compares given points with a strip whose bending it takes out roughly; what a long strip bends beyond that
-looks like a slip. Where a run has come to a result, its points and their covariances decide.
+looks like a slip. Where a run has come to a result, its points and their covariances decide. A bundle that has found
+nothing wrong with the given points of a strip has compared them better than the gate could.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.pipeline.given_points import rejected_control
+from photostrip.pipeline.given_points import rejected_control, rows_of_given
 from photostrip.points import locate
 from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
 from photostrip.triangulation.plausibility.control import control_slips, given_points
@@ -23,12 +24,14 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats
     from photostrip.notes import Finding
+    from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.plausibility.given_control import GivenControl
     from photostrip.pipeline.results import Result
 
 CODE = "P406"
 LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)
 LEAST_OTHERS = 3  # given coordinates that tell how well the prediction is known
+MOST_SIGMA0 = 2.0  # of a bundle, over what is stated: a principal distance of another lens leaves 4 and more
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,21 +42,38 @@ class Predicted:
     sigma: Floats  # (c, 3): standard deviation of that difference
     sound: Flags  # (c, 3): control coordinates that took part: the run tested them and found them right
 
+    def agree(self, use: Flags) -> Flags:
+        """Given points (c,) whose coordinates `use` (c, 3) the adjustment predicts, or tested and kept."""
+        near = np.abs(self.off) <= LIMIT * self.sigma
+        return np.asarray((self.sound | near | ~use).all(axis=1))
 
-def judged(findings: Iterable[Finding], result: Result, control: GivenControl) -> Iterator[Finding]:
+
+def fits_measurements(result: Result) -> bool:
+    """Whether a bundle leaves no more than what measurements do; the strip method does not see all of it together."""
+    return result.bundle is not None and result.bundle.screened.solution.sigma0 < MOST_SIGMA0
+
+
+def is_doubtful(formed: EvidenceStrip, result: Result, predicted: Predicted) -> bool:
+    """Whether the given points of a strip may be wrong: no bundle has seen them, or some do not agree with it."""
+    if not fits_measurements(result):
+        return True
+    control = result.inputs.control
+    shown = rows_of_given(control.ids, formed.formed.point, result.refined.observations.point_ids) >= 0
+    return bool((shown & ~predicted.agree(control.use)).any())
+
+
+def confirmed(findings: Iterable[Finding], predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
     """Give findings again; slips only as far as the adjustment shows them too, as it predicts the coordinates."""
-    predicted: Predicted | None = None
     for each in findings:
-        if each.code == CODE and result.precision is not None:
-            predicted = predicted or predict(result)
+        if each.code == CODE:
             row = control.points.ids.index(each.points[0])
-            yield from _again(each, row, predicted, control)
+            yield from _confirmed(each, row, predicted, control)
         else:
             yield each
 
 
 def predict(result: Result) -> Predicted:
-    """Compare check points and rejected control with what was adjusted."""
+    """Compare check points and rejected control with what was adjusted; nothing is predicted without a precision."""
     control, precision = result.inputs.control, result.precision
     rejected = rejected_control(result)
     for strip in result.model_strips:
@@ -80,8 +100,8 @@ def _screened(result: Result) -> bool:
     return (settings.links if result.model_strips else settings.relative).screening != "none"
 
 
-def _again(finding: Finding, row: int, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
-    """Judge a slip by a prediction; it stands as it is where the adjustment has none."""
+def _confirmed(finding: Finding, row: int, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
+    """Test a slip by a prediction; it stands as it is where the adjustment has none."""
     axis = AXES.index(str(finding.evidence["axis"]))
     off, sigma = float(predicted.off[row, axis]), float(predicted.sigma[row, axis])
     if predicted.sound[row, axis]:

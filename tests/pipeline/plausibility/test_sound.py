@@ -11,16 +11,21 @@ import pytest
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.pipeline.plausibility import gate
-from photostrip.simulate import Control, Flight, Gnss, Ground, Image, Spec, Terrain, simulate
+from photostrip.pipeline.plausibility.given_control import GivenControl
+from photostrip.simulate import FILM, Control, Flight, Gnss, Ground, Image, Points, Spec, Terrain, simulate
 from tests.pipeline.blocks import orientations, positions, with_control
 
 if TYPE_CHECKING:
+    from photostrip.arrays import Numbers
     from photostrip.simulate import Simulation
+    from photostrip.triangulation.plausibility.control.control_reading import Reading
+    from photostrip.triangulation.plausibility.control.control_strip import StripPoints
 
 BLOCK = Spec(
     seed=4, flight=Flight(photos=6, strips=4, side_lap_percent=40.0), control=Control(per_band=1, check=4), gnss=Gnss()
 )
 HILLS = Terrain(relief=60.0)
+WIDE = replace(FILM, name="wide", principal_distance=88.0)
 BUNDLE = Settings(adjustment="bundle")
 
 
@@ -61,6 +66,30 @@ def test_strips_of_a_bundle_hold_each_other() -> None:
     assert told(replace(one_strip, positions=positions(made)), BUNDLE) == []
 
 
+@pytest.mark.parametrize("role", ["K", "G"])
+def test_a_bundle_says_whose_given_points_need_a_closer_look(role: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Strips are laid on their control only where the bundle does not agree with it."""
+    looked_at: list[str] = []
+    compared = GivenControl.compared
+
+    def seen(control: GivenControl, rows: Numbers, on_strip: StripPoints) -> Reading:
+        looked_at.append(on_strip.strip)
+        return compared(control, rows, on_strip)
+
+    monkeypatch.setattr(GivenControl, "compared", seen)
+    made = simulate(replace(BLOCK, control=Control(check=4)))
+    inputs = inputs_of(made)
+    assert triangulate(inputs, BUNDLE).findings == ()
+    assert looked_at == []
+    row = [number for number, name in enumerate(inputs.control.ids) if name.startswith(role)][1]
+    enu = inputs.control.enu.copy()
+    enu[row, 0] += 30.0 if enu[row, 0] // 10 % 10 < 5 else -30.0
+    wrong = replace(inputs, control=replace(inputs.control, enu=enu))
+    findings = triangulate(wrong, BUNDLE).findings
+    assert {(each.code, *each.points) for each in findings} == {("P406", inputs.control.ids[row])}
+    assert 0 < len(looked_at) < len(inputs.strips)
+
+
 def test_one_control_list_outside_its_area_is_told_alone() -> None:
     """Gauss-Kruger zones are used beyond the countries for which they were registered."""
     spec = Spec(
@@ -84,6 +113,23 @@ def test_a_start_may_be_far_off() -> None:
         far, observed=True, sigma=np.full(far.enu.shape, 500.0), sigma_angles=np.full(far.enu.shape, 1.0)
     )
     assert "P204" in told(replace(inputs_of(made), orientations=observed), BUNDLE)
+
+
+def test_photos_laid_side_by_side_predict_nothing_beyond_their_control() -> None:
+    """They curl: a check point at the end of a strip lies half a base away from where `check` would expect it."""
+    spec = Spec(
+        seed=809380,
+        camera=WIDE,
+        ground=Ground("local"),
+        flight=Flight(photos=8, end_lap_percent=67.78338999, scale=7806.195903629958, heading_deg=168.5663651633,
+                      attitude_sigma_deg=(2.5, 2.5, 2.5)),
+        terrain=Terrain(relief=68.69452395194364, slope_percent=(4.701872098953423, 0.5976056032583266)),
+        points=Points(rows=5, extra_per_model=6),
+        control=Control(layout="random", count=9, sigma=(0.0156, 0.0156, 0.0234)),
+        image=Image(sigma_um=2.0),
+    )  # fmt: skip
+    made = simulate(spec)
+    assert told(inputs_of(made), settings_of(made)) == []
 
 
 def long_strip() -> Simulation:

@@ -56,7 +56,7 @@ def find_plan_slips(
 ) -> Iterator[Finding]:
     """Name points that do not go with the others in plan, and the slip that explains it."""
     fit = left.plan
-    odd = left.consistent & given.use[:, 0] & np.isfinite(fit.residual) & fit.odd
+    odd = left.consistent & given.use[:, 0] & np.isfinite(fit.residual) & fit.odd & _between_control(fitted)
     rows = np.flatnonzero(odd).tolist()
     exchanged = _exchanged(given, fit, rows)
     for one, other in exchanged:
@@ -77,6 +77,14 @@ def find_plan_slips(
         difference = np.array([fit.residual[row].real, fit.residual[row].imag, 0.0])
         if not _one_ray_is_wrong(given, on_strip, fitted, left, row):
             yield from _slips(given, on_strip, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (0, 1))
+
+
+def _between_control(fitted: StraightenedStrip) -> Flags:
+    """Points (n,) whose place a strip predicts: photos that are only laid side by side curl away beyond its control."""
+    if np.isfinite(fitted.height).any():
+        return np.ones(len(fitted.along), bool)
+    ends = fitted.along[fitted.plan.used]
+    return np.asarray((fitted.along >= ends.min(initial=np.inf)) & (fitted.along <= ends.max(initial=-np.inf)))
 
 
 def find_height_slips(
