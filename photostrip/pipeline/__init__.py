@@ -6,14 +6,16 @@ themselves stand in ``strips/``, strips together in ``block/``, covariances in `
 against themselves in ``plausibility/``. The equations are those of ``triangulation/``.
 """
 
-from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, MeasuredModels, ModelStrip, Settings, Strip
+from photostrip.pipeline.inputs import ADJUSTMENTS, AUTO, METHODS, Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.pipeline.results import CHECK, CONTROL, NEW, Adjusted, Precision, Result, StripResult, Ties
 from photostrip.pipeline.run import triangulate
 
 __all__ = [
     "ADJUSTMENTS",
+    "AUTO",
     "CHECK",
     "CONTROL",
+    "METHODS",
     "NEW",
     "Adjusted",
     "Inputs",

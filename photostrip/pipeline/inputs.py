@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 
-ADJUSTMENTS = ("similarity", "polynomial", "covariance", "bundle")
+METHODS = ("similarity", "polynomial", "covariance", "bundle")
+AUTO = "auto"  # polynomial or covariance, strip by strip
+ADJUSTMENTS = (AUTO, *METHODS)
 
 
 @dataclass(frozen=True)

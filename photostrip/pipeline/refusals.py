@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.ground_frame import GroundFrame
 
-OF_MODELS = ("polynomial", "similarity")  # adjustments that need no image coordinates
+OF_MODELS = ("auto", "polynomial", "similarity")  # adjustments that need no image coordinates
 
 
 def require_runnable(inputs: Inputs, settings: Settings) -> None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.notes import Finding, Note
     from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
+    from photostrip.pipeline.strips.choosing import Choice
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.rejection import Rejection
     from photostrip.triangulation import absolute_orientation as absolute
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
     from photostrip.triangulation.independent_models.formation import FormedModels
     from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
-    from photostrip.triangulation.polynomial import correction as polynomial
+    from photostrip.triangulation.polynomial.correction import Polynomial
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.resection import resection as exterior
     from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -109,8 +110,9 @@ class StripResult:
     control: ControlPoints  # control that took part
     control_rows: Numbers  # (n,): its rows in the strip's points
     absolute: absolute.AbsoluteOrientation
-    # correction of the strip deformation; None with other adjustments
-    polynomial: polynomial.Polynomial | None
+    # correction of the strip deformation, also where it was weighed and another adjustment taken; None where it was not
+    # asked for
+    polynomial: Polynomial | None
     xyz: Floats  # (q, 3): adjusted points, intermediate frame, metres; points of ``formed.point``
     cartesian: Floats  # (q, 3): the same in the project's Cartesian frame
     rays: Numbers  # (q,): photos on which each point was measured and used
@@ -119,8 +121,15 @@ class StripResult:
     # control coordinates that were not used; ``control`` says so in its ``use``
     screened_control: ScreenedControl
     shared: StretchedHeights | ShiftedList | None = None  # by all control, found before points were tested one by one
+    choice: Choice | None = None  # between polynomial and covariance; None where the project has made it
     photo_stages: PhotoStages | None = None  # None for independent models
     model_stages: ModelStages | None = None  # None for photos
+
+    @property
+    def correction(self) -> Polynomial | None:
+        """The polynomial, where it is what took the deformation out."""
+        taken = self.choice is None or self.choice.taken == "polynomial"
+        return self.polynomial if taken else None
 
     @property
     def wrong_control(self) -> tuple[Rejection, ...]:

@@ -20,6 +20,7 @@ ROTATION = {
     "local": "the axes east, north, up of the local frame",
 }
 OF_PHOTOS, OF_MODELS = ("relative", "formation", "covariance", "interior", "refinement"), ("links",)
+ASKED_BY = {"bundle": ("bundle",), "covariance": ("covariance", "auto")}
 EFFECTS = ("principal point", "distortion", "refraction")
 MEANT_OF_PHOTOS = ("vx_um, vy_um", "q_um")
 MEANT_OF_MODELS = {
@@ -60,7 +61,7 @@ def settings_of(result: Result) -> Document:
     found: Document = {"adjustment": settings.adjustment}
     for field in fields(settings):
         value = getattr(settings, field.name)
-        if field.name in {"bundle", "covariance"} and settings.adjustment != field.name:
+        if field.name in {"bundle", "covariance"} and settings.adjustment not in ASKED_BY[field.name]:
             continue
         if field.name in (OF_PHOTOS if result.model_strips else OF_MODELS):
             continue

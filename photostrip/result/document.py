@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING
 
 from photostrip import __version__
 from photostrip.result import conventions, summary
-from photostrip.result.adjustment import bundle, covariance, deformation, junctions, links, pairs, rejected, strips
+from photostrip.result.adjustment import (
+    bundle,
+    choices,
+    covariance,
+    deformation,
+    junctions,
+    links,
+    pairs,
+    rejected,
+    strips,
+)
 from photostrip.result.numbers import Document, natural_rank
 from photostrip.result.points import cross_validation, given, ground, image_coordinates, photos, precision
 from photostrip.result.verdict import verdict_of
@@ -32,7 +42,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     found = given.differences(result)
     numbers = summary.summary_of(result, found)
     body: Document = {
-        "adjustment": result.settings.adjustment,
+        "adjustment": choices.adjustment_of(result),
         "frame": ground.frame_of(result),
         "summary": numbers,
         "tolerances": summary.tolerances_of(result, numbers),
@@ -44,6 +54,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         **image_coordinates.fiducials_of(result),
         "strips": strips.strips_of(result),
         "absolute": strips.absolute_of(result),
+        **choices.choices_of(result),
         **strips.polynomials_of(result),
         **covariance.covariances_of(result),
         **precision.precision_of(result, found),

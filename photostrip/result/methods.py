@@ -16,11 +16,14 @@ SCHEMA = 1
 PARTS = ("count", "rms", "max", "worst", "rms_um")
 
 
-def methods_document(name: str, found: Mapping[str, Document | PhotostripError]) -> Document:
+def methods_document(
+    name: str, found: Mapping[str, Document | PhotostripError], auto: Document | PhotostripError
+) -> Document:
     """Put the results of several adjustments side by side.
 
     `found` has for each adjustment the document of its result, or why there is none. ``methods`` says what is left at
-    check and at control points, ``best`` which adjustment has the smallest rms at check points, None without these.
+    check and at control points, ``best`` which adjustment has the smallest rms at check points, None without these,
+    ``choices`` what `auto` takes for each strip and why.
     """
     rows = [_method(adjustment, each) for adjustment, each in found.items()]
     return {
@@ -29,6 +32,7 @@ def methods_document(name: str, found: Mapping[str, Document | PhotostripError])
         "name": name,
         "methods": rows,
         "best": {part: _best(rows, part) for part in ("plan", "height")},
+        "choices": auto.get("choices", []) if isinstance(auto, dict) else [],
     }
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.pipeline import ADJUSTMENTS
+from photostrip.pipeline import METHODS
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
@@ -30,11 +30,12 @@ def test_all_methods_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> N
     code, out, _ = run(capsys, PROJECT, "--compare-methods", "--format", "json")
     document = json.loads(out)
     assert code == 0
-    assert [row["adjustment"] for row in document["methods"]] == list(ADJUSTMENTS)
+    assert [row["adjustment"] for row in document["methods"]] == list(METHODS)
     by_name = {row["adjustment"]: row for row in document["methods"]}
     rms = {name: row["check"]["plan"]["rms"] for name, row in by_name.items()}
     assert rms["bundle"] < rms["polynomial"] < rms["similarity"]
     assert document["best"] == {"plan": "bundle", "height": "bundle"}
+    assert [row["taken"] for row in document["choices"]] == ["covariance"]
     single = json.loads(run(capsys, PROJECT, *BUNDLE, "--format", "json")[1])
     assert single["summary"]["check"]["plan"]["rms"] == rms["bundle"]
 
@@ -45,7 +46,8 @@ def test_text_and_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> N
     assert code == 0
     assert out.startswith("Methods: simulated-20\n")
     assert "Smallest at check points: bundle." in out
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(ADJUSTMENTS)
+    assert "`auto` takes for strip A: covariance, which betters the polynomial by " in out
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(METHODS)
     assert "reliability.csv" in {path.name for path in (tmp_path / "out" / "bundle").iterdir()}
     assert "reliability.csv" not in {path.name for path in (tmp_path / "out" / "polynomial").iterdir()}
     assert "wrote the result of bundle" in err
@@ -84,7 +86,7 @@ def test_a_method_that_does_not_take_the_project_is_told_with_its_reason(
     document = json.loads(out)
     assert document["name"] == "singles"
     status = {row["adjustment"]: row["status"] for row in document["methods"]}
-    assert {name for name, each in status.items() if each == "refused"} == {*ADJUSTMENTS} - {"bundle"}
+    assert {name for name, each in status.items() if each == "refused"} == {*METHODS} - {"bundle"}
     for row in nonempty([row for row in document["methods"] if row["status"] == "refused"]):
         assert "there is only one photo" in row["reason"]
     assert document["best"]["plan"] == "bundle"

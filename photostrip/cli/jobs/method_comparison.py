@@ -10,7 +10,7 @@ from photostrip.cli.stdout import Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
 from photostrip.formats.output.result_files import refined_csv, result_files
 from photostrip.formats.text.writing import write_files, write_text
-from photostrip.pipeline import ADJUSTMENTS
+from photostrip.pipeline import AUTO, METHODS
 from photostrip.project.loading import adjust_project, load_project
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
@@ -37,9 +37,9 @@ def compare_methods(
 ) -> int:
     """Adjust a project in every way there is and print what is left at its check points.
 
-    In the output folder each adjustment gets a folder of its name, with `html` each its report and all of them
-    ``methods.html``. An adjustment that refuses the project, or its key in the project file, is named with its reason;
-    when none succeeds, the first failure is raised.
+    What `auto` takes is said in a line. In the output folder each adjustment gets a folder of its name, with `html`
+    each its report and all of them ``methods.html``. An adjustment that refuses the project, or its key in the project
+    file, is named with its reason; when none succeeds, the first failure is raised.
     """
     found: dict[str, Document | PhotostripError] = {}
     name = ""
@@ -48,7 +48,7 @@ def compare_methods(
             from photostrip.report.html import check_html, methods_html, to_html
 
             check_html()
-        for adjustment in ADJUSTMENTS:
+        for adjustment in (*METHODS, AUTO):
             waiting.at(f"adjusting: {adjustment}")
             try:
                 loaded = load_project(project, [*assignments, f"processing.adjustment={adjustment}"])
@@ -58,14 +58,14 @@ def compare_methods(
                 continue
             name = loaded.inputs.name
             found[adjustment] = document = document_of(result, loaded.remarks)
-            if output is not None:
+            if output is not None and adjustment != AUTO:  # one of the others
                 pages = {"report.html": to_html(document, everything=messages.verbose)} if html else {}
                 write_files(output / adjustment, pages | result_files(document, loaded.resolved, refined_csv(result)))
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
         failures = [each for each in found.values() if not isinstance(each, dict)]
         if len(failures) == len(found):
             raise failures[0]
-        document = methods_document(name, found)
+        document = methods_document(name, found, found.pop(AUTO))
         if html and output is not None:
             write_text(output / "methods.html", methods_html(document))
     if form is Format.JSON:

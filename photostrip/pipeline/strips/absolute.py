@@ -28,11 +28,12 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.results import StripResult, StripShape
+    from photostrip.pipeline.strips.choosing import Deformation
     from photostrip.points import ControlPoints
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
     from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
-    from photostrip.triangulation.polynomial.correction import Polynomial
 
 
 class StripDerivatives(Protocol):
@@ -88,10 +89,11 @@ class StripStage(Protocol[Errors]):
     def refuse_other_hand(self, oriented: OrientedStrip[Errors]) -> None:
         """Refuse a strip that its control fits only as a mirror image."""
 
-    def adjusted(
-        self, screened: ScreenedStrip[Errors], correction: Polynomial | None, settings: Settings
-    ) -> StripResult:
-        """Adjust the points and photos, the correction of the deformation being known."""
+    def by_covariance(self, oriented: OrientedStrip[Errors], settings: Settings) -> CovarianceAdjustment | None:
+        """Adjust the strip with its own covariance; None where that is not known."""
+
+    def adjusted(self, screened: ScreenedStrip[Errors], found: Deformation, settings: Settings) -> StripResult:
+        """Adjust the points and photos, the deformation being known."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What the similarity leaves at the control: polynomials, or the strip's own covariance.
+"""What the similarity leaves at the control: polynomials, the strip's own covariance, or the better of the two.
 
 Source: [001] eq. 150-152 for the polynomials.
 """
@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.pipeline.inputs import AUTO
 from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control
+from photostrip.pipeline.strips.choosing import COVARIANCE, POLYNOMIAL, Deformation, choose
 from photostrip.triangulation.polynomial import correction as polynomial
 
 if TYPE_CHECKING:
@@ -23,8 +25,7 @@ if TYPE_CHECKING:
 def adjust(screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:
     """Correct the deformation of a strip and orient its photos on the corrected points."""
     oriented = screened.oriented
-    correction = _polynomial(oriented, settings) if settings.adjustment == "polynomial" else None
-    return oriented.stage.adjusted(screened, correction, settings)
+    return oriented.stage.adjusted(screened, _deformation(oriented, settings), settings)
 
 
 def adjust_formed(
@@ -32,6 +33,17 @@ def adjust_formed(
 ) -> StripResult:
     """Take a formed strip to the ground with its own control."""
     return adjust(reject_wrong_control(orient_on_control(stage, control, frames), settings), settings)
+
+
+def _deformation(oriented: OrientedStrip[Errors], settings: Settings) -> Deformation:
+    """Find what the settings ask for; with `auto` both, and which of them is better."""
+    asked = settings.adjustment
+    fitted = _polynomial(oriented, settings) if asked in {POLYNOMIAL, AUTO} else None
+    covariance = oriented.stage.by_covariance(oriented, settings) if asked in {COVARIANCE, AUTO} else None
+    if fitted is None or covariance is None:
+        return Deformation(fitted, covariance)
+    choice = choose(oriented, fitted, covariance)
+    return Deformation(fitted, covariance if choice.taken == COVARIANCE else None, choice)
 
 
 def _polynomial(oriented: OrientedStrip[Errors], settings: Settings) -> polynomial.Polynomial:

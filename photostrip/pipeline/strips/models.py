@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
+    from photostrip.pipeline.strips.choosing import Deformation
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
     from photostrip.triangulation.independent_models.linking import StripModels
@@ -117,9 +118,12 @@ class LinkedModels:
         if conspicuous and mirrored < link_screening.REFLECTED * as_it_is:
             raise _left_handed(self.strip)
 
-    def adjusted(self, screened: WithControlScreened, correction: Polynomial | None, _: Settings) -> StripResult:
+    def by_covariance(self, _: Oriented, __: Settings) -> None:
+        """Models are adjusted by polynomials only: their image coordinates are not known."""
+
+    def adjusted(self, screened: WithControlScreened, found: Deformation, _: Settings) -> StripResult:
         """Adjust the points, and move the perspective centres with them."""
-        oriented, strip, formed = screened.oriented, self.strip, self.formed
+        oriented, strip, formed, correction = screened.oriented, self.strip, self.formed, found.polynomial
         xyz = oriented.xyz if correction is None else correction(oriented.xyz)
         similarity = oriented.absolute.similarity
         centers = _centers(formed, similarity, correction)

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
+    from photostrip.pipeline.strips.choosing import Deformation
     from photostrip.points import PhotoPoints
     from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.polynomial.correction import Polynomial
 
     Oriented = OrientedStrip[strip_errors.StripErrors]
     WithControlScreened = ScreenedStrip[strip_errors.StripErrors]
@@ -131,10 +131,10 @@ class FormedPhotos:
     def refuse_other_hand(self, oriented: Oriented) -> None:
         """Photos have no other hand."""
 
-    def adjusted(self, screened: WithControlScreened, correction: Polynomial | None, settings: Settings) -> StripResult:
+    def adjusted(self, screened: WithControlScreened, found: Deformation, settings: Settings) -> StripResult:
         """Adjust the points, and orient every photo on them."""
         oriented, strip, formed = screened.oriented, self.strip, self.formed
-        covariance = self._by_covariance(oriented, settings) if settings.adjustment == "covariance" else None
+        covariance, correction = found.covariance, found.correction
         xyz = oriented.xyz if correction is None else correction(oriented.xyz)
         if covariance is not None:
             xyz = covariance.xyz
@@ -152,7 +152,8 @@ class FormedPhotos:
             control=oriented.control,
             control_rows=oriented.control_rows,
             absolute=oriented.absolute,
-            polynomial=correction,
+            polynomial=found.polynomial,
+            choice=found.choice,
             xyz=xyz,
             cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
             rays=np.bincount(points, minlength=len(formed.point)),
@@ -165,7 +166,7 @@ class FormedPhotos:
                 *notes.junction_notes(strip, formed),
                 *notes.control_notes(strip, oriented.absolute),
                 *notes.polynomial_notes(strip, correction, xyz),
-                *([] if correction is None else notes.covariance_proposal(strip, correction)),
+                *([] if correction is None or found.choice else notes.covariance_proposal(strip, correction)),
                 *notes.photo_notes(strip, resection),
                 *notes.covariance_notes(strip, oriented.control, covariance),
             ),
@@ -183,7 +184,7 @@ class FormedPhotos:
             ),
         )
 
-    def _by_covariance(self, oriented: Oriented, settings: Settings) -> CovarianceAdjustment:
+    def by_covariance(self, oriented: Oriented, settings: Settings) -> CovarianceAdjustment:
         """Distribute the misclosures at the control by the strip's own covariance."""
         from photostrip.triangulation.covariance_adjustment.adjust import StripOnControl, adjust
 

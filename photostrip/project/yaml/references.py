@@ -58,7 +58,7 @@ NEEDED = {
     "observations": "points measured on photos, or `models` measured on a plotter",
 }
 NEEDS_IMAGES = {
-    "adjustment": (("bundle", "covariance"), "polynomial or similarity"),
+    "adjustment": (("bundle", "covariance"), "auto, polynomial or similarity"),
     "earth_curvature": (("image",), "auto, model or none"),
     "refraction": (("true", "yes", "on"), "false"),
 }

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.report.page.parts import Document, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.sections.decisions import choice_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,7 +21,9 @@ def methods_sections(document: Document) -> tuple[Section, ...]:
         for row in document["methods"]
         if row["status"] == "refused"
     ]
-    return (Section("Methods side by side", (*parts, Words(_verdict(document)))),)
+    parts.append(Words(_verdict(document)))
+    parts += [Words(f"`auto` takes for strip {each['strip']}: {choice_line(each)}.") for each in document["choices"]]
+    return (Section("Methods side by side", tuple(parts)),)
 
 
 def _table(rows: list[Document], role: str) -> Table:

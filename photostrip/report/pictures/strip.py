@@ -172,7 +172,7 @@ def _height_picture(document: Document, plan: Plan) -> Picture:
     before = [
         (ups[row["id"]][0], row["up"])
         for row in document["misclosures"]
-        if document.get("polynomials") and row["id"] in ups and row.get("up") is not None
+        if document["adjustment"] == "polynomial" and row["id"] in ups and row.get("up") is not None
     ]
     height = 320.0
     places = [*ups.values(), *before]

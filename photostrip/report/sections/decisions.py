@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
-from photostrip.report.page.numbers import LEAST_PROBABILITY, micrometres, short
+from photostrip.report.page.numbers import LEAST_PROBABILITY, fixed, metres, micrometres, ratio, short
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import elsewhere
@@ -13,7 +13,9 @@ from photostrip.report.sections.strip import elsewhere
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+WEIGHED = ("polynomial", "covariance")
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
+CLOSE = 0.10  # methods that differ by less are said to agree
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
 
 
@@ -26,6 +28,7 @@ def decisions_section(document: Document) -> Section:
 
 def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     settings = document["settings"]
+    yield from choice_rows(document)
     for block in document.get("polynomials", []):
         if block["asked"] == "auto":
             label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
@@ -49,6 +52,42 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     if curvature["asked"] == "auto":
         yield "Earth curvature", f"{curvature['treatment']}, as the frame of the control requires"
     yield from _heights(document, settings.get("refinement", {}))
+
+
+def choice_rows(document: Document) -> Iterator[tuple[str, str]]:
+    """Say for each strip what was taken and why."""
+    blocks = document.get("choices", [])
+    for block in blocks:
+        yield "chosen adjustment" if len(blocks) == 1 else f"adjustment of {block['strip']}", choice_line(block)
+
+
+def choice_line(block: Document) -> str:
+    """Say what was taken, why, and what both witnesses say of both methods."""
+    predicted, left_out = block["predicted"], block["left_out"]
+    text = f"{block['taken']}, {_why(block)}: standard deviations of new points {_figures(predicted)}"
+    if left_out is None:
+        return f"{text}; no control can be left out"
+    chance = "" if block["p"] is None else f", p {_probability(block['p'])}"
+    by = counted(left_out["count"], block["left_out_by"])
+    return f"{text}; errors at {by} left out in turn {_figures(left_out, chance)}"
+
+
+def _why(block: Document) -> str:
+    if block["contradicted"]:
+        return "because the errors at left-out control contradict the standard deviations"
+    if block["taken"] == "polynomial":
+        return f"which the covariance of the strip betters by less than {100 * CLOSE:.0f} %"
+    return f"which betters the polynomial by {fixed(100 * (1 - block['predicted']['ratio']), 0)} %"
+
+
+def _figures(witness: Document, more: str = "") -> str:
+    """Give plan and height of both methods, and their ratio."""
+    each = [f"{metres(witness[name]['plan'])}/{metres(witness[name]['height'])} m" for name in WEIGHED]
+    return f"{each[0]} with the polynomial, {each[1]} with the covariance (ratio {ratio(witness['ratio'])}{more})"
+
+
+def _probability(p: float) -> str:
+    return f"below {LEAST_PROBABILITY:g}" if p < LEAST_PROBABILITY else fixed(p, 3)
 
 
 def _degree(block: Document) -> str:

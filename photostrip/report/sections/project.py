@@ -102,7 +102,12 @@ def _length(mark: Document) -> float:
 
 
 def adjustment_of(document: Document) -> str:
-    """Say how the points were adjusted."""
+    """Say how the points were adjusted, and who wanted it."""
+    text = _adjustment_of(document)
+    return f"{text}; chosen by `auto`" if document["settings"]["adjustment"] == "auto" else text
+
+
+def _adjustment_of(document: Document) -> str:
     if document["adjustment"] == "covariance":
         alone = document["settings"].get("covariance", {}).get("distances") is False
         return "with the covariance of the strip itself" + (", control alone" if alone else "")

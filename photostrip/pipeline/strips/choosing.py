@@ -1,0 +1,197 @@
+"""Which adjustment a strip gets with ``adjustment: auto``: its polynomial, or its own covariance.
+
+Two witnesses are asked about both. The standard deviations of the new points follow from the covariance of the strip
+and its control, through either estimate: so what a polynomial cannot describe counts. The errors at control left out in
+turn, the same for both, tell what no standard deviation knows. The standard deviations decide, unless the errors
+contradict them beyond chance: left-out points are few, and their errors scatter by more than the methods differ.
+
+Source: derived; docs/method.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.statistics import t_p_value
+from photostrip.triangulation.error_propagation import control_errors, covariances
+from photostrip.triangulation.polynomial.terms import bands
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.arrays import Floats, Numbers
+    from photostrip.pipeline.strips.absolute import OrientedStrip
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+    from photostrip.triangulation.polynomial.correction import Polynomial
+
+    Oriented = OrientedStrip[Any]
+
+POLYNOMIAL, COVARIANCE = "polynomial", "covariance"
+AGREED = 0.10  # methods that differ by less are as good as each other
+LEVEL = 0.05  # probability with which left-out control contradicts the standard deviations by chance
+MOST_GROUPS = 12  # bands or points that are left out in turn, spread over the strip
+MOST_POINTS = 300  # new points whose standard deviations are compared, spread likewise
+
+
+@dataclass(frozen=True)
+class Witness:
+    """Root mean squares of both methods, in plan (of one coordinate) and in height, metres; NaN where nothing tells."""
+
+    polynomial: tuple[float, float]
+    covariance: tuple[float, float]
+    count: int  # points compared, or bands and points that were left out
+
+    @property
+    def ratio(self) -> float:
+        """Covariance over polynomial, the geometric mean of plan and height."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(np.exp(np.nanmean(np.log(np.divide(self.covariance, self.polynomial)))))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was taken, and what speaks for it."""
+
+    taken: str  # ``"polynomial"`` or ``"covariance"``
+    predicted: Witness  # standard deviations of new points
+    left_out: Witness | None  # errors at control left out; None where the rest determines none of it
+    left_out_by: str  # ``"band"`` or ``"point"``: what was left out at a time
+    p: float  # probability by chance of left-out errors that differ as much from band to band; NaN of a single band
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the errors at left-out control decided against the standard deviations."""
+        return self.taken != _of_ratio(self.predicted.ratio)
+
+
+@dataclass(frozen=True, eq=False)
+class Deformation:
+    """What the similarity leaves at the control, and who takes it out."""
+
+    polynomial: Polynomial | None = None  # shown also where the covariance was taken
+    covariance: CovarianceAdjustment | None = None  # where that was asked for or taken
+    choice: Choice | None = None  # None where nothing was to be chosen
+
+    @property
+    def correction(self) -> Polynomial | None:
+        """The polynomial, where it is what takes the deformation out."""
+        return self.polynomial if self.covariance is None else None
+
+
+def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Choice:
+    """Decide between the polynomial of a strip and its adjustment with its own covariance."""
+    predicted = _predicted(oriented, polynomial, covariance)
+    groups, by = _groups(oriented, polynomial)
+    left_out, p = _left_out(oriented, polynomial, covariance, groups)
+    taken = _of_ratio(predicted.ratio)
+    if left_out is not None and p < LEVEL:
+        sides = {POLYNOMIAL: left_out.ratio < 1 - AGREED, COVARIANCE: left_out.ratio > 1 + AGREED}
+        if sides[taken]:
+            taken = COVARIANCE if taken == POLYNOMIAL else POLYNOMIAL
+    return Choice(taken=taken, predicted=predicted, left_out=left_out, left_out_by=by, p=p)
+
+
+def _of_ratio(ratio: float) -> str:
+    return COVARIANCE if ratio < 1 - AGREED else POLYNOMIAL
+
+
+def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Witness:
+    """Compare the standard deviations of new points; of control where there are no others."""
+    errors, found = oriented.errors, oriented.misclosures
+    new = np.setdiff1d(np.arange(len(oriented.xyz)), oriented.control_rows[found.point])
+    points = _spread(new if len(new) else np.arange(len(oriented.xyz)), MOST_POINTS)
+    fit = _fit(oriented, polynomial, np.arange(len(found.point)))
+    parameters = covariances.of_parameters(errors, found, fit.operator, covariance.factor)
+    after = covariances.covariances(errors, errors.points.take(points), parameters, fit.influence(oriented.xyz[points]))
+    both = [
+        np.diagonal(each, axis1=1, axis2=2).mean(axis=0)
+        for each in (after * covariance.factor, covariance.points[points])
+    ]
+    first, second = ((float(np.sqrt(v[:2].mean())), float(np.sqrt(v[2]))) for v in both)
+    return Witness(first, second, len(points))
+
+
+def _spread(rows: Numbers, most: int) -> Numbers:
+    """Take at most so many of the rows, evenly spread."""
+    some: Numbers = rows[np.linspace(0, len(rows) - 1, min(len(rows), most)).round().astype(int)]
+    return some
+
+
+def _groups(oriented: Oriented, polynomial: Polynomial) -> tuple[list[Numbers], str]:
+    """Group control points to be left out in turn: inner bands that the polynomial can do without, or points."""
+    if all(each.left_out_by == "band" for each in polynomial.evidence):
+        number = _bands(oriented)
+        inner = _spread(np.arange(1, int(number.max())), MOST_GROUPS)
+        return [np.flatnonzero(number == band) for band in inner.tolist()], "band"
+    along = np.argsort(oriented.at_control[:, 0], kind="stable")
+    return [np.array([row]) for row in _spread(along, MOST_GROUPS).tolist()], "point"
+
+
+def _bands(oriented: Oriented) -> Numbers:
+    """Number the bands of the control along the strip; the band of each point."""
+    return bands(oriented.at_control[:, 0], oriented.extent[0])
+
+
+def _left_out(
+    oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment, groups: Sequence[Numbers]
+) -> tuple[Witness | None, float]:
+    """Compare the errors at control that is left out in turn; the covariance needs no new elimination for it."""
+    from photostrip.triangulation.covariance_adjustment.left_out import left_out_errors
+
+    found = oriented.misclosures
+    coordinates = [np.flatnonzero(np.isin(found.point, group)) for group in groups]
+    coordinates = [rows for rows in coordinates if len(rows)]
+    pairs = [
+        np.stack([_by_polynomial(oriented, polynomial, rows), others])
+        for rows, others in zip(coordinates, left_out_errors(covariance.system, coordinates), strict=True)
+    ]
+    known = [number for number, pair in enumerate(pairs) if np.isfinite(pair).all()]
+    if not known:
+        return None, float("nan")
+    rows = np.concatenate([coordinates[number] for number in known])
+    height = found.axis[rows] == 2
+    squares = np.concatenate([pairs[number] for number in known], axis=1) ** 2
+    mean = np.array([[_mean(row[~height]), _mean(row[height])] for row in squares])
+    first, second = ((float(plan), float(up)) for plan, up in np.sqrt(mean))
+    relative = squares / np.where(height, mean[:, 1].mean(), mean[:, 0].mean())
+    # points of one band share the errors of the strip: the bands are what testifies
+    _, band = np.unique(_bands(oriented)[found.point[rows]], return_inverse=True)
+    gain = np.bincount(band, relative[0] - relative[1]) / np.bincount(band)
+    return Witness(first, second, len(known)), _p_value(gain)
+
+
+def _mean(values: Floats) -> float:
+    return float(values.mean()) if len(values) else float("nan")
+
+
+def _p_value(gain: Floats) -> float:
+    """Probability of gains whose mean differs from zero as much by chance."""
+    if len(gain) < 2:
+        return float("nan")
+    error = float(gain.std(ddof=1)) / np.sqrt(len(gain))
+    return t_p_value(float(gain.mean()) / error, len(gain) - 1) if error > 0 else 1.0
+
+
+def _by_polynomial(oriented: Oriented, polynomial: Polynomial, rows: Numbers) -> Floats:
+    """Predict control coordinates by similarity and polynomial of all others: strip minus given, metres."""
+    found = oriented.misclosures
+    others = np.setdiff1d(np.arange(len(found.point)), rows)
+    misclosures = oriented.absolute.misclosures[found.point, found.axis]
+    try:
+        fit = _fit(oriented, polynomial, others)
+    except np.linalg.LinAlgError:
+        return np.full(len(rows), np.inf)
+    influence = fit.influence(oriented.at_control[found.point[rows]])
+    by_parameters = np.einsum("wi,wit->wt", found.direction[rows], influence)
+    return np.asarray(misclosures[rows] - by_parameters @ (fit.operator @ misclosures[others]), float)
+
+
+def _fit(oriented: Oriented, polynomial: Polynomial, coordinates: Numbers) -> control_errors.FitOperator:
+    """Operator of similarity and polynomial on some of the control coordinates."""
+    terms = [axis.terms for axis in polynomial.axes]
+    return control_errors.fit_operator(
+        oriented.misclosures.take(coordinates), oriented.weights, oriented.at_control, terms, oriented.errors.origin
+    )

@@ -1,0 +1,52 @@
+"""What ``adjustment: auto`` took for each strip, and what spoke for it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip.pipeline import AUTO
+from photostrip.result.quantities import record
+
+if TYPE_CHECKING:
+    from photostrip.pipeline import Result, StripResult
+    from photostrip.pipeline.strips.choosing import Choice, Witness
+    from photostrip.result.numbers import Document
+
+
+def adjustment_of(result: Result) -> str:
+    """Name the adjustment that was made; with `auto` the covariance where it was taken for any strip."""
+    asked = result.settings.adjustment
+    if asked != AUTO:
+        return asked
+    taken = {strip.choice.taken for strip in result.strips if strip.choice is not None}
+    return "covariance" if "covariance" in taken else "polynomial"
+
+
+def choices_of(result: Result) -> Document:
+    """Return the list ``choices`` under its key: a record for each strip with a choice; empty without any."""
+    found = [_choice(strip, strip.choice) for strip in result.strips if strip.choice is not None]
+    return {"choices": found} if found else {}
+
+
+def _choice(strip: StripResult, choice: Choice) -> Document:
+    values = {
+        "strip": strip.strip.id,
+        "taken": choice.taken,
+        "predicted": _witness(choice.predicted),
+        "left_out": None if choice.left_out is None else _witness(choice.left_out),
+        "left_out_by": choice.left_out_by,
+        "p": choice.p,
+        "contradicted": choice.contradicted,
+    }
+    return record("choices", values)
+
+
+def _witness(found: Witness) -> Document:
+    return {
+        "count": found.count,
+        "ratio": found.ratio,
+        **{
+            name: {"plan": plan, "height": height}
+            for name, (plan, height) in (("polynomial", found.polynomial), ("covariance", found.covariance))
+        },
+    }

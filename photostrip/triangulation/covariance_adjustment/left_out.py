@@ -1,0 +1,46 @@
+"""Errors at control that takes no part, without adjusting again: all of it from the one eliminated system.
+
+Source: derived. With Pi the part of K^-1 (docs/precision.md, eq. 7) that belongs to a group of conditions and lambda
+their correlates, the group is predicted from everything else with the error Pi^-1 lambda.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.arrays import Floats, Numbers
+    from photostrip.triangulation.covariance_adjustment.system import System
+
+UNCHECKED = 1e-9  # smallest eigenvalue of the scaled Pi of a group that the others determine
+
+
+def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[Floats]:
+    """Predict groups of control coordinates (rows of the misclosures), each from all the others.
+
+    Returns strip minus given of each group, metres; infinite where the others do not determine it.
+    """
+    layout = found.layout
+    rows = found.conditions.of_control(np.concatenate(groups))
+    block, position = layout.block[rows], layout.position[rows]
+    right = np.zeros((layout.blocks, layout.height, len(rows)))
+    right[block, position, np.arange(len(rows))] = 1.0
+    inverse = found.factors.solve(right)[block, position]
+    ends = np.cumsum([0, *(len(group) for group in groups)])
+    return [
+        _predicted(inverse[start:stop, start:stop], found.correlates[rows[start:stop]])
+        for start, stop in pairwise(ends.tolist())
+    ]
+
+
+def _predicted(cofactors: Floats, correlates: Floats) -> Floats:
+    size = np.sqrt(np.maximum(np.diag(cofactors), np.finfo(float).tiny))
+    scaled = cofactors / size / size[:, None]
+    if np.linalg.eigvalsh(scaled)[0] < UNCHECKED:
+        return np.full(len(correlates), np.inf)
+    return np.asarray(np.linalg.solve(scaled, correlates / size) / size, float)
