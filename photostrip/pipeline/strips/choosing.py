@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.statistics import t_p_value
+from photostrip.triangulation.covariance_adjustment.settings import BETTER
 from photostrip.triangulation.error_propagation import control_errors, covariances
 from photostrip.triangulation.polynomial.terms import bands
 
@@ -30,8 +31,7 @@ if TYPE_CHECKING:
     Oriented = OrientedStrip[Any]
 
 POLYNOMIAL, COVARIANCE = "polynomial", "covariance"
-AGREED = 0.10  # methods that differ by less are as good as each other
-LEVEL = 0.05  # probability with which left-out control contradicts the standard deviations by chance
+LEVEL = 0.01  # probability with which left-out control contradicts the standard deviations by chance
 MOST_GROUPS = 12  # bands or points that are left out in turn, spread over the strip
 MOST_POINTS = 300  # new points whose standard deviations are compared, spread likewise
 
@@ -88,14 +88,15 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
     left_out, p = _left_out(oriented, polynomial, covariance, groups)
     taken = _of_ratio(predicted.ratio)
     if left_out is not None and p < LEVEL:
-        sides = {POLYNOMIAL: left_out.ratio < 1 - AGREED, COVARIANCE: left_out.ratio > 1 + AGREED}
-        if sides[taken]:
-            taken = COVARIANCE if taken == POLYNOMIAL else POLYNOMIAL
+        if left_out.ratio < BETTER:
+            taken = COVARIANCE
+        elif left_out.ratio > 1 / BETTER:
+            taken = POLYNOMIAL
     return Choice(taken=taken, predicted=predicted, left_out=left_out, left_out_by=by, p=p)
 
 
 def _of_ratio(ratio: float) -> str:
-    return COVARIANCE if ratio < 1 - AGREED else POLYNOMIAL
+    return COVARIANCE if ratio < BETTER else POLYNOMIAL
 
 
 def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Witness:
@@ -131,7 +132,7 @@ def _groups(oriented: Oriented, polynomial: Polynomial) -> tuple[list[Numbers], 
 
 
 def _bands(oriented: Oriented) -> Numbers:
-    """Number the bands of the control along the strip; the band of each point."""
+    """Give the band of each control point, counted along the strip."""
     return bands(oriented.at_control[:, 0], oriented.extent[0])
 
 

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+# standard deviations over those of the polynomial: where the covariance does not do better than that, the polynomial
+# of the textbook stays
+BETTER = 0.90
+
 
 @dataclass(frozen=True)
 class CovarianceSettings:

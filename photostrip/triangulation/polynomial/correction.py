@@ -27,10 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["DEGREES", "GROUPS", "AxisFit", "Evidence", "FitProblem", "Polynomial", "PolynomialSettings", "fit"]
 
 DEGREES = ("auto", "1", "2", "3")
-SURE_LEVEL = 0.10  # of the F test: enough by itself
-LIKELY_LEVEL = 0.40  # enough when left-out points get better too
-# left-out errors may not grow by more, however significant the step: such control only bends the strip
-LARGEST_GROWTH = 1.5
+LEVEL = 0.05  # of the F test
 PLAN, HEIGHT = "plan", "height"
 GROUPS = ((PLAN, (0, 1)), (HEIGHT, (2,)))  # decided apart: control can be good in one and poor in the other
 SMALLEST_REST = 1e-6  # smallest eigenvalue of I - H for a group that can be left out
@@ -170,9 +167,8 @@ def decide(
 
 
 def _is_justified(p: float, rich: float, simple: float) -> bool:
-    """Whether more terms are justified: by the F test alone, or by a weaker one that left-out points confirm."""
-    ratio = rich / simple if simple > 0 and np.isfinite(rich) else LARGEST_GROWTH
-    return (p < SURE_LEVEL and ratio < LARGEST_GROWTH) or (p < LIKELY_LEVEL and ratio < 1.0)
+    """Whether more terms are justified: by the F test, and by left-out points that they predict better."""
+    return p < LEVEL and rich < simple
 
 
 def _expected(problem: FitProblem) -> Floats:
@@ -272,25 +268,33 @@ def _conditions_without(problem: FitProblem, counted: Numbers, groups: Numbers, 
 
 
 def _left_out(problem: FitProblem, fits: Sequence[AxisFit], axes: tuple[int, ...], groups: Sequence[Numbers]) -> float:
-    """Root mean square error at groups of control predicted from all others, without fitting again.
-
-    The error of a left-out group is (I - H)^-1 times its residuals, H the part of the hat matrix within the group.
-    The similarity is taken to share its parameters evenly among the points.
-    """
-    share = SIMILARITY_PARAMETERS[PLAN] / 2 if len(axes) > 1 else float(SIMILARITY_PARAMETERS[HEIGHT])
+    """Root mean square error at groups of control predicted from all others, without fitting again."""
     errors: list[Floats] = []
-    for axis in axes:
-        fit_, total = fits[axis], int(_counted(problem, axis).sum())
-        root = np.sqrt(np.where(_counted(problem, axis), problem.by_axis[:, axis], 1.0))
-        for size in np.unique([len(rows) for rows in groups]).tolist():
-            rows = np.array([each for each in groups if len(each) == size])
-            parts = fit_.basis[rows]
-            hat = parts @ parts.transpose(0, 2, 1) if fit_.terms else np.eye(size) * min(share / total, 0.9)
-            rest = np.broadcast_to(np.eye(size) - hat, (len(rows), size, size))
-            free = np.linalg.eigvalsh(rest)[:, 0] >= SMALLEST_REST
-            # a group that alone determines part of the fit cannot be predicted by the others
-            errors.append(np.full(int((~free).sum()) * size, np.inf))
-            if free.any():
-                residuals = (fit_.residuals[rows] * root[rows])[free]
-                errors.append((np.linalg.solve(rest[free], residuals[:, :, None])[:, :, 0] / root[rows][free]).ravel())
+    for size in np.unique([len(rows) for rows in groups]).tolist():
+        rows = np.array([each for each in groups if len(each) == size])
+        if not any(fits[axis].terms for axis in axes):
+            basis, residuals = problem.similarity
+            found = _from_the_others(
+                basis[rows].reshape(len(rows), 3 * size, -1), residuals[rows].reshape(len(rows), -1)
+            )
+            root = np.sqrt(problem.by_axis)[rows][:, :, list(axes)]
+            errors.append((found.reshape(len(rows), size, 3)[:, :, list(axes)] / root).ravel())
+            continue
+        for axis in axes:
+            root = np.sqrt(problem.by_axis[:, axis])[rows]
+            errors.append((_from_the_others(fits[axis].basis[rows], fits[axis].residuals[rows] * root) / root).ravel())
     return _rms(np.concatenate(errors))
+
+
+def _from_the_others(basis: Floats, residuals: Floats) -> Floats:
+    """Predict groups (g, k) from all that is not in them: (I - H)^-1 times their residuals, H the hat matrix within.
+
+    basis: (g, k, t), rows of the orthonormal basis of the design. A group that alone determines part of the fit cannot
+        be predicted: its errors are infinite.
+    """
+    rest = np.eye(residuals.shape[1]) - basis @ basis.transpose(0, 2, 1)
+    free = np.linalg.eigvalsh(rest)[:, 0] >= SMALLEST_REST
+    errors = np.full(residuals.shape, np.inf)
+    if free.any():
+        errors[free] = np.linalg.solve(rest[free], residuals[free][:, :, None])[:, :, 0]
+    return errors

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.triangulation.polynomial import terms as polynomial_terms
 
 if TYPE_CHECKING:
@@ -64,6 +65,16 @@ class FitProblem:
     def misclosures(self) -> Floats:
         """Strip minus given after the similarity, intermediate frame, metres."""
         return self.xyz - self.targets.of(self.xyz)
+
+    @cached_property
+    def similarity(self) -> tuple[Floats, Floats]:
+        """Orthonormal basis (n, 3, 7) of the weighted design of a similarity, and what it leaves, (n, 3), weighted."""
+        root = np.sqrt(self.by_axis)
+        moved = similarity_derivatives(self.xyz, self.xyz.mean(axis=0)) * root[:, :, None]
+        basis, _ = np.linalg.qr(moved.reshape(-1, SIMILARITY_PARAMETERS))
+        misclosures = (self.misclosures * root).ravel()
+        left = misclosures - basis @ (basis.T @ misclosures)
+        return basis.reshape(moved.shape), left.reshape(-1, 3)
 
     @cached_property
     def by_axis(self) -> Floats:

@@ -283,7 +283,7 @@ def test_without_deformation_the_similarity_is_kept_as_often_as_the_tests_say() 
     xyz = layout(SEVEN)
     degrees = np.array([fit(noisy(seed, 0 * xyz, xyz), PolynomialSettings()).degree for seed in range(120)])
     kept = (degrees == 0).mean()
-    assert 0.5 < kept < 0.95
+    assert 0.9 < kept < 1.0
 
 
 def steps(found: Polynomial, group: str) -> list[Evidence]:
@@ -292,7 +292,7 @@ def steps(found: Polynomial, group: str) -> list[Evidence]:
 
 def test_the_f_test_is_that_of_two_sums_of_squares() -> None:
     xyz = layout(SEVEN)
-    affine = np.column_stack([0 * xyz[:, 0], xyz[:, 1] * 1e-3, xyz[:, 1] * 1e-3])  # so that every degree is a step
+    affine = np.column_stack([0 * xyz[:, 0], xyz[:, 1] * 1e-2, xyz[:, 1] * 1e-2])  # so that every degree is a step
     one = noisy(1, bent(xyz, 2.0, 2) + affine, xyz, sigma=0.05)
     one = replace(one, weight=one.weight * 1e6)  # the control's own sigma does not limit the variance
     found, squares = fit(one, PolynomialSettings()), {}
@@ -387,11 +387,9 @@ def test_bands_are_left_out_when_the_ladder_says_so_of_what_is_left(seed: int, s
         assert richest.left_out_by == ("band" if rest and all(carried) else "point")
 
 
-@pytest.mark.slow
-def test_the_similarity_left_out_is_nearly_that_refitted() -> None:
-    """Its leverage is taken as the same for all points; refitting it without each point agrees within a tenth."""
-    xyz, ratios = layout(SEVEN), []
-    for seed in range(40):
+def test_the_similarity_left_out_is_that_refitted() -> None:
+    xyz = layout(SEVEN)
+    for seed in range(5):
         one = noisy(seed, 0 * xyz, xyz)
         given_ = np.nan_to_num(one.targets.control.enu)
         inner = [np.arange(3 * band, 3 * band + 3) for band in range(1, 6)]
@@ -400,9 +398,9 @@ def test_the_similarity_left_out_is_nearly_that_refitted() -> None:
             rest = np.setdiff1d(np.arange(21), rows)
             errors.append(Similarity.from_points(one.xyz[rest], given_[rest])(one.xyz[rows]) - given_[rows])
         found = fit(one, PolynomialSettings())
-        theirs = float(np.sqrt(np.mean(np.square(np.concatenate(errors)[:, 2]))))
-        ratios.append(steps(found, "height")[0].left_out / theirs)
-    assert np.mean(ratios) == pytest.approx(1, abs=0.1)
+        theirs = np.square(np.concatenate(errors))
+        assert steps(found, "plan")[0].left_out == pytest.approx(np.sqrt(theirs[:, :2].mean()), rel=1e-3)
+        assert steps(found, "height")[0].left_out == pytest.approx(np.sqrt(theirs[:, 2].mean()), rel=1e-3)
 
 
 def test_residuals_of_the_evidence_are_those_of_the_control() -> None:
