@@ -2,8 +2,9 @@
 
 Two witnesses are asked about both. The standard deviations of the new points follow from the covariance of the strip
 and its control, through either estimate: so what a polynomial cannot describe counts. The errors at control left out in
-turn, the same for both, tell what no standard deviation knows. The standard deviations decide, unless the errors
-contradict them beyond chance: left-out points are few, and their errors scatter by more than the methods differ.
+turn, the same for both, tell what no standard deviation knows. They are few, and scatter by more than the methods
+differ, so the standard deviations decide, as long as the left-out errors are such as these let expect. A lens that is
+not what its calibration says makes them many times larger; then the errors decide.
 
 Source: derived; docs/method.md.
 """
@@ -15,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.statistics import t_p_value
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
 from photostrip.triangulation.error_propagation import control_errors, covariances
 from photostrip.triangulation.polynomial.terms import bands
@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     Oriented = OrientedStrip[Any]
 
 POLYNOMIAL, COVARIANCE = "polynomial", "covariance"
-LEVEL = 0.01  # probability with which left-out control contradicts the standard deviations by chance
+# left-out errors over what the covariance lets expect, beyond which its standard deviations are not to be believed
+MOST_EXCESS = 3.0
+TELLING = 3  # bands of control from which on left-out errors say how a strip bends between the others
 MOST_GROUPS = 12  # bands or points that are left out in turn, spread over the strip
 MOST_POINTS = 300  # new points whose standard deviations are compared, spread likewise
 
@@ -59,7 +61,7 @@ class Choice:
     predicted: Witness  # standard deviations of new points
     left_out: Witness | None  # errors at control left out; None where the rest determines none of it
     left_out_by: str  # ``"band"`` or ``"point"``: what was left out at a time
-    p: float  # probability by chance of left-out errors that differ as much from band to band; NaN of a single band
+    excess: float  # those of the covariance over what it lets expect; NaN without any
 
     @property
     def contradicted(self) -> bool:
@@ -85,14 +87,12 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
     """Decide between the polynomial of a strip and its adjustment with its own covariance."""
     predicted = _predicted(oriented, polynomial, covariance)
     groups, by = _groups(oriented, polynomial)
-    left_out, p = _left_out(oriented, polynomial, covariance, groups)
+    left_out, excess = _left_out(oriented, polynomial, covariance, groups)
     taken = _of_ratio(predicted.ratio)
-    if left_out is not None and p < LEVEL:
-        if left_out.ratio < BETTER:
-            taken = COVARIANCE
-        elif left_out.ratio > 1 / BETTER:
-            taken = POLYNOMIAL
-    return Choice(taken=taken, predicted=predicted, left_out=left_out, left_out_by=by, p=p)
+    believed = excess <= MOST_EXCESS or len(np.unique(_bands(oriented))) < TELLING
+    if left_out is not None and not believed and left_out.ratio > 1 / BETTER:
+        taken = POLYNOMIAL
+    return Choice(taken=taken, predicted=predicted, left_out=left_out, left_out_by=by, excess=excess)
 
 
 def _of_ratio(ratio: float) -> str:
@@ -145,35 +145,27 @@ def _left_out(
     found = oriented.misclosures
     coordinates = [np.flatnonzero(np.isin(found.point, group)) for group in groups]
     coordinates = [rows for rows in coordinates if len(rows)]
+    if not coordinates:
+        return None, float("nan")
+    by_covariance = left_out_errors(covariance.system, coordinates)
     pairs = [
-        np.stack([_by_polynomial(oriented, polynomial, rows), others])
-        for rows, others in zip(coordinates, left_out_errors(covariance.system, coordinates), strict=True)
+        np.stack([_by_polynomial(oriented, polynomial, rows), each.errors])
+        for rows, each in zip(coordinates, by_covariance, strict=True)
     ]
     known = [number for number, pair in enumerate(pairs) if np.isfinite(pair).all()]
     if not known:
         return None, float("nan")
-    rows = np.concatenate([coordinates[number] for number in known])
-    height = found.axis[rows] == 2
+    height = found.axis[np.concatenate([coordinates[number] for number in known])] == 2
     squares = np.concatenate([pairs[number] for number in known], axis=1) ** 2
     mean = np.array([[_mean(row[~height]), _mean(row[height])] for row in squares])
     first, second = ((float(plan), float(up)) for plan, up in np.sqrt(mean))
-    relative = squares / np.where(height, mean[:, 1].mean(), mean[:, 0].mean())
-    # points of one band share the errors of the strip: the bands are what testifies
-    _, band = np.unique(_bands(oriented)[found.point[rows]], return_inverse=True)
-    gain = np.bincount(band, relative[0] - relative[1]) / np.bincount(band)
-    return Witness(first, second, len(known)), _p_value(gain)
+    expected = sum(len(by_covariance[number].errors) for number in known) * covariance.factor
+    excess = np.sqrt(sum(by_covariance[number].squares for number in known) / expected)
+    return Witness(first, second, len(known)), float(excess)
 
 
 def _mean(values: Floats) -> float:
     return float(values.mean()) if len(values) else float("nan")
-
-
-def _p_value(gain: Floats) -> float:
-    """Probability of gains whose mean differs from zero as much by chance."""
-    if len(gain) < 2:
-        return float("nan")
-    error = float(gain.std(ddof=1)) / np.sqrt(len(gain))
-    return t_p_value(float(gain.mean()) / error, len(gain) - 1) if error > 0 else 1.0
 
 
 def _by_polynomial(oriented: Oriented, polynomial: Polynomial, rows: Numbers) -> Floats:

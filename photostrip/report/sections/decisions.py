@@ -67,27 +67,23 @@ def choice_line(block: Document) -> str:
     text = f"{block['taken']}, {_why(block)}: standard deviations of new points {_figures(predicted)}"
     if left_out is None:
         return f"{text}; no control can be left out"
-    chance = "" if block["p"] is None else f", p {_probability(block['p'])}"
+    excess = f"; those of the covariance are {ratio(block['excess'])} times what it lets expect"
     by = counted(left_out["count"], block["left_out_by"])
-    return f"{text}; errors at {by} left out in turn {_figures(left_out, chance)}"
+    return f"{text}; errors at {by} left out in turn {_figures(left_out)}{excess}"
 
 
 def _why(block: Document) -> str:
     if block["contradicted"]:
-        return "because the errors at left-out control contradict the standard deviations"
+        return "because left-out control contradicts the standard deviations of the covariance"
     if block["taken"] == "polynomial":
         return f"which the covariance of the strip betters by less than {100 * CLOSE:.0f} %"
     return f"which betters the polynomial by {fixed(100 * (1 - block['predicted']['ratio']), 0)} %"
 
 
-def _figures(witness: Document, more: str = "") -> str:
+def _figures(witness: Document) -> str:
     """Give plan and height of both methods, and their ratio."""
     each = [f"{metres(witness[name]['plan'])}/{metres(witness[name]['height'])} m" for name in WEIGHED]
-    return f"{each[0]} with the polynomial, {each[1]} with the covariance (ratio {ratio(witness['ratio'])}{more})"
-
-
-def _probability(p: float) -> str:
-    return f"below {LEAST_PROBABILITY:g}" if p < LEAST_PROBABILITY else fixed(p, 3)
+    return f"{each[0]} with the polynomial, {each[1]} with the covariance (ratio {ratio(witness['ratio'])})"
 
 
 def _degree(block: Document) -> str:

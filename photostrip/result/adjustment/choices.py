@@ -35,7 +35,7 @@ def _choice(strip: StripResult, choice: Choice) -> Document:
         "predicted": _witness(choice.predicted),
         "left_out": None if choice.left_out is None else _witness(choice.left_out),
         "left_out_by": choice.left_out_by,
-        "p": choice.p,
+        "excess": choice.excess,
         "contradicted": choice.contradicted,
     }
     return record("choices", values)

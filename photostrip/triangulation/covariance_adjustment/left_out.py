@@ -1,13 +1,13 @@
 """Errors at control that takes no part, without adjusting again: all of it from the one eliminated system.
 
 Source: derived. With Pi the part of K^-1 (docs/precision.md, eq. 7) that belongs to a group of conditions and lambda
-their correlates, the group is predicted from everything else with the error Pi^-1 lambda.
+their correlates, everything else predicts the group with the error Pi^-1 lambda, whose covariance is Pi^-1.
 """
 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,11 +20,15 @@ if TYPE_CHECKING:
 UNCHECKED = 1e-9  # smallest eigenvalue of the scaled Pi of a group that the others determine
 
 
-def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[Floats]:
-    """Predict groups of control coordinates (rows of the misclosures), each from all the others.
+class LeftOut(NamedTuple):
+    """A group of control coordinates as all the others predict it."""
 
-    Returns strip minus given of each group, metres; infinite where the others do not determine it.
-    """
+    errors: Floats  # (k,): strip minus given, metres; infinite where the others do not determine it
+    squares: float  # e^T Pi e, for a variance factor of 1: expected to be k
+
+
+def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[LeftOut]:
+    """Predict groups of control coordinates (rows of the misclosures), each from all the others."""
     layout = found.layout
     rows = found.conditions.of_control(np.concatenate(groups))
     block, position = layout.block[rows], layout.position[rows]
@@ -38,9 +42,10 @@ def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[Floats]:
     ]
 
 
-def _predicted(cofactors: Floats, correlates: Floats) -> Floats:
+def _predicted(cofactors: Floats, correlates: Floats) -> LeftOut:
     size = np.sqrt(np.maximum(np.diag(cofactors), np.finfo(float).tiny))
     scaled = cofactors / size / size[:, None]
     if np.linalg.eigvalsh(scaled)[0] < UNCHECKED:
-        return np.full(len(correlates), np.inf)
-    return np.asarray(np.linalg.solve(scaled, correlates / size) / size, float)
+        return LeftOut(np.full(len(correlates), np.inf), np.inf)
+    errors = np.linalg.solve(scaled, correlates / size) / size
+    return LeftOut(np.asarray(errors, float), float(errors @ correlates))
