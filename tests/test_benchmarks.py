@@ -52,6 +52,17 @@ def test_strip_prints_seconds_memory_parts_and_growth() -> None:
 
 
 @pytest.mark.slow
+def test_auto_prints_the_best_and_what_was_taken() -> None:
+    out = printed("auto.py", "--seeds", "1", "--photos", "6", "--overlap", "60", "--errors", "none")
+    rows = re.findall(
+        r"^\| 6 \| 60 % \| [^|]+ \| none \| [^|]+ \| (\w+) \| (\d\.\d\d) \| (\d\.\d\d) \|", out, re.MULTILINE
+    )
+    assert len(rows) == 8
+    assert all(float(mean) <= 1.2 for _, mean, _ in nonempty(rows))
+    assert re.search(r"^auto within 1\.05 of the best method in \d of 8 cells", out, re.MULTILINE)
+
+
+@pytest.mark.slow
 def test_methods_prints_errors_and_ratios() -> None:
     out = printed("methods.py", "--seeds", "1", "--models", "6", "--bands", "3")
     (row,) = re.findall(r"^\| 6 \| 3 \|((?: \d+\.\d \|){6}) (\d\.\d\d) / (\d\.\d\d) \|", out, re.MULTILINE)

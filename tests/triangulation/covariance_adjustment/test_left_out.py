@@ -1,0 +1,46 @@
+"""Control left out of the solved system against the same strip solved without it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from photostrip.triangulation.covariance_adjustment import conditions, prediction, system
+from photostrip.triangulation.covariance_adjustment.left_out import left_out_errors
+from tests.derivatives import errors_of
+from tests.loops import nonempty
+from tests.triangulation.covariance_adjustment.test_covariance_adjustment import noisy
+
+pytestmark = pytest.mark.usefixtures("_no_findings")
+FACTOR = 1.3
+
+
+@pytest.mark.parametrize(("photos", "lap"), [(5, 62.0), (9, 80.0)])
+def test_groups_are_predicted_as_without_them(photos: int, lap: float) -> None:
+    result = noisy(photos, lap, 4)
+    (strip,), found = result.strips, errors_of(result)
+    control = found.control
+    given = strip.absolute.misclosures[control.point, control.axis]
+    parts = (found.errors, strip.of_photos.orientation, strip.of_photos.formed)
+    solved = system.system(found.errors, conditions.conditions(*parts, control, given), FACTOR)
+    groups = [np.flatnonzero(np.isin(control.point, rows)) for rows in ([0], [3, 4, 5], [7])]
+    for rows, left_out in nonempty(zip(groups, left_out_errors(solved, groups), strict=True)):
+        rest = np.setdiff1d(np.arange(len(given)), rows)
+        without = conditions.conditions(*parts, control.take(rest), given[rest])
+        (there,), _ = prediction.predict(system.system(found.errors, without, FACTOR), [control.take(rows).rows])
+        error = given[rows] - there.error[:, 0]
+        assert left_out.errors == pytest.approx(error, abs=1e-7)
+        variance = there.covariance[:, 0, 0] + control.variance[rows] / FACTOR
+        if len(rows) == 1:
+            assert left_out.squares == pytest.approx(error[0] ** 2 / variance[0])
+        assert left_out.squares > 0
+
+
+def test_control_that_alone_holds_the_strip_cannot_be_predicted() -> None:
+    result = noisy(4, 62.0, 3)
+    (strip,), found = result.strips, errors_of(result)
+    some = found.control.take(np.flatnonzero(found.control.point < 3))  # one band
+    given = strip.absolute.misclosures[some.point, some.axis]
+    wanted = conditions.conditions(found.errors, strip.of_photos.orientation, strip.of_photos.formed, some, given)
+    (left_out,) = left_out_errors(system.system(found.errors, wanted, 1.0), [np.arange(6)])
+    assert not np.isfinite(left_out.errors).any()
