@@ -124,11 +124,13 @@ def test_independent_models_prints_three_tables() -> None:
 @pytest.mark.slow
 def test_mutations_prints_changes_and_who_notices_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HYPOTHESIS_PROFILE", "quick")
-    out = printed("mutations.py", "--count", "2", "--seed", "1", "--room", "geometry", "--near", python=PYTHON)
-    rows = re.findall(r"^\| `geometry/\w+\.py:\d+` \| `.+` to `.+` in `.+` \| (.+) \|$", out, re.MULTILINE)
-    assert len(rows) == 2
-    assert any(row.startswith("`geometry/test_") for row in rows)
-    assert re.search(rf"^\| all \| 2 \| {sum(row != 'NOT noticed' for row in rows)} \|$", out, re.MULTILINE)
+    place = r"^\| `geometry/\w+\.py:\d+` \| `.+` to `.+` in `.+` \|"
+    listed = printed("mutations.py", "--count", "5", "--room", "geometry", "--list", python=PYTHON)
+    assert len(re.findall(rf"{place} \|$", listed, re.MULTILINE)) == 5
+    out = printed("mutations.py", "--count", "1", "--seed", "1", "--room", "geometry", "--near", python=PYTHON)
+    (test,) = re.findall(rf"{place} (.+) \|$", out, re.MULTILINE)
+    assert test.startswith("`geometry/test_")
+    assert re.search(r"^\| geometry \| 1 \| 1 \|\n\| all \| 1 \| 1 \|$", out, re.MULTILINE)
 
 
 def test_gross_errors_prints_two_tables_for_one_project() -> None:

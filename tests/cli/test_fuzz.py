@@ -25,7 +25,7 @@ def right(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, bytes]]:
 
 
 @pytest.mark.slow
-@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(seed=st.integers(0, 2**32), command=st.sampled_from(["check", "run"]))
 def test_a_damaged_project_ends_well(right: list[dict[str, bytes]], seed: int, command: str) -> None:
     case = damaged(right, Random(seed))
@@ -39,7 +39,7 @@ def right_blocks(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, byt
 
 
 @pytest.mark.slow
-@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(seed=st.integers(0, 2**32), command=st.sampled_from(["check", "run"]))
 def test_a_damaged_block_ends_well(right_blocks: list[dict[str, bytes]], seed: int, command: str) -> None:
     case = damaged(right_blocks, Random(seed))
@@ -57,12 +57,12 @@ def test_right_blocks_are_right(right_blocks: list[dict[str, bytes]], tmp_path: 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_quick_start")
 def test_the_benchmark_prints_its_table() -> None:
-    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "40", "7"]
+    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "12", "7"]
     out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert out.startswith("40 cases, seed 7")
+    assert out.startswith("12 cases, seed 7")
     assert "wrong: 0" in out
     numbers = [int(word) for line in out.splitlines() if line.startswith(("run", "check")) for word in line.split()[1:]]
-    assert sum(numbers) == 40
+    assert sum(numbers) == 12
 
 
 @pytest.mark.parametrize("command", ["check", "run"])

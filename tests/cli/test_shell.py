@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,6 @@ from photostrip.cli.jobs.manual import manual_pages
 from photostrip.cli.main import main
 from tests.cli.helps import FOLDER
 from tests.loops import nonempty
-from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -34,12 +32,9 @@ def pages() -> dict[str, str]:
 # --------------------------------------------------------------------------------------------------- completion
 
 
-def asked(folder: Path, shell: str, script: str) -> list[str]:
+def asked(photostrip: Path, shell: str, script: str) -> list[str]:
     """Run a script of a shell in which ``photostrip`` is this one; give the lines that it prints."""
-    command = folder / "photostrip"
-    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m photostrip "$@"\n', encoding="utf-8")
-    command.chmod(0o755)
-    environment = os.environ | {"PATH": f"{folder}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"PATH": f"{photostrip.parent}{os.pathsep}{os.environ['PATH']}"}
     done = subprocess.run([shell, "-c", script], env=environment, capture_output=True, text=True, check=False)
     assert done.stderr == ""
     return done.stdout.split()
@@ -66,20 +61,20 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
         ("report r --section ch", {"check"}),
     ],
 )
-def test_bash_completes(tmp_path: Path, words: str, expected: set[str]) -> None:
-    assert set(asked(tmp_path, "bash", BASH.format(words=words, count=len(words.split())))) == expected
+def test_bash_completes(forked: Path, words: str, expected: set[str]) -> None:
+    assert set(asked(forked, "bash", BASH.format(words=words, count=len(words.split())))) == expected
 
 
 @pytest.mark.skipif(shutil.which("fish") is None, reason="needs fish")
-def test_fish_completes(tmp_path: Path) -> None:
-    found = asked(tmp_path, "fish", "photostrip completion fish | source; complete -C 'photostrip co'")
+def test_fish_completes(forked: Path) -> None:
+    found = asked(forked, "fish", "photostrip completion fish | source; complete -C 'photostrip co'")
     assert {"compare", "completion"} <= set(found)
 
 
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="needs zsh")
-def test_zsh_reads_the_script(tmp_path: Path) -> None:
+def test_zsh_reads_the_script(forked: Path) -> None:
     script = 'autoload -U compinit; compinit -u -D; eval "$(photostrip completion zsh)"; echo $_comps[photostrip]'
-    assert asked(tmp_path, "zsh", script) == ["_photostrip_completion"]
+    assert asked(forked, "zsh", script) == ["_photostrip_completion"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])

@@ -8,6 +8,7 @@ proof against formulas written apart); nothing of the method is used in making t
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -467,8 +468,8 @@ def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
     ("bands", "degree", "limits"), [(3, "2", (4.8, 4.4, 9.2)), (4, "3", (2.9, 2.9, 5.9))], ids=["3 bands", "4 bands"]
 )
 def test_twenty_models_stay_within_their_limits(bands: int, degree: str, limits: Sequence[float]) -> None:
-    found = rms(strip_of(20, bands), 24, "similarity", degree, "auto")
-    # 24 strips know their rms to 6 to 10 %; benchmarks/accuracy.py takes more
+    found = rms(strip_of(20, bands), 12, "similarity", degree, "auto")
+    # 12 strips know their rms to 9 to 14 %; benchmarks/accuracy.py takes more
     assert (found[degree] < 1.1 * np.array(limits)).all()
     assert (found[degree] > 0.5 * np.array(limits)).all()
     assert (found["similarity"] > 1.5 * found[degree]).all()
@@ -505,6 +506,7 @@ def numbers(result: Result) -> dict[str, Floats]:
     return found
 
 
+@cache
 def noisy_project(crs: str = "EPSG:32633") -> tuple[Simulation, Inputs]:
     spec = Spec(
         ground=Ground(crs=crs),
@@ -513,6 +515,12 @@ def noisy_project(crs: str = "EPSG:32633") -> tuple[Simulation, Inputs]:
     )
     done = simulate(spec)
     return done, inputs_of(done)
+
+
+@cache
+def noisy_result(crs: str = "EPSG:32633", curvature: str = "auto") -> Result:
+    _, inputs = noisy_project(crs)
+    return triangulate(inputs, replace(Settings(), absolute=replace(Settings().absolute, earth_curvature=curvature)))
 
 
 def moved(control: ControlPoints, shift: Floats) -> ControlPoints:
@@ -524,8 +532,8 @@ def moved(control: ControlPoints, shift: Floats) -> ControlPoints:
 @pytest.mark.parametrize("curvature", ["auto", "model"])
 @pytest.mark.parametrize("change", ["wild", "slightly", "removed", "first", "plan only", "sure"])
 def test_a_check_point_never_influences_anything(change: str, curvature: str) -> None:
-    done, inputs = noisy_project("local" if curvature == "model" else "EPSG:32633")
-    asked = replace(Settings(), absolute=replace(Settings().absolute, earth_curvature=curvature))
+    crs = "local" if curvature == "model" else "EPSG:32633"
+    done, inputs = noisy_project(crs)
     control = done.control
     assert control.check.sum() == 12
     others = {
@@ -536,8 +544,9 @@ def test_a_check_point_never_influences_anything(change: str, curvature: str) ->
         "plan only": replace(control, use=control.use & ~(control.check[:, None] & np.array([False, False, True]))),
         "sure": replace(control, sigma=np.where(control.check[:, None], 1e-6, control.sigma)),
     }
-    before = numbers(triangulate(inputs, asked))
-    result = triangulate(replace(inputs, control=others[change]), asked)
+    alone = noisy_result(crs, curvature)
+    before = numbers(alone)
+    result = triangulate(replace(inputs, control=others[change]), alone.settings)
     after = numbers(result)
     assert before.keys() == after.keys()
     for name, values in before.items():
@@ -580,7 +589,7 @@ def coordinates(result: Result) -> dict[str, Floats]:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_order_of_rows_and_ids_does_not_matter(seed: int) -> None:
     _, inputs = noisy_project()
-    straight = coordinates(triangulate(inputs, Settings()))
+    straight = coordinates(noisy_result())
     mixed = coordinates(triangulate(shuffled(inputs, seed), Settings()))
     assert straight.keys() == mixed.keys()
     for name, values in straight.items():
@@ -596,7 +605,7 @@ def test_names_do_not_matter() -> None:
         observations=replace(inputs.observations, point_ids=tuple(names.values())),
         control=replace(inputs.control, ids=tuple(names[name] for name in inputs.control.ids)),
     )
-    before, after = (numbers(triangulate(each, Settings())) for each in (inputs, renamed))
+    before, after = numbers(noisy_result()), numbers(triangulate(renamed, Settings()))
     for name, values in before.items():
         np.testing.assert_array_equal(values, after[name], err_msg=name)
 
@@ -604,8 +613,7 @@ def test_names_do_not_matter() -> None:
 @pytest.mark.slow
 def test_twice_is_the_same() -> None:
     _, inputs = noisy_project()
-    first, second = (triangulate(inputs, Settings()) for _ in range(2))
-    assert document_of(first) == document_of(second)
+    assert document_of(triangulate(inputs, Settings())) == document_of(noisy_result())
 
 
 @pytest.mark.parametrize("backwards", [False, True])

@@ -35,7 +35,7 @@ def load(folder: str, files: dict[str, bytes]) -> None:
     assert before == {name: (Path(folder) / name).read_bytes() for name in files}
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(mutations)
 def test_mutated_text(changes: list[tuple[str, float, int, str]]) -> None:
     files = dict(MARKED_FILES)
@@ -92,7 +92,7 @@ PATHS = [
 ]
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(st.lists(st.tuples(st.sampled_from(PATHS), trees), min_size=1, max_size=3))
 def test_any_tree_at_any_key(changes: list[tuple[str, object]]) -> None:
     import json
