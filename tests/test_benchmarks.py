@@ -181,6 +181,17 @@ def test_ablation_prints_a_line_for_every_change() -> None:
 
 
 @pytest.mark.slow
+def test_gate_constants_prints_what_each_change_does() -> None:
+    kinds = ("--of", "principal distance off by 10", "corners")
+    out = printed("gate_constants.py", "1", "--workers", "1", "--only", "units.REACH ", *kinds)
+    assert out.startswith("1 mistakes, 1 found by run; 1 sound projects\n")
+    lines = re.findall(r"^units\.REACH (\S+) -> (\S+) +(.*)$", out, re.MULTILINE)
+    assert [line[:2] for line in lines] == [("1.2", "0.6")]  # points of sound photos reach farther
+    assert lines[0][2].startswith("- sound: corners, centre, random (run); - sound: corners, centre, random (check)")
+    assert "no difference: units.REACH 0.12 -> 0.24; units.REACH 0.12 -> 0.06; units.REACH 1.2 -> 2.4" in out
+
+
+@pytest.mark.slow
 def test_false_alarms_prints_a_row_for_each_layout() -> None:
     out = printed("false_alarms.py", "--count", "1", "--first", "7", "corners", "GNSS")
     assert len(re.findall(r"^(?:corners|blocks|strips)[\w ,]+ +1 +0", out, re.MULTILINE)) == 3

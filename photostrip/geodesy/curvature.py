@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 Ellipsoid = tuple[float, float]
 """Semi-major and semi-minor axis (a, b) of an ellipsoid of revolution, metres."""
 
+EARTH_RADIUS = 6_371_000.0
+"""Mean radius of the Earth, metres, where no ellipsoid is known or none is needed."""
+
 
 def eccentricity_squared(ellipsoid: Ellipsoid) -> float:
     """First eccentricity squared of an ellipsoid, e^2 = (a^2 - b^2) / a^2."""

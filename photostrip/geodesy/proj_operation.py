@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.geodesy.curvature import EARTH_RADIUS
+
 if TYPE_CHECKING:
     from pyproj import CRS, Transformer
 
     from photostrip.arrays import Floats
 
 
-EARTH_RADIUS = 6.37e6  # metres
 DECADE = 10.0  # years
 
 

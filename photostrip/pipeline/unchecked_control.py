@@ -33,7 +33,7 @@ def unchecked_control_notes(adjusted: AdjustedStrips, power: float) -> Iterator[
     for strip in adjusted.strips:
         screened = strip.screened_control
         ids = strip.control.ids
-        yield from _told(ids, screened.detectable, strip.control.sigma, strip.precision, f"strip {strip.strip.id}")
+        yield from _note_of(ids, screened.detectable, strip.control.sigma, strip.precision, f"strip {strip.strip.id}")
 
 
 def _of_bundle(bundle: Bundle, power: float) -> Iterator[Note]:
@@ -43,7 +43,7 @@ def _of_bundle(bundle: Bundle, power: float) -> Iterator[Note]:
         if group.kind == reliability.CONTROL:
             ids = [problem.point_name(number) for number in problem.control.point.tolist()]
             precision = _largest(bundle.start.strips)
-            yield from _told(ids, group.detectable(shift), group.sigma, precision, "the block")
+            yield from _note_of(ids, group.detectable(shift), group.sigma, precision, "the block")
 
 
 def _largest(strips: Sequence[StripResult]) -> tuple[float, float]:
@@ -51,7 +51,7 @@ def _largest(strips: Sequence[StripResult]) -> tuple[float, float]:
     return plan, height
 
 
-def _told(
+def _note_of(
     ids: Sequence[str], detectable: Floats, sigma: Floats, precision: tuple[float, float], where: str
 ) -> Iterator[Note]:
     size = detectable / np.hypot(sigma, [precision[0], precision[0], precision[1]])

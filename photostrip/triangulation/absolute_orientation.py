@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
 from photostrip.geometry.similarity import Similarity, collinearity, similarity_derivatives
@@ -47,7 +48,7 @@ class AbsoluteSettings:
     # ``"auto"`` or ``"none"``: the frames carry it (``local`` is truly Cartesian); ``"model"``: eq. 153, for plane map
     # coordinates of unknown projection given as ``local``; ``"image"``: in image space
     earth_curvature: str = "auto"
-    earth_radius: float = 6_371_000.0  # radius in metres for ``"model"``
+    earth_radius: float = EARTH_RADIUS  # radius in metres for ``"model"``
 
 
 @dataclass(frozen=True, eq=False)

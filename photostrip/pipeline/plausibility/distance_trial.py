@@ -17,8 +17,9 @@ from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control import control_heights
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from photostrip.camera import Camera
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
@@ -40,6 +41,7 @@ MOST_POINTS = (
     20_000  # image points of all strips formed for trials: of 20 photos with 200 points two starts are followed
 )
 FACTOR_RANGE = (0.2, 5.0)  # of the principal distance given
+FIX = "take it from the certificate"
 FIRST_FACTORS = (1.4, 0.7, 2.0, 0.5)  # tried when the pairs cannot be oriented at all
 
 
@@ -147,11 +149,19 @@ def _followed(
     )
 
 
+def other_distance(
+    camera: Camera, would_fit: float, message: str, fix: str, numbers: Evidence, strips: Sequence[str]
+) -> Finding:
+    """Name the principal distance that would fit: a small difference (P107) or a wrong one (P105)."""
+    given = camera.principal_distance
+    code = "P107" if abs(would_fit / given - 1.0) < control_heights.LEAST_SCALE_ERROR else "P105"
+    evidence_ = numbers | {"principal_distance_mm": given, "would_fit_mm": would_fit}
+    return found(code, message, fix, evidence_, strips=strips, key=f"cameras.{camera.name}.principal_distance")
+
+
 def _finding(strip: Strip, ratio: float, how: str, numbers: Evidence) -> list[Finding]:
     if abs(ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
         return []
     given = strip.camera.principal_distance
     message = f"strip {strip.id} {how} with a principal distance of {given * ratio:.1f} mm; {given:g} mm is given"
-    evidence_ = numbers | {"principal_distance_mm": given, "would_fit_mm": given * ratio}
-    key = f"cameras.{strip.camera.name}.principal_distance"
-    return [found("P105", message, "take it from the certificate", evidence_, strips=(strip.id,), key=key)]
+    return [other_distance(strip.camera, given * ratio, message, FIX, numbers, (strip.id,))]

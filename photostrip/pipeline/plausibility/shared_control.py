@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
 from photostrip.triangulation.plausibility import found
-from photostrip.triangulation.plausibility.control import control_heights
 from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList
 from photostrip.triangulation.plausibility.finding import ERROR
 
@@ -79,12 +79,5 @@ def _stretched(strip: Strip, stretch: StretchedHeights) -> Finding:
         f"wrong principal distance: {given * factor:.2f} mm would fit (standard deviation {sigma:.2g} mm), "
         f"{given:g} mm is given; no control was tested by itself"
     )
-    evidence_: Evidence = {
-        "heights_stretched": stretch.share,
-        "principal_distance_mm": given,
-        "would_fit_mm": given * factor,
-        "standard_deviation_mm": sigma,
-    }
-    code = "P107" if abs(stretch.share) < control_heights.LEAST_SCALE_ERROR else "P105"
-    key = f"cameras.{strip.camera.name}.principal_distance"
-    return found(code, message, "take it from the certificate", evidence_, strips=(strip.id,), key=key)
+    numbers: Evidence = {"heights_stretched": stretch.share, "standard_deviation_mm": sigma}
+    return other_distance(strip.camera, given * factor, message, FIX, numbers, (strip.id,))

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
 from photostrip.triangulation.bundle.common_errors import ALL, DISTANCE, DRIFT
 from photostrip.triangulation.bundle.observations.given_orientations import drift_columns
 from photostrip.triangulation.bundle.quality.reliability import CONTROL
 from photostrip.triangulation.plausibility import found
-from photostrip.triangulation.plausibility.control.control_heights import LEAST_SCALE_ERROR
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import Bundle
     from photostrip.triangulation.bundle.common_errors import CommonError
     from photostrip.triangulation.bundle.quality.self_calibration import Parameter
+    from photostrip.triangulation.plausibility.finding import Evidence
 
 SHOWN_SIGMAS = 4.0  # standard deviations from which a group, or a camera, is named
 KEY = "camera_positions.correction"
@@ -41,19 +42,17 @@ def _is_distance(each: Parameter) -> bool:
 
 
 def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
-    given = next(each.camera.principal_distance for each in inputs.strips if each.camera.name == parameter.camera)
-    would_fit = given + parameter.value
+    strips = [each for each in inputs.strips if each.camera.name == parameter.camera]
+    camera = strips[0].camera
+    would_fit = camera.principal_distance + parameter.value
     message = (
-        f"control and camera positions agree with the photos of camera {parameter.camera} at a principal distance of "
-        f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {given:g} mm is given. The adjustment "
-        "continued with the one that fits"
+        f"control and camera positions agree with the photos of camera {camera.name} at a principal distance of "
+        f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {camera.principal_distance:g} mm is given. "
+        "The adjustment continued with the one that fits"
     )
-    evidence = {"principal_distance_mm": given, "would_fit_mm": would_fit, "standard_deviation_mm": parameter.sigma}
-    fix = "take it from the certificate; if that agrees with what is given, name it in `self_calibration`"
-    key = f"cameras.{parameter.camera}.principal_distance"
-    strips = tuple(each.id for each in inputs.strips if each.camera.name == parameter.camera)
-    code = "P107" if abs(parameter.value) < LEAST_SCALE_ERROR * given else "P105"
-    return found(code, message, fix, evidence, strips=strips, key=key)
+    fix = f"{FIX}; if that agrees with what is given, name it in `self_calibration`"
+    numbers: Evidence = {"standard_deviation_mm": parameter.sigma}
+    return other_distance(camera, would_fit, message, fix, numbers, [each.id for each in strips])
 
 
 def _positions(bundle: Bundle, inputs: Inputs, error: CommonError) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.statistics import t_quantile
 from photostrip.triangulation.plausibility.control.control_fit import (
     KEPT_SIGMAS,
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.plausibility.finding import Evidence
 
 
-EARTH_RADIUS = 6.37e6  # metres
 FALSE_ALARM = 1e-5  # probability of a finding where there is nothing to find
 LEAST_SCALE_ERROR = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
 LEAST_OFFSET_SIGMAS = 8.0  # a-priori standard deviations of a height: a smaller constant does no harm

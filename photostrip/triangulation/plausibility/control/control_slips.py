@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.triangulation.plausibility.control.control_strip import AXES
 from photostrip.triangulation.plausibility.control.digits import slip
 from photostrip.triangulation.plausibility.finding import found
@@ -29,7 +30,6 @@ NEAR_SIGMAS = 3.5
 SOUND_SIGMAS = 4.5  # within which the other coordinates of a point with a slip of the pen lie
 RIDGE_SHARE = 1e-9  # of a variance: no computer knows them better
 UNKNOWN_HEIGHT_SIGMAS = 1e3  # standard deviations in plan: that of a height that is not given
-EARTH_RADIUS = 6.37e6  # metres
 HEIGHT = 2
 DOUBT = "; or a coordinate along the base is wrong on one of its photos"
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import PhotostripError
+from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.statistics import f_p_value
 from photostrip.triangulation.gross_errors.control.control_deletion import HEIGHT, adjust
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control.control_deletion import JointAdjustment
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
-EARTH_RADIUS = 6.37e6  # metres
 MORE_THAN_ALONE = 1.0 + 1e-6  # of what one point explains: a list may have one point only
 FALSE_ALARM = 1e-5  # probability of an error of all where there is none
 
