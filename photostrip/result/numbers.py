@@ -59,9 +59,10 @@ def micrometres(millimetres: ArrayLike) -> Plain:
 
 def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
     """Return the key that puts ``P2`` before ``P10``; equal numbers (``7``, ``07``) by their text."""
-    parts: list[str | tuple[int, str]] = [*DIGITS.split(name)]
+    split = DIGITS.split(name)
+    parts: list[str | tuple[int, str]] = [*split]
     # numbers by length, then by digits: an id may have more digits than int() takes
-    parts[1::2] = [(len(digits), digits) for digits in (part.lstrip("0") for part in DIGITS.findall(name))]
+    parts[1::2] = [(len(digits), digits) for digits in (part.lstrip("0") for part in split[1::2])]
     return parts, name
 
 

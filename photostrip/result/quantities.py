@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES, "gon": DEGREES, "rad": RADIANS}
 
 
+class Records(list[Document]):
+    """Records as they are written: what holds them takes them as they are."""
+
+
 def rounded_as(entry: Quantity, value: ArrayLike, unit: str = "") -> Plain:
     """Return a value, or an array of them, as its key is written; None for a number that is not finite."""
     decimals = DECIMALS_BY_UNIT[unit] if entry.unit_key else entry.decimals
@@ -48,21 +52,21 @@ def _record(table: Table, values: Mapping[str, Any]) -> Document:
 
 
 def _written(entry: Quantity | Table, value: Any, beside: Mapping[str, Any]) -> Plain:  # noqa: ANN401 (any value)
-    if value is None:
-        return None
+    if value is None or isinstance(value, Records):
+        return value
     if isinstance(entry, Quantity):
         return rounded_as(entry, value, beside.get(entry.unit_key, ""))
     return [_record(entry, each) for each in value] if isinstance(value, list) else _record(entry, value)
 
 
-def records(block: str, columns: Mapping[str, Any]) -> list[Document]:
+def records(block: str, columns: Mapping[str, Any]) -> Records:
     """Make the records of a block from its columns, rounded as their keys are described.
 
     A column is an array or a list, or a dictionary of columns where the record has parts; a text, a flag or None
     stands in every record.
     """
     size = next(len(column) for column in columns.values() if isinstance(column, list | tuple | np.ndarray))
-    return as_records({key: _cells(table_at(block)[key], column, size) for key, column in columns.items()})
+    return Records(as_records({key: _cells(table_at(block)[key], column, size) for key, column in columns.items()}))
 
 
 def as_records(columns: Mapping[str, Sequence[Plain]]) -> list[Document]:

@@ -11,7 +11,7 @@ from photostrip.result.numbers import PER_RADIAN, Document
 from photostrip.result.points.image_coordinates import refined_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from photostrip.pipeline import Result
     from photostrip.result.columns import Column
@@ -55,9 +55,9 @@ def refined_csv(result: Result) -> str:
         return ""
     listed = tables.refined_csv()
     form = ",".join("%s" if each.quantity.decimals is None else f"%.{each.quantity.decimals}f" for each in listed)
-    ids = {name: _cell(name) for name in (*found["photo"], *found["point"])}
-    cells = [[ids[name] for name in found["photo"]], [ids[name] for name in found["point"]]]
-    rows = zip(*cells, *(found[column.key] for column in listed[2:]), strict=True)
+    rows = zip(
+        _texts(found["photo"]), _texts(found["point"]), *(found[column.key] for column in listed[2:]), strict=True
+    )
     return "\n".join([_header(listed), *(form % row for row in rows)]) + "\n"
 
 
@@ -99,25 +99,34 @@ def _checked_rays(residuals: Iterable[Document]) -> Iterator[Document]:
 
 def _table(columns: Sequence[Column], rows: Iterable[Document]) -> str:
     """Write a table; an empty cell is a number that does not exist."""
-    cells = [(column.key, _writer(column.quantity)) for column in columns]
-    lines = [",".join([write(row.get(key)) for key, write in cells]) for row in rows]
-    return "\n".join([_header(columns), *lines]) + "\n"
+    listed = list(rows)
+    cells = [_cells(column.quantity, [row.get(column.key) for row in listed]) for column in columns]
+    return "\n".join([_header(columns), *map(",".join, zip(*cells, strict=True))]) + "\n"
 
 
 def _header(columns: Iterable[Column]) -> str:
     return ",".join(column.name for column in columns)
 
 
-def _writer(quantity: Quantity) -> Callable[[Any], str]:
-    """Return what writes a cell."""
+def _cells(quantity: Quantity, values: Sequence[Any]) -> list[str]:
+    """Write the cells of a column."""
     decimals = BY_UNIT_DECIMALS if quantity.unit_key else quantity.decimals
     if decimals is not None:
         form = f"%.{decimals}f"
-        return lambda value: "" if value is None else form % value
+        return ["" if value is None else form % value for value in values]
     if quantity.kind == "text":
-        return _cell
+        return _texts(values)
     whole = quantity.kind in {"count", "flag"}
-    return lambda value: "" if value is None else str(int(value)) if whole else str(value)
+    return ["" if value is None else str(int(value)) if whole else str(value) for value in values]
+
+
+def _texts(values: Sequence[str | Sequence[str] | None]) -> list[str]:
+    """Quote ids where CSV needs it; each is looked at once."""
+    known: dict[str, str] = {}
+    return [
+        known.get(value) or known.setdefault(value, _cell(value)) if isinstance(value, str) else _cell(value)
+        for value in values
+    ]
 
 
 def _cell(text: str | Sequence[str] | None) -> str:

@@ -11,7 +11,7 @@ from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
 from photostrip.pipeline.given_points import axes_of
 from photostrip.result.numbers import PER_RADIAN, Document, rms
-from photostrip.result.quantities import record, records
+from photostrip.result.quantities import Records, record, records
 from photostrip.statistics import binomial_p_value, chi2_quantile, normal_quantile
 
 if TYPE_CHECKING:
@@ -137,11 +137,11 @@ def precision_of(result: Result, found: Differences) -> Document:
         ]
         or _basis_of_singles(result),
         "points": {name: _summed(column, names) for name, column in zip(("plan", "height"), sigma.T, strict=True)},
-        "along": [
+        "along": Records(
             row
             for strip, photos in zip(result.strips, precision.photos, strict=True)
             for row in _along(result, strip, sigma, photos)
-        ],
+        ),
     }
     check = _check(result, found)
     return {"precision": record("precision", block | ({"check": check} if check else {}))}
