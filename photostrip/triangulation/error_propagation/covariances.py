@@ -159,8 +159,11 @@ def _by_photo(errors: StripErrors, by_component: Floats, images: Numbers) -> Flo
     padded = np.concatenate([none, by_component, none[:1]])
     photo = errors.images.photo[images]
     result = np.zeros((len(photo), 2, by_component.shape[2]))
-    for slot in range(SPAN):
-        result += errors.images.components[images, slot].transpose(0, 2, 1) @ padded[photo + slot]
+    for start in range(0, len(photo), ENTRIES):
+        some = slice(start, start + ENTRIES)
+        for slot in range(SPAN):
+            components = errors.images.components[images[some], slot]
+            result[some] += components.transpose(0, 2, 1) @ padded[photo[some] + slot]
     return result
 
 
