@@ -1,17 +1,17 @@
-"""How long a strip takes and how much memory: whole processes, the parts of the work, growth with the number of photos.
+"""How long runs take and how much memory: whole processes, growth with the number of photos, the parts of the work.
 
-Simulated film strips with about 30 points on a photo and three control points every five models. A whole process is
-timed from its start to its end, reading and writing included, by a small process of its own, so that nothing of this
-program counts for it. Parts are timed inside one process, as the command runs them, in seconds of computing: other work
-on the machine does not count. Of several repetitions the fastest counts. The numbers hold for the machine; ratios say
-more.
+Simulated film strips with about 30 points on a photo and, as users have them, one check point for each photo. A whole
+process is timed in seconds of computing, reading and writing included, by a small process of its own, so that nothing
+of this program counts for it. The unit is L, a bare ``import numpy, yaml, pyproj``, timed in turn with the rows: a busy
+machine makes both slower. Of several repetitions the fastest counts.
 
-Usage: python benchmarks/strip.py [--photos N] [--sizes N ...] [--repeat N]
+Usage: python benchmarks/strip.py [--rows NAME ...] [--photos N] [--sizes N ...] [--repeat N]
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import gc
 import json
 import os
@@ -21,7 +21,7 @@ import tempfile
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import wraps
+from functools import partial, wraps
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
@@ -36,6 +36,7 @@ limit_threads()  # as the command does, before numpy is imported
 import numpy as np  # noqa: E402
 
 from photostrip.formats.output.result_files import result_files  # noqa: E402
+from photostrip.formats.output.result_json import read_result  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of, project_files  # noqa: E402
 from photostrip.formats.text.writing import write_files  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
@@ -46,7 +47,7 @@ from photostrip.report import chosen_sections, title_of  # noqa: E402
 from photostrip.report.page import console  # noqa: E402
 from photostrip.result.document import document_of  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
-from photostrip.simulate.spec import Control, Flight, Points, Spec  # noqa: E402
+from photostrip.simulate.spec import Control, Flight, Gnss, Points, Spec  # noqa: E402
 from photostrip.triangulation import absolute_orientation  # noqa: E402
 from photostrip.triangulation.gross_errors.control import control_screening  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import screening  # noqa: E402
@@ -63,48 +64,76 @@ if TYPE_CHECKING:
 
 MEGABYTE = 1024  # kilobytes, in which the system counts
 PAIR_POINTS = 24
-FEW_BANDS = 5
-TARGETS = {
-    "seconds": 1.5,
-    "megabytes": 250.0,
-    "pair_us": 100.0,
-    "exponent": 1.1,
-    "short_strip": 0.5,
-    "start": 0.25,
-}
+UNIT = "import numpy, yaml, pyproj"
+EXPONENT = 1.05  # at most, of whole runs from the first to the last of the sizes
+POINT_KB = 2.0  # at most, for one more check point
 
 LAUNCHER = """
-import json, resource, subprocess, sys, time
-start = time.perf_counter()
+import json, resource, subprocess, sys
 code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
-seconds = time.perf_counter() - start
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
-print(json.dumps([code, seconds, used.ru_utime + used.ru_stime, used.ru_maxrss]))
+print(json.dumps([code, used.ru_utime + used.ru_stime, used.ru_maxrss]))
 """
 
 
 # ------------------------------------------------------------------------------------------------ what is run
 
 
-def spec(photos: int, bands: int | None = None) -> Spec:
+@dataclass(frozen=True)
+class Row:
+    """A whole process of the table."""
+
+    title: str
+    spec: Spec
+    most: float | None = None  # units of L at most
+    megabytes: float | None = None  # at most
+    command: str = "run"
+    adjustment: str = "polynomial"
+
+
+def strip_spec(photos: int, every: int, *, check: int | None = None, extra: int = 6) -> Spec:
     """Give a film strip 1:5000 to the north with 30 points on a photo: 3000 photos are 1300 km.
 
-    Bands of three control points stand at every fifth model, or as many bands as are asked for.
+    every: models from one band of three control points to the next.
+    check: check points; one for each photo where that is not said.
+    extra: points of each model beside the five rows of Gruber points.
     """
-    control = Control(every=5) if bands is None else Control(bands=bands)
     return Spec(
         name=f"{photos} photos",
         flight=Flight(photos=photos, end_lap_percent=62.0, heading_deg=0.0, scale=5000.0),
-        points=Points(rows=5, extra_per_model=6, reach_percent=75.0),
-        control=control,
+        points=Points(rows=5, extra_per_model=extra, reach_percent=75.0),
+        control=Control(every=every, check=photos if check is None else check),
     )
 
 
-def write_project(folder: Path, photos: int, bands: int | None = None) -> tuple[Path, float]:
-    """Write a simulated project; give its file and the mean number of points on a photo."""
-    simulation = simulate(spec(photos, bands))
-    write_files(folder, project_files(simulation))
-    return folder / "project.yaml", len(simulation.observations) / photos
+BLOCK = Spec(
+    name="block",
+    flight=Flight(photos=40, strips=10, end_lap_percent=62.0, heading_deg=0.0, scale=5000.0),
+    points=Points(rows=5, extra_per_model=6, reach_percent=90.0),
+    control=Control(check=100),
+    gnss=Gnss(use=True),
+)
+DENSE, SPARSE = strip_spec(1000, 5), strip_spec(1000, 200)
+ROWS = {
+    "short": Row("20 photos", strip_spec(20, 5), 1.8),
+    "dense": Row("1000 photos, band every 5 models, polynomial", DENSE, 6.0, 200.0),
+    "sparse": Row("1000 photos, band every 200 models, polynomial", SPARSE, 6.0, 200.0),
+    "dense-covariance": Row("1000 photos, every 5, covariance", DENSE, 8.0, 250.0, adjustment="covariance"),
+    "sparse-covariance": Row("1000 photos, every 200, covariance", SPARSE, 8.0, 250.0, adjustment="covariance"),
+    "dense-bundle": Row("1000 photos, every 5, bundle", DENSE, 8.0, 210.0, adjustment="bundle"),
+    "sparse-bundle": Row("1000 photos, every 200, bundle", SPARSE, 8.0, 210.0, adjustment="bundle"),
+    "long": Row("3000 photos, band every 600 models", strip_spec(3000, 600), 16.0, 400.0),
+    "block": Row("bundle block 10 x 40 with GNSS", BLOCK, adjustment="bundle"),
+    "check": Row("check of 1000 photos", DENSE, 2.0, command="check"),
+    "lidar-10000": Row("300 photos, 10 000 check points", strip_spec(300, 60, check=10_000, extra=40)),
+    "lidar-50000": Row("300 photos, 50 000 check points", strip_spec(300, 60, check=50_000, extra=180)),
+}
+
+
+def write_project(folder: Path, spec: Spec) -> Path:
+    """Write a simulated project; give its file."""
+    write_files(folder, project_files(simulate(spec)))
+    return folder / "project.yaml"
 
 
 # ------------------------------------------------------------------------------------------- whole processes
@@ -112,30 +141,42 @@ def write_project(folder: Path, photos: int, bands: int | None = None) -> tuple[
 
 @dataclass(frozen=True)
 class Spent:
-    """What a process took: seconds on the clock, seconds of computing, megabytes at the peak."""
+    """What a process took: seconds of computing, the unit in the same minute, megabytes at the peak."""
 
-    wall: float
     computing: float
+    unit: float
     megabytes: float
 
+    @property
+    def units(self) -> float:
+        """Seconds of computing in units of L."""
+        return self.computing / self.unit
 
-def process(arguments: Sequence[str], repeat: int) -> Spent:
-    """Run an interpreter several times; the fastest counts, and its memory."""
-    found, environment = [], {**os.environ, "PYTHONPATH": sys.path[0]}
+
+def process(arguments: Sequence[str]) -> tuple[float, float]:
+    """Run an interpreter: seconds of computing, and megabytes at the peak."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    launch = [sys.executable, "-S", "-c", LAUNCHER, sys.executable, *arguments]
+    environment["PYTHONPATH"] = sys.path[0]
+    done = subprocess.run(launch, capture_output=True, text=True, check=True, env=environment)
+    code, computing, kilobytes = json.loads(done.stdout)
+    if code:
+        message = f"{' '.join(arguments)} ended with {code}"
+        raise RuntimeError(message)
+    return computing, kilobytes / MEGABYTE
+
+
+def whole_run(project: Path, row: Row, repeat: int) -> Spent:
+    """Run the command as processes of their own, in turn with the unit; the fastest of each counts."""
+    arguments = ["-m", "photostrip", row.command, str(project)]
+    if row.command == "run":
+        arguments += ["-o", str(project.parent / "result"), f"--set=processing.adjustment={row.adjustment}"]
+    units, found = [process(["-c", UNIT])[0]], []
     for _ in range(repeat):
-        launch = [sys.executable, "-S", "-c", LAUNCHER, sys.executable, *arguments]
-        done = subprocess.run(launch, capture_output=True, text=True, check=True, env=environment)
-        code, wall, computing, kilobytes = json.loads(done.stdout)
-        if code:
-            message = f"{' '.join(arguments)} ended with {code}"
-            raise RuntimeError(message)
-        found.append(Spent(wall, computing, kilobytes / MEGABYTE))
-    return min(found, key=lambda spent: spent.wall)
-
-
-def run_process(project: Path, repeat: int) -> Spent:
-    """Run ``photostrip run PROJECT -o DIR`` as a process of its own."""
-    return process(["-m", "photostrip", "run", str(project), "-o", str(project.parent / "result")], repeat)
+        found.append(process(arguments))
+        units.append(process(["-c", UNIT])[0])
+    computing, megabytes = min(found)
+    return Spent(computing, min(units), megabytes)
 
 
 # ---------------------------------------------------------------------------------------- parts of the work
@@ -210,6 +251,8 @@ STAGES = (
 )
 WHOLE = "triangulate"
 FILES = "writing files"
+IMPORTS = "start and imports"
+ROOMS = ("cli.commands.run", "project.loading", "formats.output.result_files", "report.page.console", "result.document")
 
 
 @contextmanager
@@ -226,6 +269,7 @@ def no_collector() -> Iterator[None]:
 def parts(project: Path) -> dict[str, float]:
     """Do what the command does, once, and time each part."""
     watch = Stopwatch()
+    watch.seconds[IMPORTS] = process(["-c", f"import {', '.join(f'photostrip.{room}' for room in ROOMS)}"])[0]
     with no_collector():
         with watch.on("reading"):
             loaded = load_project(project)
@@ -237,9 +281,34 @@ def parts(project: Path) -> dict[str, float]:
             files = result_files(document, loaded.resolved)
         with watch.on(FILES):
             write_files(project.parent / "parts", files)
+        with watch.on("reading result.json again"):
+            read_result(str(project.parent / "parts" / "result.json"))
         with watch.on("report"):
             console.print_report(title_of(document), chosen_sections(document), StringIO(), None)
     return watch.seconds
+
+
+def near_limits(project: Path, repeat: int) -> dict[str, float]:
+    """Seconds that a library alone needs for parts of the work: what they could come near to."""
+    tables = [path.read_text() for path in sorted(project.parent.glob("*.csv"))]
+    files = {path.name: path.read_text() for path in sorted((project.parent / "parts").iterdir())}
+    document = json.loads(files["result.json"])
+
+    work: dict[str, Callable[[], object]] = {
+        "reading": lambda: [list(csv.reader(StringIO(text))) for text in tables],
+        "result as text": partial(json.dumps, document),
+        FILES: lambda: [(project.parent / "copy").write_text(text) for text in files.values()],
+        "reading result.json again": partial(json.loads, files["result.json"]),
+    }
+    found = {IMPORTS: min(process(["-c", UNIT])[0] for _ in range(repeat))}
+    for name, once in work.items():
+        seconds = []
+        for _ in range(repeat):
+            start = time.process_time()
+            once()
+            seconds.append(time.process_time() - start)
+        found[name] = min(seconds)
+    return found
 
 
 def fastest(rounds: Sequence[dict[str, float]]) -> dict[str, float]:
@@ -297,48 +366,44 @@ def line(title: str, value: str, target: str = "", ratio: float | None = None) -
     print(f"{title:<58}{value:>12}{tail}", flush=True)
 
 
-def print_start(repeat: int) -> float:
-    """Print how long it takes until something can happen; give the time of a bare interpreter."""
-    bare = process(["-c", "pass"], 3 * repeat)
-    line("python -c pass", f"{bare.wall:.3f} s")
-    for option in ("--version", "--help"):
-        spent = process(["-m", "photostrip", option], 3 * repeat)
-        over = spent.wall - bare.wall
-        line(f"photostrip {option}, over that", f"{over:.3f} s", "0.25 s", over / TARGETS["start"])
-    rooms = ("cli.commands.run", "project.loading", "formats.output.result_files", "report.page.console")
-    modules = ", ".join(f"photostrip.{room}" for room in rooms)
-    loaded = process(["-c", f"import {modules}"], 3 * repeat)
-    line("importing everything that a run needs, over that", f"{loaded.wall - bare.wall:.3f} s")
-    print()
-    return bare.wall
+def print_rows(folder: Path, names: Sequence[str], repeat: int) -> dict[str, Spent]:
+    """Print the table of whole processes; give what they took."""
+    print(f"{'whole processes':<50}{'seconds':>9}{'L':>8}{'at most':>9}{'MB':>7}{'at most':>9}")
+    found, projects = {}, {}
+    for name in names:
+        row = ROWS[name]
+        if id(row.spec) not in projects:
+            projects[id(row.spec)] = write_project(folder / name, row.spec)
+        found[name] = spent = whole_run(projects[id(row.spec)], row, repeat)
+        most, megabytes = (f"{limit:g}" if limit else "" for limit in (row.most, row.megabytes))
+        numbers = f"{spent.computing:>9.2f}{spent.units:>8.1f}{most:>9}{spent.megabytes:>7.0f}{megabytes:>9}"
+        print(f"{row.title:<50}{numbers}", flush=True)
+    print(f"{'L: ' + UNIT:<50}{min(spent.unit for spent in found.values()):>9.2f}\n", flush=True)
+    if {"lidar-10000", "lidar-50000"} <= set(found):
+        more = found["lidar-50000"].megabytes - found["lidar-10000"].megabytes
+        each = more * MEGABYTE / 40_000
+        line("memory of one more check point", f"{each:.2f} KB", f"{POINT_KB} KB", each / POINT_KB)
+        few, many = found["lidar-10000"], found["lidar-50000"]
+        line("exponent from 10 000 to 50 000 check points", f"{exponent((1, 5), (few.units, many.units)):.2f}")
+    return found
 
 
-def print_whole(title: str, spent: Spent, bare: float, limits: tuple[float, float | None]) -> None:
-    """Print one run of the command."""
-    seconds, megabytes = limits
-    line(f"{title}: whole run", f"{spent.wall:.3f} s", f"{seconds} s", spent.wall / seconds)
-    line("    of it computing", f"{spent.computing:.3f} s")
-    line("    in units of a bare interpreter", f"{spent.wall / bare:.0f}")
-    if megabytes is None:
-        line("    peak memory", f"{spent.megabytes:.0f} MB")
-    else:
-        line("    peak memory", f"{spent.megabytes:.0f} MB", f"{megabytes:.0f} MB", spent.megabytes / megabytes)
-
-
-def print_parts(found: dict[str, float], photos: int) -> None:
-    """Print the parts of the work with their shares."""
-    inner = [name for name, _, _ in STAGES if name in found]
+def print_parts(found: dict[str, float], limits: dict[str, float], photos: int) -> None:
+    """Print the parts of the work with their shares, and what a library alone needs for it."""
+    inner = [name for name in dict.fromkeys(name for name, _, _ in STAGES) if name in found]
     rest = found[WHOLE] - sum(found[name] for name in inner)
     outer = [name for name in found if name not in inner]
     total = sum(found[name] for name in outer)
-    print(f"\n{'parts, control every 5 models':<40}{'seconds':>10}{'share':>9}{'us a photo':>13}")
+    title = f"parts of {photos} photos, control every 5 models"
+    print(f"\n{title:<50}{'seconds':>10}{'share':>9}{'us a photo':>13}{'near limit':>13}")
     for name in outer:
         rows = [(name, found[name])]
         if name == WHOLE:
             rows += [(f"    {each}", found[each]) for each in inner] + [("    all else", rest)]
-        for title, seconds in rows:
-            print(f"{title:<40}{seconds:>10.4f}{seconds / total:>8.1%}{1e6 * seconds / photos:>13.1f}")
-    print(f"{'sum':<40}{total:>10.4f}{1:>8.1%}{1e6 * total / photos:>13.1f}\n", flush=True)
+        for each, seconds in rows:
+            limit = f"{limits[each]:.4f}" if each in limits else ""
+            print(f"{each:<50}{seconds:>10.4f}{seconds / total:>8.1%}{1e6 * seconds / photos:>13.1f}{limit:>13}")
+    print(f"{'sum':<50}{total:>10.4f}{1:>8.1%}{1e6 * total / photos:>13.1f}\n", flush=True)
 
 
 def exponent(sizes: Sequence[int], seconds: Sequence[float]) -> float:
@@ -347,49 +412,48 @@ def exponent(sizes: Sequence[int], seconds: Sequence[float]) -> float:
 
 
 def print_growth(folder: Path, sizes: Sequence[int], repeat: int) -> None:
-    """Print how the time grows with the number of photos."""
-    print(f"{'photos':>8}{'points a photo':>16}{'triangulate':>14}{'ms a photo':>12}{'whole run':>12}{'memory':>10}")
+    """Print how the time grows with the number of photos, six bands of control on each."""
+    print(f"{'photos':>8}{'triangulate':>14}{'ms a photo':>12}{'whole run':>12}{'memory':>10}")
     inside, whole = [], []
     for photos in sizes:
-        project, points = write_project(folder / str(photos), photos)
+        spec = strip_spec(photos, max(photos // 5, 1))
+        project = write_project(folder / str(photos), spec)
         inside.append(triangulation(load_project(project), repeat))
-        spent = run_process(project, repeat)
-        whole.append(spent.wall)
-        row = f"{photos:>8}{points:>16.1f}{inside[-1]:>12.3f} s{1e3 * inside[-1] / photos:>12.3f}{spent.wall:>10.3f} s"
+        spent = whole_run(project, Row("", spec), repeat)
+        whole.append(spent.units)
+        row = f"{photos:>8}{inside[-1]:>12.3f} s{1e3 * inside[-1] / photos:>12.3f}{spent.units:>10.1f} L"
         print(f"{row}{spent.megabytes:>7.0f} MB", flush=True)
     print()
     for title, seconds in (("triangulate", inside), ("whole run", whole)):
         value = exponent(sizes, seconds)
         name = f"exponent of {title} from {sizes[0]} to {sizes[-1]} photos"
-        line(name, f"{value:.2f}", f"{TARGETS['exponent']}", value / TARGETS["exponent"])
+        line(name, f"{value:.2f}", f"{EXPONENT}", value / EXPONENT)
 
 
 def main() -> None:
     """Read the options and print the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
-    parser.add_argument("--photos", type=int, default=1000, help="photos of the long strip (default 1000)")
-    parser.add_argument("--sizes", type=int, nargs="+", default=[100, 300, 1000, 3000], help="sizes for the growth")
+    parser.add_argument("--rows", nargs="*", choices=ROWS, default=list(ROWS), help="whole processes (default all)")
+    parser.add_argument("--photos", type=int, default=1000, help="photos of the strip of the parts (default 1000)")
+    parser.add_argument("--sizes", type=int, nargs="*", default=[300, 1000, 3000], help="sizes for the growth")
     parser.add_argument("--repeat", type=int, default=3, help="repetitions, of which the fastest counts (default 3)")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        bare = print_start(options.repeat)
-        short, _ = write_project(folder / "short", 20)
-        print_whole("20 photos", run_process(short, options.repeat), bare, (TARGETS["short_strip"], None))
-        project, points = write_project(folder / "long", options.photos)
-        title = f"{options.photos} photos x {points:.0f} points"
-        few, _ = write_project(folder / "few", options.photos, FEW_BANDS)
-        limits = TARGETS["seconds"], TARGETS["megabytes"]
-        print_whole(f"{title}, {FEW_BANDS} bands of control", run_process(few, options.repeat), bare, limits)
-        print_whole(f"{title}, control every 5 models", run_process(project, options.repeat), bare, limits)
-        print_parts(fastest([parts(project) for _ in range(options.repeat)]), options.photos)
-        whole, inner, alone = pairs_in_one_batch(options.photos, options.repeat)
-        text = f"relative orientation, {options.photos} pairs of {PAIR_POINTS} points in one batch"
-        line(text, f"{whole:.0f} us", "100 us", whole / TARGETS["pair_us"])
-        line("    of it the iteration", f"{inner:.0f} us")
-        line("    the same one pair after the other", f"{alone:.0f} us")
-        print()
-        print_growth(folder, options.sizes, options.repeat)
+        if options.rows:
+            print_rows(folder, options.rows, options.repeat)
+        if options.photos:
+            project = write_project(folder / "parts", strip_spec(options.photos, 5))
+            rounds = [parts(project) for _ in range(options.repeat)]
+            print_parts(fastest(rounds), near_limits(project, options.repeat), options.photos)
+            whole, inner, alone = pairs_in_one_batch(options.photos, options.repeat)
+            text = f"relative orientation, {options.photos} pairs of {PAIR_POINTS} points in one batch"
+            line(text, f"{whole:.0f} us")
+            line("    of it the iteration", f"{inner:.0f} us")
+            line("    the same one pair after the other", f"{alone:.0f} us")
+            print()
+        if options.sizes:
+            print_growth(folder, options.sizes, options.repeat)
 
 
 if __name__ == "__main__":
