@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.notes import Finding, Note
+    from photostrip.pipeline.choice import Choice
     from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
-    from photostrip.pipeline.strips.choosing import Choice
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.rejection import Rejection
     from photostrip.triangulation import absolute_orientation as absolute

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.pipeline.choice import Deformation
     from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.results import StripResult, StripShape
-    from photostrip.pipeline.strips.choosing import Deformation
     from photostrip.points import ControlPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.control_errors import Misclosures

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.pipeline.choice import COVARIANCE, POLYNOMIAL, Deformation
 from photostrip.pipeline.inputs import AUTO
 from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control
-from photostrip.pipeline.strips.choosing import COVARIANCE, POLYNOMIAL, Deformation, choose
+from photostrip.pipeline.strips.choosing import choose
 from photostrip.triangulation.polynomial import correction as polynomial
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ Source: derived; docs/method.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.pipeline.choice import POLYNOMIAL, Choice, Witness, method_of
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
 from photostrip.triangulation.error_propagation import control_errors, covariances
 from photostrip.triangulation.polynomial.terms import bands
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     Oriented = OrientedStrip[Any]
 
-POLYNOMIAL, COVARIANCE = "polynomial", "covariance"
 # left-out errors over what the covariance lets expect, beyond which its standard deviations are not to be believed
 MOST_EXCESS = 3.0
 TELLING = 3  # bands of control from which on left-out errors say how a strip bends between the others
@@ -38,65 +37,16 @@ MOST_GROUPS = 12  # bands or points that are left out in turn, spread over the s
 MOST_POINTS = 300  # new points whose standard deviations are compared, spread likewise
 
 
-@dataclass(frozen=True)
-class Witness:
-    """Root mean squares of both methods, in plan (of one coordinate) and in height, metres; NaN where nothing tells."""
-
-    polynomial: tuple[float, float]
-    covariance: tuple[float, float]
-    count: int  # points compared, or bands and points that were left out
-
-    @property
-    def ratio(self) -> float:
-        """Covariance over polynomial, the geometric mean of plan and height."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.exp(np.nanmean(np.log(np.divide(self.covariance, self.polynomial)))))
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What was taken, and what speaks for it."""
-
-    taken: str  # ``"polynomial"`` or ``"covariance"``
-    predicted: Witness  # standard deviations of new points
-    left_out: Witness | None  # errors at control left out; None where the rest determines none of it
-    left_out_by: str  # ``"band"`` or ``"point"``: what was left out at a time
-    excess: float  # those of the covariance over what it lets expect; NaN without any
-
-    @property
-    def contradicted(self) -> bool:
-        """Whether the errors at left-out control decided against the standard deviations."""
-        return self.taken != _of_ratio(self.predicted.ratio)
-
-
-@dataclass(frozen=True, eq=False)
-class Deformation:
-    """What the similarity leaves at the control, and who takes it out."""
-
-    polynomial: Polynomial | None = None  # shown also where the covariance was taken
-    covariance: CovarianceAdjustment | None = None  # where that was asked for or taken
-    choice: Choice | None = None  # None where nothing was to be chosen
-
-    @property
-    def correction(self) -> Polynomial | None:
-        """The polynomial, where it is what takes the deformation out."""
-        return self.polynomial if self.covariance is None else None
-
-
 def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Choice:
     """Decide between the polynomial of a strip and its adjustment with its own covariance."""
     predicted = _predicted(oriented, polynomial, covariance)
     groups, by = _groups(oriented, polynomial)
     left_out, excess = _left_out(oriented, polynomial, covariance, groups)
-    taken = _of_ratio(predicted.ratio)
+    taken = method_of(predicted.ratio)
     believed = excess <= MOST_EXCESS or len(np.unique(_bands(oriented))) < TELLING
     if left_out is not None and not believed and left_out.ratio > 1 / BETTER:
         taken = POLYNOMIAL
     return Choice(taken=taken, predicted=predicted, left_out=left_out, left_out_by=by, excess=excess)
-
-
-def _of_ratio(ratio: float) -> str:
-    return COVARIANCE if ratio < BETTER else POLYNOMIAL
 
 
 def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Witness:

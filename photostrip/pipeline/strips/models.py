@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geometry.similarity import Similarity
+    from photostrip.pipeline.choice import Deformation
     from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-    from photostrip.pipeline.strips.choosing import Deformation
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
     from photostrip.triangulation.independent_models.linking import StripModels

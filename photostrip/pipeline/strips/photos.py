@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geometry.similarity import Similarity
+    from photostrip.pipeline.choice import Deformation
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-    from photostrip.pipeline.strips.choosing import Deformation
     from photostrip.points import PhotoPoints
     from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment

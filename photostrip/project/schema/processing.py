@@ -143,8 +143,9 @@ class Processing(Section):
     """What is computed and how."""
 
     adjustment: Annotated[str, *choice(ADJUSTMENTS)] = key(
-        "`auto` (polynomial or covariance, by evidence, which is printed), `polynomial` (the strip method), `similarity` "
-        "(without a polynomial), `covariance` (each strip with its own covariance) or `bundle` (all strips rigorously)",
+        "`auto` (polynomial or covariance, by evidence, which is printed), `polynomial` (the strip method), "
+        "`similarity` (without a polynomial), `covariance` (each strip with its own covariance) or `bundle` (all "
+        "strips rigorously)",
         DEFAULTS.adjustment,
     )
     polynomial: Polynomial = key("Polynomial adjustment", Polynomial.model_construct())

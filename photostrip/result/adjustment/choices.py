@@ -9,7 +9,7 @@ from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
-    from photostrip.pipeline.strips.choosing import Choice, Witness
+    from photostrip.pipeline.choice import Choice, Witness
     from photostrip.result.numbers import Document
 
 
