@@ -21,7 +21,7 @@ from importlib import import_module
 from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
@@ -34,6 +34,7 @@ limit_threads()  # as the command does, before numpy is imported
 from benchmarks.gross_errors import AUTO, CLEAN, HEAD, KNOWN, Run, Tally, loses_anything, runs_of  # noqa: E402
 from photostrip.pipeline.strips.absolute import ScreenedStrip  # noqa: E402
 from photostrip.triangulation import gross_errors as search  # noqa: E402
+from photostrip.triangulation.bundle.settings import BundleSettings  # noqa: E402
 from photostrip.triangulation.gross_errors.control.control_screening import not_screened  # noqa: E402
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ NEAR_ONE = 0.9  # constants between it and 1 are probabilities
 
 
 def constants() -> Iterator[tuple[str, str, float]]:
-    """Numbers at module level in the search for gross errors: module, name, value."""
+    """Numbers at module level in the search for gross errors, and the level in a bundle: module, name, value."""
+    yield f"{BundleSettings.__module__}:{BundleSettings.__name__}", "level", BundleSettings.level
     for found in pkgutil.walk_packages(search.__path__, f"{search.__name__}."):
         for node in ast.parse(inspect.getsource(import_module(found.name))).body:
             for name in [each.id for each in getattr(node, "targets", ()) if isinstance(each, ast.Name)]:
@@ -53,19 +55,39 @@ def constants() -> Iterator[tuple[str, str, float]]:
                     yield found.name, name, value
 
 
+def functions(holder: object) -> Iterator[FunctionType]:
+    """Functions of a module, and methods of its classes and those that dataclasses make."""
+    for each in vars(holder).values():
+        found = getattr(each, "__func__", each)
+        if isinstance(found, FunctionType):
+            yield found
+        elif isinstance(found, type) and found.__module__ == getattr(holder, "__name__", ""):
+            yield from functions(found)
+
+
 def put(home: str, name: str, value: object) -> None:
-    """Replace what a module or a class (``module:class``) holds, also where it is imported by name."""
+    """Replace what a module or a class (``module:class``) holds, also where it is imported or a default."""
     holder = pkgutil.resolve_name(home)
     before = getattr(holder, name)
     setattr(holder, name, value)
-    for function in vars(holder).values():
-        if isinstance(function, FunctionType) and function.__defaults__:
-            function.__defaults__ = tuple(value if each is before else each for each in function.__defaults__)
-    for module in [each for key, each in sys.modules.items() if key.startswith("photostrip") and hasattr(each, name)]:
-        nodes = ast.walk(ast.parse(inspect.getsource(module)))
-        imports = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.module == home]
-        if any(each.name == name for node in imports for each in node.names):
+    holders = [holder]
+    for module in [each for key, each in sys.modules.items() if key.startswith("photostrip")]:
+        named = hasattr(module, name) and imported(module, home, name)
+        if named:
             setattr(module, name, value)
+        if named or getattr(module, home.rpartition(".")[2], None) is holder:
+            holders.append(module)
+    for function in [each for some in holders for each in functions(some)]:
+        defaults, by_name = function.__defaults__ or (), function.__kwdefaults__ or {}
+        function.__defaults__ = tuple(value if each is before else each for each in defaults)
+        function.__kwdefaults__ = {key: value if each is before else each for key, each in by_name.items()}
+
+
+def imported(module: ModuleType, home: str, name: str) -> bool:
+    """Whether a module imports a name from its home."""
+    nodes = ast.walk(ast.parse(inspect.getsource(module)))
+    imports = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.module == home]
+    return any(each.name == name for node in imports for each in node.names)
 
 
 def scaled(value: float, factor: float) -> float:

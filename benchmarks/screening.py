@@ -1,11 +1,13 @@
 """Gross errors in relative orientation: how many are found, how many good points are lost, how long it takes.
 
-Run it as ``python benchmarks/screening.py [repetitions]``. The first table repeats the published experiment: 34 models
+Run it as ``python benchmarks/screening.py [repetitions]``, or with ``--growth [PHOTOS ...]`` for the last table alone:
+how the time of the search grows with the number of photos. The first table repeats the published experiment: 34 models
 of 16 points, 44 errors of 0.1 to 0.5 mm. Reference rates of other programs stand in the last row of each block.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from dataclasses import dataclass, replace
@@ -34,7 +36,7 @@ from photostrip.triangulation.strip_formation.scale_transfer import StripFormati
 from photostrip.triangulation.strip_formation.strip import form_from_pairs  # noqa: E402
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -48,6 +50,7 @@ SIGMA_Q = 0.01  # mm, of a y parallax
 MODELS, COUNTS, SECOND = 34, (2, 2, 3, 3, 3, 3), 10  # models, points of the zones 1-6, models with a second error
 SIZES = (0.1, 0.2, 0.3, 0.4, 0.5)  # mm
 SOURCE_LIKE = RelativeSettings(screening="parallax+grubbs", grubbs_alpha=0.05, parallax_limit=0.20)
+GROWTH = (300, 1000, 3000)  # photos
 REPEATED = 15  # measurements of a time
 REFERENCE = "reference R3            51.9     41.7      6.4      1.1"
 POWER_BOUND = (
@@ -287,24 +290,42 @@ def times(pairs_of_strip: int = 999, points: int = 30, seed: int = 5) -> list[st
     return lines
 
 
-def strip_times(photos: int = 1000) -> list[str]:
-    """Milliseconds of processor time of every part of screening, 30 points on a photo, for shares of wrong points."""
+def long_strip(photos: int, share: float = 0.0) -> Inputs:
+    """Give a strip with 30 points on a photo, a share of the measurements wrong."""
     clean = Spec(
         flight=Flight(photos=photos, end_lap_percent=62.0, heading_deg=0.0, scale=5000.0),
         points=Points(rows=5, extra_per_model=6, reach_percent=75.0),
     )
-    count = len(simulate(clean).observations)
+    count = round(share * len(simulate(clean).observations)) if share else 0
+    errors = (GrossError("image", count=count),) if count else ()
+    return inputs_of(simulate(replace(clean, gross_errors=errors)))
+
+
+def fastest(inputs: Inputs, share: float) -> Floats:
+    """Milliseconds of the stages; what takes seconds is not repeated so often."""
+    repeated = REPEATED if share < 0.01 else 2  # noqa: PLR2004
+    return np.asarray(1000 * np.min([stages(inputs) for _ in range(repeated)], axis=0), float)
+
+
+def strip_times(photos: int = 1000) -> list[str]:
+    """Milliseconds of processor time of every part of screening, 30 points on a photo, for shares of wrong points."""
     lines = []
     for share in (0.0, 0.001, 0.01, 0.05):
-        errors = (GrossError("image", count=round(share * count)),) if share else ()
-        inputs = inputs_of(simulate(replace(clean, gross_errors=errors)))
-        repeated = REPEATED if share < 0.01 else 2  # noqa: PLR2004  what takes seconds is not repeated so often
-        best = np.min([stages(inputs) for _ in range(repeated)], axis=0)
-        orient, *parts = (1000 * best).tolist()
+        orient, *parts = fastest(long_strip(photos, share), share).tolist()
         columns = "".join(f"{part:12.1f}" for part in parts)
         row = f"{100 * share:9.1f}{orient:14.1f}{columns}{sum(parts):10.1f}{sum(parts) / orient:8.2f}"
         lines.append(f"{row}{sum(parts) / (photos - 1):12.2f}")
     return lines
+
+
+def strip_growth(sizes: Sequence[int]) -> Iterator[str]:
+    """Milliseconds of processor time of the search in strips of different lengths, and of it for each photo."""
+    for share in (0.0, 0.03):
+        stages(long_strip(20, share))  # what is imported first counts for none of them
+        for photos in sizes:
+            orient, *parts = fastest(long_strip(photos, share), share).tolist()
+            row = f"{100 * share:9.1f}{photos:10d}{orient:14.1f}{parts[0]:12.1f}{parts[1]:12.1f}"
+            yield f"{row}{sum(parts) / orient:8.2f}{sum(parts) / photos:13.3f}"
 
 
 def stages(inputs: Inputs) -> Floats:
@@ -332,7 +353,7 @@ def stages(inputs: Inputs) -> Floats:
     return np.array([orient, search, settle - form])
 
 
-def main(repetitions: int) -> None:
+def print_all(repetitions: int) -> None:
     """Print all tables."""
     print(f"Published experiment, 34 models x 16 points, 44 errors of 0.1-0.5 mm, {repetitions} repetitions")
     print("method          parallax %   later % missed % good lost per 44 errors")
@@ -360,5 +381,27 @@ def main(repetitions: int) -> None:
     print("\n".join(strip_times()))
 
 
+def print_growth(sizes: Sequence[int]) -> None:
+    """Print how the time grows."""
+    print(
+        "\nstrips with 30 points on a photo, ms of processor time, the fastest of several: relative orientation; pairs"
+    )
+    print("searched, rays judged and the strip formed again; both over the first, and for each photo")
+    print("  wrong %    photos   orientation       pairs        rays   ratio   ms a photo")
+    for row in strip_growth(sizes):
+        print(row, flush=True)
+
+
+def main() -> None:
+    """Print the tables that are asked for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("repetitions", type=int, nargs="?", default=200, help="repetitions of each table (default 200)")
+    parser.add_argument("--growth", type=int, nargs="*", metavar="PHOTOS", help="the table of the growth alone")
+    options = parser.parse_args()
+    if options.growth is None:
+        print_all(options.repetitions)
+    print_growth(options.growth or GROWTH)
+
+
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 200)
+    main()

@@ -154,19 +154,37 @@ def test_gross_errors_finds_nearly_all_and_loses_little(kind: str) -> None:
     assert int(lost) < 0.02 * int(good)
 
 
+@pytest.mark.slow
+def test_screening_prints_how_the_time_grows() -> None:
+    out = printed("screening.py", "--growth", "20", "40")
+    assert re.findall(r"^ +(\d\.\d) +(20|40)(?: +-?\d+\.\d){3} +-?\d+\.\d{2} +-?\d+\.\d{3}$", out, re.MULTILINE) == [
+        ("0.0", "20"),
+        ("0.0", "40"),
+        ("3.0", "20"),
+        ("3.0", "40"),
+    ]
+
+
 def test_ablation_changes_constants_where_they_are_imported_and_everything_it_switches_off_exists() -> None:
     program = """
 import sys
 from benchmarks import ablation
 from photostrip.triangulation.bundle.quality import reliability
-from photostrip.triangulation.gross_errors.rays import point_decisions, strip_network
+from photostrip.triangulation.gross_errors.pairs import deletion, global_test, pair_search
+from photostrip.triangulation.gross_errors.rays import point_decisions
+from photostrip.triangulation.bundle.settings import BundleSettings
 names = [f"{module.rpartition('.')[2]}.{name}" for module, name, _ in ablation.constants()]
-assert "strip_network.LEVEL" in names and "point_decisions.LIKELIER" in names
+assert {"settings:BundleSettings.level", "strip_network.LEVEL", "point_decisions.LIKELIER"} < set(names)
 ablation.put(reliability.__name__, "UNCONTROLLED", 0.25)
 assert point_decisions.UNCONTROLLED == reliability.UNCONTROLLED == 0.25
+ablation.put(global_test.__name__, "FIFTH_WRONG", 2.5)  # the default of a class method, and of a named argument
+assert global_test.ParallaxScatter.of.__defaults__ == (2.5,)
+assert pair_search.search.__kwdefaults__ == {"start": True, "sets": True, "spoiled": 2.5}
+ablation.put(deletion.__name__, "LARGEST", 5)  # of a method of another module
+assert pair_search._Log.without_sets.__defaults__ == (5,) and point_decisions.LARGEST == 5
 for make in list(ablation.changes().values()):
     make()
-assert strip_network.LEVEL == 0.0075
+assert BundleSettings.level == BundleSettings().level == 0.005
 assert ablation.scaled(0.999, 2.0) == 0.998 and ablation.scaled(3, 0.5) == 2 and ablation.scaled(0.2, 2.0) == 0.4
 """
     subprocess.run([sys.executable, "-c", program], check=True, cwd=ROOT)

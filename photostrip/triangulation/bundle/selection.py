@@ -37,6 +37,11 @@ class Selection:
             attitudes=np.isfinite(problem.attitudes.sigma),
         )
 
+    @property
+    def given(self) -> bytes:
+        """Which given coordinates take part."""
+        return b"".join(each.tobytes() for each in (self.control, self.positions, self.attitudes))
+
     def without(self, kind: str, row: int, axis: int) -> Selection:
         """Take one ray or one coordinate out."""
         flags = getattr(self, FIELDS[kind]).copy()

@@ -15,7 +15,7 @@ from photostrip.errors import GeometryError
 from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.settings import BundleSettings
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
@@ -149,20 +149,27 @@ class Limit(NamedTuple):
     """What a point is tested against."""
 
     value: float  # largest standardised residual of a coordinate
+    both: float  # the same of a point on two photos, which loses both rays
     alpha: float  # probability that the test of one good coordinate, or of rays that agree, rejects them
     unit: float  # standard deviation of unit weight in force
 
+    def of(self, rays: Numbers | int) -> Floats:
+        """Largest standardised residual by number of rays of the point."""
+        return np.where(rays == 2, self.both, self.value)
 
-def limit_of(solution: BundleSolution, settings: BundleSettings, established: int) -> Limit:
+
+def limit_of(solution: BundleSolution, settings: BundleSettings, established: int, share_of_both: float = 1.0) -> Limit:
     """Limit of standardised residuals: never sharper than the stated standard deviations allow.
 
     Without errors all tests together, as many as there are conditions, have the level q of the settings. With many
     errors q is the part of the rejections that are false: with k of m hypotheses rejected the next is tested at
     i q / (m + 1 - i (1 - q)), i = k + 1, and m - k conditions are left. Source: [Gavrilov 2009].
+
+    share_of_both: what the test of a point on two photos has of the level of one test.
     """
+    found = settings.test == "tau" and sigma0_test(solution).too_large
     share = settings.level * (established + 1)
     alpha = share / (max(solution.redundancy, 1) + share) if settings.alpha is None else settings.alpha
-    stated = Limit(normal_quantile(1 - alpha / 2), alpha, 1.0)
-    if settings.test != "tau" or not sigma0_test(solution).too_large:
-        return stated
-    return Limit(limit("tau", alpha, solution.redundancy), alpha, solution.sigma0)
+    test, unit = ("tau", solution.sigma0) if found else ("baarda", 1.0)
+    value, both = (limit(test, each, solution.redundancy) for each in (alpha, alpha * share_of_both))
+    return Limit(value=value, both=both, alpha=alpha, unit=unit)

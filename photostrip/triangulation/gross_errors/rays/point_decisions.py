@@ -71,7 +71,7 @@ def decide(point: PointRays, limit: Limit) -> Decision:
     tests = np.abs(pulled[: 2 * r]) / np.sqrt(np.maximum(share, UNCONTROLLED))
     value = float(tests[share > UNCONTROLLED].max(initial=0.0))
     size = np.full((r, 2), np.nan)
-    if value <= limit.value * limit.unit:
+    if value <= limit.of(r) * limit.unit:
         return Decision(out=np.zeros(r, bool), cause="", value=value, size=size)
     total, unit = float(gap @ weight @ gap), limit.unit**2
     left, sets, errors = _without(total, pulled, normal, [(ray,) for ray in range(r)])

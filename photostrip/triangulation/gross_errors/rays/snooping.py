@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 
 
 OUT_TO_ONE_MORE = 8
+BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +77,7 @@ class ScreenedBundle:
             selection=selection,
             solution=solution,
             precision=cofactors_of(solution),
-            limit=reliability.limit_of(solution, settings, _established(problem, selection)),
+            limit=reliability.limit_of(solution, settings, _established(problem, selection), BOTH_GO if rough else 1.0),
         )
 
     @cached_property
@@ -103,7 +104,7 @@ def screen_bundle(
     ``begin`` takes part at first, the rest is put in at the end where it fits; the rays ``kept`` (n,) stay in whatever
     the tests say.
 
-    rough: adjust as well as the tests need it.
+    rough: only the rays matter: adjust as well as their tests need it; two that only go together have ``BOTH_GO``.
     """
     if settings.screening == "none":
         return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)), settings)
@@ -139,6 +140,7 @@ class _Search:
         self.began |= {(CONTROL, row, axis): nothing(kind=CONTROL, row=row, axes=(axis,)) for row, axis in given}
         self.latest: dict[int, Rejection] = {}  # what was last said of rays outside
         self.back: set[int] = set()  # points that came back; what must go again stays out
+        self.decided = Selection.everything(problem)  # what took part when rays outside were decided on
         self.rounds = 0
         self.common: list[CommonError] = []
         self.next_trial = 0  # given coordinates that are out when a common error, tried in vain, is tried again
@@ -194,8 +196,7 @@ class _Search:
 
     def _without(self, done: ScreenedBundle, worst: list[Rejection]) -> ScreenedBundle:
         """Take observations out; points without which nothing would hold some photos stay, whatever the tests say."""
-        selection = done.selection
-        axes = [0 if each.kind == IMAGE else each.axes[0] for each in worst]
+        selection, axes = done.selection, [0 if each.kind == IMAGE else each.axes[0] for each in worst]
         for each, axis in zip(worst, axes, strict=True):
             selection = selection.without(each.kind, each.row, axis)
         before = self.problem
@@ -258,9 +259,10 @@ class _Search:
 
     def _doubtful(self, selection: Selection, value: Floats, limit: Limit) -> Floats:
         """Test values of points, by the worst of their rays; 0 where it is within the limit, or the user keeps one."""
-        worst = np.zeros(self.problem.points)
-        np.maximum.at(worst, self.problem.images.point[selection.images], value)
-        return np.where(self.spared | (worst <= limit.value), 0.0, worst)
+        point, worst = self.problem.images.point[selection.images], np.zeros(self.problem.points)
+        np.maximum.at(worst, point, value)
+        within = worst <= limit.of(np.bincount(point, minlength=len(worst)))
+        return np.where(self.spared | within, 0.0, worst)
 
     def _worst_nearby(self, selection: Selection, value: Floats) -> Flags:
         """Doubtful points of which no other on the same photos is worse."""
@@ -289,7 +291,7 @@ class _Search:
                 axes=(int(axis[place]),),
                 test=self.settings.test,
                 value=decision.value / limit.unit,
-                limit=limit.value,
+                limit=float(limit.of(len(rows))),
                 size=tuple(size[place].tolist()),
                 cause=decision.cause,
             )
@@ -300,8 +302,7 @@ class _Search:
         """Decide on rays of a point, linearised at a place near it."""
         images, solution, control = self.problem.images, done.solution, self.problem.control
         photo, sigma, r = images.photo[rows], images.sigma[rows], len(rows)
-        photos = KnownPhotos(solution.centers, solution.rotations, self._focal)
-        place = np.broadcast_to(xyz, (r, 3))
+        photos, place = KnownPhotos(solution.centers, solution.rotations, self._focal), np.broadcast_to(xyz, (r, 3))
         by_photo, by_point = derivatives(place, photos, photo)
         misfit = (self._measured(solution, rows) - project(place, photos, photo)) / sigma
         if not (np.isfinite(misfit).all() and np.isfinite(by_photo).all()):
@@ -329,10 +330,12 @@ class _Search:
 
     def fitting(self, done: ScreenedBundle) -> Selection | None:
         """Put back what fits the adjustment without it; None when there is nothing new."""
-        limit = done.limit
         point, images = self.problem.images.point, done.selection.images.copy()
-        xyz = self.problem.start.points.copy()
-        for number in np.unique(point[~images]).tolist():
+        limit, xyz = done.limit, self.problem.start.points.copy()
+        changed = np.full(self.problem.photos, done.selection.given != self.decided.given)
+        changed[self.problem.images.photo[images != self.decided.images]] = True
+        self.decided = done.selection
+        for number in np.unique(point[~images & changed[self.problem.images.photo]]).tolist():
             rows = self.rays_of(number)
             placed = images[rows].sum() > 1
             place = done.solution.points[number] if placed else self._meeting(done.solution, rows)

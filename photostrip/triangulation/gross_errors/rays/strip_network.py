@@ -32,10 +32,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 
-# of a whole strip, and of what is rejected the part that is not wrong: at 0.01 12.2 % of the wrong image points still
-# place a point and 0.009 % of the good ones are lost, here 11.9 and 0.016 %; at 0.02, in 60 strips from seed 30001,
-# 11.4 and 0.028 %, where here 0.022 % are lost
-LEVEL = 0.015
+LEVEL = 0.012  # of a whole strip, and of what is rejected the part that is not wrong
 
 
 def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> tuple[Rejection, ...] | None:

@@ -169,6 +169,14 @@ def test_a_majority_is_never_rejected() -> None:
     assert not whole.allows((0, 1, 3, 4, 6, 7, 9, 10, 12, 13, 15, 16, 18, 19))
 
 
+def test_a_share_below_half_the_digits_is_rounding() -> None:
+    """M_KK of a coordinate alone, and of one beside another deleted one."""
+    whole = adjusted_jointly(drawn(2))
+    for share, told in ((1.2e-8, False), (1.8e-8, True)):
+        matrix = np.diag(np.full(24, share))
+        assert np.isfinite(replace(whole, matrix=matrix).deletions([(3,)])[0].gain) == told
+
+
 @pytest.mark.parametrize(("points", "sections"), [(33, 1), (34, 2), (66, 2), (67, 3)])
 def test_long_strips_are_cut_in_sections_of_a_hundred_coordinates(points: int, sections: int) -> None:
     strip = drawn(1, points=points)

@@ -316,3 +316,33 @@ def test_the_scatter_is_that_of_the_strip_when_one_photo_is_worse() -> None:
     found = examined(spoiled(flown, noise))
     assert np.isnan(found.scatter.found)
     assert (~found.orientation.used).sum() <= 12
+
+
+@pytest.mark.parametrize(("scatter", "searched"), [(0.008, True), (0.013, False)])
+def test_parallaxes_that_scatter_by_a_hundredth_of_the_principal_distance_are_not_searched(
+    scatter: float, *, searched: bool
+) -> None:
+    focal = level(24, 1).pairs.focal
+    found = examined(level(24, 40, (4,) * 6, sigma=scatter * focal / np.sqrt(2)).pairs)
+    assert np.isfinite(found.scatter.found) == searched
+    assert found.masked.all() == (not searched)
+
+
+def test_the_number_of_pairs_at_a_time_is_for_the_memory_and_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    flown = level(25, 150, (3,) * 6)
+    rng = np.random.default_rng(26)
+    wrong = rng.permuted(np.tile(np.arange(18) < 4, (150, 1)), axis=1)
+    pairs = spoiled(flown, np.where(wrong, rng.uniform(0.1, 5.0, wrong.shape), 0.0))
+    sizes, of_sets = list[int](), deletion.search
+
+    def counted(residuals: Floats, *others: Any) -> Any:  # noqa: ANN401 (as they are)
+        sizes.append(len(residuals))
+        return of_sets(residuals, *others)
+
+    monkeypatch.setattr(deletion, "search", counted)
+    used = examined(pairs).orientation.used
+    assert 40 < max(sizes) <= 64
+    monkeypatch.setattr(pair_search, "AT_ONCE", 10)
+    sizes.clear()
+    assert (examined(pairs).orientation.used == used).all()
+    assert max(sizes) <= 10
