@@ -123,12 +123,13 @@ def planted(first: int, count: int, words: Sequence[str]) -> Iterator[Project]:
         done, seed = 0, first
         while done < count and seed < first + 40 * count:
             seed += 1
-            case = plausibility.sound(seed)
+            case = mistake.make(seed)
             made = mistake.plant(case)
             if made is None:
                 continue
             inputs, ids = made
-            settings = replace(case.settings, adjustment="bundle") if done % 2 else case.settings
+            settings = mistake.settings(case)
+            settings = replace(settings, adjustment="bundle") if done % 2 else settings
             yield Project(mistake.name, mistake, ids, frozenset(), inputs, settings, adjusted(inputs, settings))
             done += 1
 
@@ -170,9 +171,21 @@ def changes() -> dict[str, Callable[[], None]]:
     return found
 
 
+def put_to(text: str) -> None:
+    """Give a constant a value: ``control_fit.SETTLED=0``."""
+    what, _, value = text.partition("=")
+    for module, name, before in constants():
+        if f"{module.rpartition('.')[2]}.{name}" == what:
+            put(module, name, type(before)(float(value)))
+            return
+    raise SystemExit(f"no constant {what}")
+
+
 def outcomes(title: str, projects: Sequence[Project]) -> list[tuple[bool, bool]] | str:
     """Examine all projects with a changed gate, or say how it fails; nothing is put back."""
-    if title:
+    if "=" in title:
+        put_to(title)
+    elif title:
         changes()[title]()
     try:
         return [each.passes(again=IN_THE_RUN in title) for each in projects]
@@ -204,7 +217,9 @@ def main() -> None:
     parser.add_argument("count", type=int, nargs="?", default=1, help="projects of each kind (default 1)")
     parser.add_argument("--first-seed", type=int, default=600_000)
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one for each core)")
-    parser.add_argument("--only", nargs="+", default=("",), metavar="WORD", help="changes whose title has a word")
+    parser.add_argument(
+        "--only", nargs="+", default=("",), metavar="WORD", help="changes whose title has a word, or NAME=VALUE"
+    )
     parser.add_argument("--of", nargs="+", default=("",), metavar="WORD", help="mistakes and layouts that have a word")
     options = parser.parse_args()
     PROJECTS.extend(each for make in (planted, sound) for each in make(options.first_seed, options.count, options.of))
@@ -214,7 +229,9 @@ def main() -> None:
     of = Counter(not each.name.startswith(SOUND) for each in PROJECTS)
     found = sum(run for (_, run), each in zip(before, PROJECTS, strict=True) if each.mistake)
     print(f"{of[True]} mistakes, {found} found by run; {of[False]} sound projects", flush=True)
-    titles = [title for title in changes() if any(word in title for word in options.only)]
+    words = [word for word in options.only if "=" not in word]
+    titles = [title for title in changes() if any(word in title for word in words)]
+    titles += [word for word in options.only if "=" in word]
     same = []
     with get_context("fork").Pool(options.workers, maxtasksperchild=1) as pool:
         for title, after in zip(titles, pool.imap(changed, titles, chunksize=1), strict=True):

@@ -107,6 +107,25 @@ def sound(seed: int) -> Case:
     raise SystemExit(f"no strip can be made of seed {seed}")
 
 
+def block(seed: int) -> Case:
+    """Simulate a block of two or three strips over hills, without a mistake."""
+    rng = np.random.default_rng([9, seed])
+    for attempt in range(20):
+        spec = drawn(rng, seed * 20 + attempt)
+        if spec.ground.crs == "geocentric":
+            continue
+        flight = replace(spec.flight, strips=int(rng.integers(2, 4)), side_lap_percent=float(rng.uniform(25, 40)))
+        control = replace(spec.control, layout="bands", bands=3, use={"xyz": 1.0})
+        hills = replace(spec.terrain, relief=max(spec.terrain.relief, 0.05 * spec.flying_height))
+        spec = replace(spec, flight=flight, control=control, terrain=hills, points=replace(spec.points, rows=5))
+        try:
+            simulation = simulate(replace(spec, gross_errors=()))
+        except InputError:
+            continue
+        return Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
+    raise SystemExit(f"no block can be made of seed {seed}")
+
+
 def holds_both_ends(case: Case) -> bool:
     """Whether neither end lies farther beyond the control than a third of what it spans: to leave one out is a mistake.
 
@@ -299,6 +318,17 @@ def distance(case: Case) -> Planted | None:
     if not seen_in_heights(case, abs(factor - 1.0)):
         return None
     return with_camera(case, factor), NOBODY
+
+
+def distance_of_one_strip(case: Case) -> Planted | None:
+    """Give one strip of a block a camera of its own with a principal distance that is off by ten percent."""
+    off = int(case.rng.integers(len(case.inputs.strips)))
+    factor = float(case.rng.choice([0.9, 1.1]))
+    strips = list(case.inputs.strips)
+    camera = strips[off].camera
+    other = replace(camera, name="other", principal_distance=camera.principal_distance * factor)
+    strips[off] = replace(strips[off], camera=other)
+    return replace(case.inputs, strips=tuple(strips)), frozenset({strips[off].id})
 
 
 def distance_by_percents(case: Case) -> Planted | None:
@@ -633,6 +663,25 @@ def two_ids(case: Case) -> Planted | None:
     return replace(case.inputs, observations=copy), frozenset({o.point_ids[number], "again"})
 
 
+def same_id_in_two_strips(case: Case) -> Planted | None:
+    """Give a point of one strip the id of a point of another, a quarter of a base away at least."""
+    o, truth = case.inputs.observations, case.simulation.truth
+    given = set(case.inputs.control.ids)
+    strip_of = {photo: number for number, strip in enumerate(case.inputs.strips) for photo in strip.photos}
+    owner = np.array([strip_of[photo] for photo in o.photo_ids])[o.photo]
+    rays = np.array([np.bincount(o.point[owner == k], minlength=len(o.point_ids)) for k in (0, 1)])
+    free = np.array([name not in given for name in o.point_ids])
+    ones, others = (np.flatnonzero(free & (rays[k] > 1) & (rays[1 - k] == 0)) for k in (0, 1))
+    if not len(ones) or not len(others):
+        return None
+    one, other = int(case.rng.choice(ones)), int(case.rng.choice(others))
+    places = [truth.points.xyz[truth.points.ids.index(o.point_ids[each])] for each in (one, other)]
+    if np.linalg.norm(places[0] - places[1]) < case.spec.base / 4:
+        return None
+    changed = replace(o, point=np.where(o.point == other, one, o.point))
+    return replace(case.inputs, observations=changed), frozenset({o.point_ids[one]})
+
+
 def lies_there(case: Case, crs: str) -> bool:
     """Whether the control lies in the area of a coordinate reference system, or less than half of it away."""
     from pyproj import CRS, Transformer
@@ -751,6 +800,22 @@ def one_position_high(case: Case) -> Planted | None:
     return None if inputs is None else (inputs, frozenset({case.simulation.truth.photo_ids[row]}))
 
 
+def positions_shifted(case: Case) -> Planted | None:
+    """Give all camera positions a common offset, as of another datum or of an antenna."""
+    shift = case.rng.uniform(20.0, 60.0, 3) * case.rng.choice([-1, 1], 3) * max(*case.noise, 0.1)
+    degrees = [1e-5, 1e-5, 1.0] if kind_of(case) == "geographic" else 1.0
+    inputs = with_positions(case, lambda enu: enu + shift * degrees)
+    return None if inputs is None else (inputs, NOBODY)
+
+
+def positions_drifting(case: Case) -> Planted | None:
+    """Let all camera positions drift from the first photo to the last."""
+    shift = case.rng.uniform(40.0, 80.0, 3) * case.rng.choice([-1, 1], 3) * max(*case.noise, 0.1)
+    degrees = [1e-5, 1e-5, 1.0] if kind_of(case) == "geographic" else 1.0
+    inputs = with_positions(case, lambda enu: enu + np.linspace(0.0, 1.0, len(enu))[:, None] * shift * degrees)
+    return None if inputs is None else (inputs, NOBODY)
+
+
 def positions_exchanged(case: Case) -> Planted | None:
     """Exchange the positions of two neighbours."""
     row = int(case.rng.integers(len(case.photos) - 1))
@@ -770,6 +835,12 @@ class Mistake:
     name: str
     plant: Callable[[Case], Planted | None]
     codes: tuple[str, ...]
+    make: Callable[[int], Case] = sound
+    adjustment: str | None = None  # None: what a simulated project asks for
+
+    def settings(self, case: Case) -> Settings:
+        """Give the settings of the run that must tell it."""
+        return case.settings if self.adjustment is None else replace(case.settings, adjustment=self.adjustment)
 
 
 MISTAKES = (
@@ -785,6 +856,7 @@ MISTAKES = (
     Mistake("principal distance off by 10 or 1000", distance_by_ten, ("P105",)),
     Mistake("principal distance of another lens", distance, ("P105",)),
     Mistake("principal distance off by 1 to 3 %", distance_by_percents, ("P107", "P105")),
+    Mistake("principal distance of one strip off by 10 %", distance_of_one_strip, ("P105",), block, "bundle"),
     Mistake("two neighbours exchanged in the list", pair_exchanged, ("P201",)),
     Mistake("a photo listed elsewhere", moved, ("P201",)),
     Mistake("all photos out of order", shuffled, ("P201",)),
@@ -796,7 +868,10 @@ MISTAKES = (
     Mistake("their heights in feet", positions_in_feet, ("P205",)),
     Mistake("one given height off by half", one_position_high, ("P205",)),
     Mistake("two given positions exchanged", positions_exchanged, ("P206", "P207")),
+    Mistake("camera positions off by a common offset", positions_shifted, ("P208",), sound, "bundle"),
+    Mistake("camera positions that drift", positions_drifting, ("P208",), sound, "bundle"),
     Mistake("one id for two points", same_id, ("P301",)),
+    Mistake("one id for two points of two strips", same_id_in_two_strips, ("P301",), block),
     Mistake("two ids for one point", two_ids, ("P302",)),
     Mistake("axes of the control exchanged", axes_exchanged, ("P401", "P103")),
     Mistake("an axis of a local system backwards", left_handed, ("P401",)),
@@ -869,7 +944,7 @@ def main() -> None:
     only = [each for each in sys.argv[1:] if not each.isdecimal() and each != "-v"]
     if without:
         false_alarms(without, first)
-    print(f"{'mistake':<40} {'code':<10} {'strips':>6} {'check':>7} {'run':>7}")
+    print(f"{'mistake':<44} {'code':<10} {'strips':>6} {'check':>7} {'run':>7}")
     for mistake in MISTAKES:
         if not only or any(each in mistake.name for each in only):
             row(mistake, strips)
@@ -880,19 +955,19 @@ def row(mistake: Mistake, strips: int) -> None:
     done, by_check, by_run, seed = 0, 0, 0, 100_000
     while done < strips and seed < 100_000 + 12 * strips:
         seed += 1
-        case = sound(seed)
+        case = mistake.make(seed)
         planted = mistake.plant(case)
         if planted is None:
             continue
         inputs, ids = planted
-        before, after = told(inputs, case.settings)
+        before, after = told(inputs, mistake.settings(case))
         done += 1
         by_check += is_found(before, mistake, ids)
         by_run += is_found(after, mistake, ids)
         if not is_found(after, mistake, ids) and "-v" in sys.argv:
             print("  missed", seed, sorted(ids), after, case.spec)
     share = [f"{100 * each / max(done, 1):.1f} %" for each in (by_check, by_run)]
-    print(f"{mistake.name:<40} {'/'.join(mistake.codes):<10} {done:>6} {share[0]:>7} {share[1]:>7}", flush=True)
+    print(f"{mistake.name:<44} {'/'.join(mistake.codes):<10} {done:>6} {share[0]:>7} {share[1]:>7}", flush=True)
 
 
 if __name__ == "__main__":
