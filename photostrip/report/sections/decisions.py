@@ -61,6 +61,15 @@ def choice_rows(document: Document) -> Iterator[tuple[str, str]]:
         yield "chosen adjustment" if len(blocks) == 1 else f"adjustment of {block['strip']}", choice_line(block)
 
 
+def choices_in_short(document: Document) -> Iterator[tuple[str, str]]:
+    """Say in a line for each strip what was taken, with the ratios of both witnesses."""
+    blocks = document.get("choices", [])
+    for block in blocks:
+        left_out = "" if block["left_out"] is None else f", left-out errors {ratio(block['left_out']['ratio'])}"
+        text = f"{block['taken']}; covariance over polynomial: σ {ratio(block['predicted']['ratio'])}{left_out}"
+        yield "chosen adjustment" if len(blocks) == 1 else f"adjustment of {block['strip']}", text
+
+
 def choice_line(block: Document) -> str:
     """Say what was taken, why, and what both witnesses say of both methods."""
     predicted, left_out = block["predicted"], block["left_out"]

@@ -13,7 +13,7 @@ from photostrip.report.page.layout import USUAL, lay_out
 from photostrip.report.page.numbers import fixed, listed, metres, micrometres, percent
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.sections.check_points import check_section, cross_validation_section
-from photostrip.report.sections.decisions import choice_rows, chosen_degrees
+from photostrip.report.sections.decisions import choices_in_short, chosen_degrees
 from photostrip.report.sections.findings import cures_section
 from photostrip.report.sections.models import of_models
 from photostrip.report.sections.points import (
@@ -91,7 +91,7 @@ def _stages(document: Document) -> Rows:
     elif document["models"]:
         yield from _pairs(document)
     yield from _absolute(document["absolute"])
-    yield from choice_rows(document)
+    yield from choices_in_short(document)
     yield from _degrees([each for each in document.get("polynomials", []) if not not_taken(document, each["strip"])])
     for block in _worst_of(document.get("covariance", []), "sigma0", 1):
         of = f" of strip {block['strip']}, the largest" if len(document["covariance"]) > 1 else ""
