@@ -133,7 +133,7 @@ class Inputs:
 class Settings:
     """What is to be done; every part stands beside the operation it steers."""
 
-    adjustment: str = "polynomial"  # one of ``ADJUSTMENTS``
+    adjustment: str = "auto"  # one of ``ADJUSTMENTS``
     relative: RelativeSettings = field(default_factory=RelativeSettings)
     formation: StripFormationSettings = field(default_factory=StripFormationSettings)
     links: LinkSettings = field(default_factory=LinkSettings)

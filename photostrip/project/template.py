@@ -57,7 +57,7 @@ output:
 
 # What follows has defaults that suit most strips.
 # processing:
-#   adjustment: polynomial          # polynomial | similarity | covariance | bundle
+#   adjustment: auto                # auto | polynomial | similarity | covariance | bundle
 #   polynomial: {{degree: auto}}      # auto | 1 | 2 | 3
 #   covariance: {{distances: true}}   # false: the control alone
 #   earth_curvature: auto           # auto | model | none

@@ -398,4 +398,4 @@ def test_points_beyond_the_control_are_warned_of() -> None:
 @pytest.mark.parametrize(("photos", "warned"), [(26, False), (27, True)])
 def test_long_strips_are_warned_of(photos: int, warned: bool) -> None:
     done = simulate(Spec(flight=Flight(photos=photos), control=Control(every=5)))
-    assert ("long-strip" in codes(triangulate(inputs_of(done), Settings()))) == warned
+    assert ("long-strip" in codes(triangulate(inputs_of(done), Settings("polynomial")))) == warned

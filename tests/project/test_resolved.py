@@ -55,7 +55,7 @@ output:
     system: omega-phi-kappa
     unit: gon
 processing:
-  adjustment: polynomial
+  adjustment: auto
   polynomial:
     degree: auto
   covariance:

@@ -489,8 +489,7 @@ def test_ties_are_the_differences_of_strips_computed_alone() -> None:
 
 def test_the_polynomial_moves_the_control_by_the_stated_misclosures() -> None:
     """Misclosure plus polynomial at a control point is what is left there: plan along the strip's own axes."""
-    found = solved(case("local").inputs)
-    document = found.document
+    document = solved(case("local").inputs, Settings(adjustment="polynomial")).document
     (block,), (absolute,) = document["polynomials"], document["absolute"]
     axes, origin = np.array(absolute["axes"]).reshape(3, 3), np.array(absolute["origin"])
     points = {row["id"]: np.array(xyz(row)) for row in document["points"]}
@@ -510,7 +509,7 @@ def polynomial(block: Document, axis: str, x: float, y: float) -> float:
 
 def test_the_drift_found_is_the_slope_of_the_polynomial() -> None:
     inputs = case("local").inputs
-    document = solved(inputs, Settings(polynomial=replace(Settings().polynomial, degree="2"))).document
+    document = solved(inputs, Settings("polynomial", polynomial=replace(Settings().polynomial, degree="2"))).document
     (block,), (absolute,), (strip,) = document["polynomials"], document["absolute"], document["strips"]
     axes, origin = np.array(absolute["axes"]).reshape(3, 3), np.array(absolute["origin"])
     start, end = (axes.T @ (np.array(xyz(document["photos"][n])) - origin) for n in (0, -1))

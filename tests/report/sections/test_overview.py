@@ -71,7 +71,7 @@ def test_each_stage_has_one_line() -> None:
         "relative orientation",
         "scale transfer",
         "absolute orientation",
-        "polynomial",
+        "chosen adjustment",
     ]
     printed = to_text("", [stages], 100).splitlines()
     assert len(printed) == 1 + len(facts.rows)

@@ -61,9 +61,9 @@ def test_the_report_shows_the_tests() -> None:
 
 
 def test_a_polynomial_is_told_of_the_alternative() -> None:
-    """Three bands of control are few for a polynomial, whatever its degree; the covariance itself proposes nothing."""
-    for known in (case("projected"), adjusted()):
-        asked = known.result.strips[0].polynomial is not None
+    """Three bands of control are few for a polynomial, whatever its degree; covariance and `auto` propose nothing."""
+    for known in (solved(case("projected").inputs, Settings(adjustment="polynomial")), adjusted(), case("projected")):
+        asked = known.result.settings.adjustment == "polynomial"
         told = [note["message"] for note in known.document["notes"] if note["code"] == "covariance-proposed"]
         assert len(told) == asked
         text = " ".join(to_text(title_of(known.document), sections_of(known.document), 100).split())

@@ -543,7 +543,7 @@ def strip_result(flown: Flown, heading_deg: float, degree: str = "2", bands_: Se
     """Run a strip whose ground is turned so that it flies in a heading (as simulated: 90 degrees, east)."""
     ground = about_vertical(flown.xyz, 90.0 - heading_deg)
     control = control_points({name: ground[flown.at[name]] for name in flown.bands(*bands_)})
-    settings = RunSettings(polynomial=PolynomialSettings(degree))
+    settings = RunSettings("polynomial", polynomial=PolynomialSettings(degree))
     return triangulate(project(flown, control), settings)
 
 
