@@ -465,11 +465,14 @@ def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
 @pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("bands", "degree", "limits"), [(3, "2", (4.8, 4.4, 9.2)), (4, "3", (2.9, 2.9, 5.9))], ids=["3 bands", "4 bands"]
+    ("bands", "degree", "strips", "limits"),
+    [(3, "2", 24, (4.8, 4.4, 9.2)), (4, "3", 12, (2.9, 2.9, 5.9))],
+    ids=["3 bands", "4 bands"],
 )
-def test_twenty_models_stay_within_their_limits(bands: int, degree: str, limits: Sequence[float]) -> None:
-    found = rms(strip_of(20, bands), 12, "similarity", degree, "auto")
-    # 12 strips know their rms to 9 to 14 %; benchmarks/accuracy.py takes more
+def test_twenty_models_stay_within_their_limits(bands: int, degree: str, strips: int, limits: Sequence[float]) -> None:
+    found = rms(strip_of(20, bands), strips, "similarity", degree, "auto")
+    # 12 strips know their rms to 9 to 14 %, not well enough to compare with the similarity at three bands;
+    # benchmarks/accuracy.py takes more
     assert (found[degree] < 1.1 * np.array(limits)).all()
     assert (found[degree] > 0.5 * np.array(limits)).all()
     assert (found["similarity"] > 1.5 * found[degree]).all()
