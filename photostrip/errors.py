@@ -40,6 +40,7 @@ class Fault:
     key: str = ""  # path of the key in the project file (``cameras.RC30.format``) or name of the table column
     expected: str = ""
     fix: str = ""
+    points: tuple[str, ...] = ()  # points concerned
 
     def __str__(self) -> str:
         """Return the one-line form ``file:line:column: key: what, expected, fix``."""

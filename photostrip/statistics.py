@@ -8,6 +8,11 @@ from statistics import NormalDist
 
 from photostrip.distributions import beta_cdf, chi2_ppf, f_isf, f_sf, t_isf, t_sf
 
+# A sound result calls for a second look with this probability at the most, for whatever reason: sigma0, pairs, points
+# that the adjustment has not seen, given points that stand out, deformed models, control against a strip's covariance.
+# Each of these six has the same share of it.
+SECOND_LOOK = 0.05
+TEST_LEVEL = SECOND_LOOK / 6
 SIGMA_FROM_MEDIAN = 1.4826  # standard deviation over the median of |x|, of a normal distribution
 
 

@@ -132,7 +132,7 @@ two
 
 ```console exit=2
 $ photostrip rnu 2>&1
-error: no such command: 'rnu'; did you mean 'run'?; 'photostrip --help' lists what there is
+error: no such command: 'rnu'; did you mean 'run'? 'photostrip --help' lists what there is
 ```
 
 ```python

@@ -220,8 +220,8 @@ def test_debug_shows_the_traceback(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["rnu"], "no such command: 'rnu'; did you mean 'run'?; 'photostrip --help' lists what there is"),
-        (["--versoin"], "no such option: '--versoin'; did you mean '--version'?; 'photostrip --help'"),
+        (["rnu"], "no such command: 'rnu'; did you mean 'run'? 'photostrip --help' lists what there is"),
+        (["--versoin"], "no such option: '--versoin'; did you mean '--version'? 'photostrip --help'"),
         (["probe"], "'photostrip probe --help' shows how it is called."),
         (["probe", "4", "--bad"], "--bad"),
         (["probe", "four"], "Invalid value"),

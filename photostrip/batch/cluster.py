@@ -259,7 +259,7 @@ def _require_scheduler(address: str) -> None:
     except ValueError as error:
         raise _unreachable(address, str(error)) from None
     if not parts.scheme or not host or not port:
-        message = f"`dask:{address}` is no address of a scheduler"
+        message = f"`dask:{address}` is not the address of a scheduler"
         raise InputError(Fault(message, "executor", "--executor", expected="dask:tcp://HOST:PORT or dask:local"))
     try:
         socket.create_connection((host, port), timeout=CONNECT_SECONDS).close()

@@ -148,7 +148,7 @@ class LocalPool:
         code, task = worker.fate(), worker.task
         self.workers.remove(worker)
         if not worker.ready and code == NO_MEMORY:
-            message = f"no process of the batch starts with {self.megabytes:.0f} MB"
+            message = f"no process of the batch can start within {self.megabytes:.0f} MB of memory"
             raise InputError(Fault(message, "memory", "--memory", fix="give more, or use fewer processes (-j)"))
         if not worker.ready:
             self._false_starts += 1
@@ -180,4 +180,4 @@ def cause_of(code: int) -> str:
         name = signal.Signals(-code).name
     except ValueError:
         name = f"signal {-code}"
-    return f"killed by {name}" + (", by somebody or for want of memory" if name == "SIGKILL" else "")
+    return f"killed by {name}" + (": by somebody, or because memory ran out" if name == "SIGKILL" else "")

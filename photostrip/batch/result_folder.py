@@ -92,7 +92,7 @@ class ResultFolder:
         if content is not None and _is(Path(chosen.project), content):
             return None
         there = self.path / chosen.output
-        message = f"its result would replace that of another project, {record['project']} as seen from there"
+        message = f"its result would replace that of another project, {record['project']} (as a path from there)"
         return Fault(message, "output-taken", str(there), fix="choose another folder with -o, or use --force")
 
     def write(self, chosen: ChosenProject, answer: Answer) -> None:

@@ -82,7 +82,7 @@ def _projects(argument: str, faults: list[Fault]) -> list[str]:
         for each in matches:
             found += _below(each) if each.is_dir() else [str(each)] * (each.suffix in ENDINGS)
         if not found:
-            faults.append(Fault("no project fits this pattern", "no-project", argument))
+            faults.append(Fault("no project matches this pattern", "no-project", argument))
         return found
     return [str(path)]  # a file that is not there is reported as the fault of that project, among the others
 

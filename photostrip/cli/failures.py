@@ -48,12 +48,12 @@ def exit_code_of(error: BaseException, *, debug: bool) -> int:
             hint = "" if debug else "; --debug shows where"
             sys.stderr.write(f"internal error (a bug): {type(error).__name__}: {visible(str(error))}{hint}\n")
             return EXIT_INTERNAL
-    for message in messages:
-        sys.stderr.write(f"error: {visible(message)}\n")
+    lines = [f"error: {visible(message)}" for message in messages]
     if isinstance(error, InputError | GeometryError) and error.findings:
-        from photostrip.report.page.messages import finding_of, lines_of
+        from photostrip.report.page.messages import findings_of, lines_of
 
-        sys.stderr.writelines(f"{line}\n" for line in lines_of([finding_of(each) for each in error.findings]))
+        lines = lines_of(findings_of(error))
+    sys.stderr.writelines(f"{line}\n" for line in lines)
     return code
 
 

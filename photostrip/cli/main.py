@@ -94,8 +94,8 @@ def _refuse(first: str) -> int:
     kind = "option" if first.startswith("-") else "command"
     known = ["--version", "--help", "--debug"] if kind == "option" else list(COMMANDS)
     meant = get_close_matches(first, known, n=1)
-    hint = f"; did you mean '{meant[0]}'?" if meant else ""
-    _complain(f"no such {kind}: '{first}'{hint}; 'photostrip --help' lists what there is")
+    hint = f"did you mean '{meant[0]}'? " if meant else ""
+    _complain(f"no such {kind}: '{first}'; {hint}'photostrip --help' lists what there is")
     return EXIT_USAGE
 
 

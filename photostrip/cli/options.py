@@ -39,5 +39,7 @@ Silent = Annotated[bool, typer.Option("--quiet", "-q", envvar="PHOTOSTRIP_QUIET"
 Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 unless the verdict is GOOD.")]
 Verbose = Annotated[
     bool,
-    typer.Option("--verbose", "-v", envvar="PHOTOSTRIP_VERBOSE", help="Print long tables whole, and what is done."),
+    typer.Option(
+        "--verbose", "-v", envvar="PHOTOSTRIP_VERBOSE", help="Print whole tables, and say what is being done."
+    ),
 ]

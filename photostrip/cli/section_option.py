@@ -23,7 +23,10 @@ Sections = Annotated[
 Verbose = Annotated[
     bool,
     typer.Option(
-        "--verbose", "-v", envvar="PHOTOSTRIP_VERBOSE", help="Print every section with whole tables, and what is done."
+        "--verbose",
+        "-v",
+        envvar="PHOTOSTRIP_VERBOSE",
+        help="Print every section with whole tables, and say what is being done.",
     ),
 ]
 

@@ -87,7 +87,9 @@ def print_sections(title: str, sections: Iterable[Section], width: int | None = 
 def print_result(document: Document, form: Format, width: int | None, parts: Parts) -> None:
     """Print the report of a result; JSON is the content of result.json, GITHUB its notes as annotations."""
     if form is Format.TEXT:
-        print_sections(*_report(document, parts), width, markdown=False)
+        from photostrip.report.page.console import page_width
+
+        print_sections(*_report(document, parts, width or page_width()), width, markdown=False)
     else:
         text = report_text(document, form, width, parts, ascii_letters=ascii_only())
         sys.stdout.write(text)
@@ -112,17 +114,17 @@ def report_text(
         from photostrip.report.page.messages import annotated, result_findings
 
         return annotated(result_findings(document))
-    title, sections = _report(document, parts)
+    title, sections = _report(document, parts, width or layout.USUAL)
     if form is Format.MD:
         return text.to_markdown(title, sections, ascii_only=ascii_letters)
     return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_letters)
 
 
-def _report(document: Document, parts: Parts) -> tuple[str, tuple[Section, ...]]:
+def _report(document: Document, parts: Parts, width: int) -> tuple[str, tuple[Section, ...]]:
     """Return title and sections; the title stands over whole reports only."""
     from photostrip.report import chosen_sections, title_of
 
-    sections = chosen_sections(document, quiet=parts.quiet, everything=parts.verbose, names=parts.names)
+    sections = chosen_sections(document, quiet=parts.quiet, everything=parts.verbose, names=parts.names, width=width)
     return "" if parts.quiet or parts.names else title_of(document), sections
 
 
@@ -147,6 +149,7 @@ def form_of(path: Path, option: str = "--output") -> Format:
     """Return the format that the ending of a file name asks for; text for a name without one."""
     if path.suffix.lower() not in {*ENDINGS, ""}:
         known = ", ".join(ENDINGS)
-        message = f"no report is written as '{path.suffix}': the name may end in {known}, or give --format"
+        rather = ", or give --format" if option == "--output" else ""
+        message = f"nothing is written as '{path.suffix}': the name may end in {known}{rather}"
         raise typer.BadParameter(message, param_hint=option)
     return ENDINGS.get(path.suffix.lower(), Format.TEXT)

@@ -33,11 +33,14 @@ def named_rows(bad: Flags, ids: Sequence[str] | None) -> str:
 def require_rows(good: Flags, trouble: str, ids: Sequence[str] | None) -> None:
     """Refuse coordinates given by the user that cannot be used."""
     if not good.all():
-        raise InputError(Fault(f"{named_rows(~good, ids)}: {trouble}", code="ground-domain"))
+        raise InputError(Fault(f"{named_rows(~good, ids)}: {trouble}", code="ground-domain", points=_ids(~good, ids)))
 
 
 def require_reached(good: Flags, trouble: str, ids: Sequence[str] | None) -> None:
     """Refuse computed points that cannot be expressed in a frame."""
     if not good.all():
-        points = [ids[int(row)] for row in np.flatnonzero(~good)] if ids is not None else []
-        raise GeometryError(f"{named_rows(~good, ids)}: {trouble}", points=points, code="ground-domain")
+        raise GeometryError(f"{named_rows(~good, ids)}: {trouble}", points=_ids(~good, ids), code="ground-domain")
+
+
+def _ids(bad: Flags, ids: Sequence[str] | None) -> tuple[str, ...]:
+    return () if ids is None else tuple(ids[int(row)] for row in np.flatnonzero(bad))

@@ -39,6 +39,11 @@ _COMES_BACK = 1.0  # metres: a point that misses itself by more was never in the
 _CENTRE = 0.1  # of the radius: nearer to the centre of the body, latitude means nothing
 
 
+def plural(unit: str) -> str:
+    """Return the name of a unit for several: ``metres``, ``US survey feet``."""
+    return f"{unit.removesuffix('foot')}feet" if unit.endswith("foot") else f"{unit}s"
+
+
 @dataclass(frozen=True, eq=False)
 class GroundFrame:
     """One frame of ground coordinates, in the CRS's own units; made by ``tie_frames``."""
@@ -233,9 +238,10 @@ class GroundFrame:
         named = self.title not in {"unknown", self.spec.crs}
         text = f"{self.spec.name} ({self.title})" if named else self.spec.name
         text += f": {', '.join(self.axes)}"
-        text += f"; plan in {self.plan_unit}, " if self.kind in {"projected", "geographic"} else f"; {self.plan_unit}"
+        plan, height = plural(self.plan_unit), plural(self.height_unit)
+        text += f"; plan in {plan}, " if self.kind in {"projected", "geographic"} else f"; {plan}"
         if self.kind in {"projected", "geographic"}:
-            text += f"{self.spec.height} heights in {self.height_unit}"
+            text += f"{self.spec.height} heights in {height}"
         if self.spec.geoid_undulation is not None:
             text += f", geoid undulation {self.spec.geoid_undulation:+.3f} m"
         if self._geoid:

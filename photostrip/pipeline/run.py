@@ -120,5 +120,7 @@ def _adjusted(
     oriented = [orient_on_control(strip, control, ground.control) for strip in formed]
     screened = [reject_wrong_control(strip, settings) for strip in oriented]
     # 8 polynomials, or the strip's own covariance
+    level = settings.covariance.level / max(len(screened), 1)  # all strips together keep it
+    settings = replace(settings, covariance=replace(settings.covariance, level=level))
     strips = tuple(adjust(strip, settings) for strip in screened)
     return join_strips(strips, screened, observations, inputs.control, ground.output, settings)

@@ -83,7 +83,7 @@ def _stations(layout: ControlLayout, last: int) -> list[int]:
 def across(count: int, rows: int) -> list[int]:
     """Rows of the points of a band, spread evenly: the middle one, both edges, and so on."""
     if not 1 <= count <= rows:
-        message = f"a band of {counted(count, 'point')} does not fit {counted(rows, 'row')} of pass points"
+        message = f"a band of {counted(count, 'point')} does not fit into {counted(rows, 'row')} of pass points"
         raise InputError(Fault(message, "plan-place", key="layouts", expected=f"1 to {rows} points"))
     return [rows // 2] if count == 1 else sorted({round(place) for place in np.linspace(0, rows - 1, count).tolist()})
 

@@ -106,7 +106,9 @@ def _cameras_not_used(
     """Say which rows of a table of cameras are not used, and that the strip method uses none."""
     what = name.replace("_", " ")
     if project.processing.adjustment != "bundle":
-        message = f"the {what} are not used: the strip method cannot use them, `adjustment: bundle` can"
+        message = (
+            f"the {what} are not used: the strip method has no place for them; `processing.adjustment: bundle` has"
+        )
         yield Note("cameras-not-used", message, file=read.table.file, key=name)
         return
     others = [name for name in read.ids if name not in photos]

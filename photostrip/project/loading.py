@@ -18,7 +18,7 @@ from photostrip.project import conversion
 from photostrip.project.hints import hints
 from photostrip.project.models import check_models, measured_models
 from photostrip.project.pixel_size import with_pixel_sizes
-from photostrip.project.places import places_of
+from photostrip.project.places import of_points, places_of
 from photostrip.project.resolved import completed, text_of
 from photostrip.project.schema.cameras import Camera as CameraBlock
 from photostrip.project.schema.ground import CameraPositions as CameraPositionsBlock
@@ -90,7 +90,8 @@ class Project:
         try:
             yield
         except InputError as error:
-            placed = InputError(fault if fault.file else at_own_key(fault, self.tree) for fault in error.faults)
+            faults = [fault if fault.file or fault.key else of_points(fault, self.tables) for fault in error.faults]
+            placed = InputError(fault if fault.file else at_own_key(fault, self.tree) for fault in faults)
             placed.findings = self.placed(error.findings)
             raise placed from None
         except GeometryError as error:

@@ -12,6 +12,7 @@ from photostrip.project.yaml.document import Node, steps
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from photostrip.errors import Fault
     from photostrip.notes import Finding
     from photostrip.pipeline import ModelStrip, Strip
     from photostrip.project.tables import Tables
@@ -35,6 +36,12 @@ def places_of(
             continue
         place = tree.place_of(path)
         yield replace(each, file=place.file, line=place.line, column=place.column, key=key)
+
+
+def of_points(fault: Fault, tables: Tables) -> Fault:
+    """Return a fault that knows only its points with the place of the first of them in a control list."""
+    row = _given(fault.points, tables)
+    return fault if row is None else replace(fault, file=row[0], line=row[1])
 
 
 def _given(points: tuple[str, ...], tables: Tables) -> tuple[str, int] | None:

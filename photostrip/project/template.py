@@ -24,7 +24,7 @@ cameras:
     principal_distance:             # mm, from the calibration certificate
     principal_point: [0, 0]         # mm, in the system of the fiducial marks; for digital cameras from the centre
     # format: [230, 230]            # mm, width and height of the photo; needed for pixels
-    # pixel_size: 0.004             # mm; needed for pixels
+    # pixel_size: 0.004             # mm; needed for pixels without calibrated fiducial marks
     # Calibrated fiducial marks, mm, by mark; with fiducial_measurements below:
     # fiducials: {{F1: [106, -106], F2: [-106, -106], F3: [-106, 106], F4: [106, 106]}}
     # Lens distortion; `direction` says which coordinates the formula starts from:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geodesy.ground_frame import plural
 from photostrip.result.numbers import Document, rms
 from photostrip.result.quantities import record
 
@@ -35,9 +36,10 @@ CURVATURE = "earth curvature"  # named with the other ways to treat it
 def conventions_of(result: Result) -> Document:
     """Return the block ``conventions``: units, axes and signs of everything in the result."""
     frame = result.output
+    plan, height = plural(frame.plan_unit), plural(frame.height_unit)
     found: Document = {
         "lengths": "metres, unless the key ends in _mm or _um",
-        "x, y, z": f"{', '.join(frame.axes)}; plan in {frame.plan_unit}, heights in {frame.height_unit}",
+        "x, y, z": f"{', '.join(frame.axes)}; plan in {plan}, heights in {height}",
         "dx, dy, dz": f"adjusted minus given, metres, along {', '.join(frame.axes)}",
         "plan, height": "length of a difference in plan and difference in height, metres",
         "_um": "micrometres in the photo; of ground differences at photo scale",

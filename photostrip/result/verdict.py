@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
 from photostrip.notes import before, listed
 from photostrip.result.verification import verification_of
-from photostrip.statistics import chi2_quantile, f_p_value
+from photostrip.statistics import TEST_LEVEL, chi2_quantile, f_p_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,35 +23,26 @@ VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "faile
 
 SIGMA0_RATIO = 1.5  # of sigma0 to the stated standard deviation
 PAIR_RATIO = 1.5  # of a pair's sigma0 to that of the others, or to the stated one, when chance does not explain it
-PAIR_LEVEL = 0.01  # probability that any sound pair of the project is named
 PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
 # Rms of the control's residuals in units of their standard deviation; a long strip bends by that much.
 POOR_CONTROL = 5.0
-CHECK_LEVEL = 0.01  # probability that the check points of a sound result contradict its standard deviations
-DEFORMED_LEVEL = 0.002  # probability that models of a sound result seem to be deformed, any of them or all alike
 MANY_REJECTED = 0.05  # share of the points in pairs
 SMALLEST = 0.001  # probability that is written as a number
 PARTS = "plan", "height"
 TERMS = "twist", "bending"
 AREAS = {"plan": "ellipse", "height": "interval"}
+WRONG_CONTROL = {"control-rejected", "control-doubtful"}  # notes on control points that a finding may have named
 NAMED = 3  # pairs, photos, findings or notes of one kind that are named
 
 
 def verdict_of(document: Document) -> Document:
     """Return status, accuracy in a sentence and what to look at, from a document that has no verdict yet."""
-    failed = [*_tolerances(document), *_findings(document, "error")]
+    errors = list(_findings(document, "error"))
+    failed = [*_tolerances(document), *errors]
     look_at = [
         *failed,
         *_findings(document, "warning"),
-        *_control(document),
-        *_odd(document, "control"),
-        *_odd(document, "check"),
-        *_checks(document),
-        *_odd(document, "cross_validation"),
-        *_cross_validation(document),
-        *_sigma0(document),
-        *_pairs(document),
-        *_photos(document),
+        *(() if errors else _numbers(document)),  # of data that contradict themselves as a whole they say the same
         *_deformed(document),
         *_rejected(document),
         *_notes(document),
@@ -59,6 +50,19 @@ def verdict_of(document: Document) -> Document:
     verification = verification_of(document)
     status = FAILED if failed else LOOK if look_at else GOOD if verification["verified"] else UNVERIFIED
     return {"status": status, "accuracy": accuracy(document), **verification, "look_at": look_at}
+
+
+def _numbers(document: Document) -> Iterator[str]:
+    """Say where differences, residuals and standard deviations do not go together."""
+    yield from _control(document)
+    yield from _odd(document, "control")
+    yield from _odd(document, "check")
+    yield from _checks(document)
+    yield from _odd(document, "cross_validation")
+    yield from _cross_validation(document)
+    yield from _sigma0(document)
+    yield from _pairs(document)
+    yield from _photos(document)
 
 
 def exit_code(status: str, *, strict: bool) -> int:
@@ -86,10 +90,13 @@ def accuracy(document: Document) -> str:
     ]
     if not parts:
         return "no given point was measured"
-    out = [
-        f"{_whole(document, role)[name]['rms']:.3f} m in {name} with {listed(names)}"
+    odd = [
+        (listed(names), f"{_whole(document, role)[name]['rms']:.3f} m in {name}")
         for name in PARTS
         if (names := _standing_out(document, role, name))
+    ]
+    out = [
+        f"{' and '.join(text for _, text in group)} with {names}" for names, group in groupby(odd, key=itemgetter(0))
     ]
     return f"rms {' and '.join(parts)} at {at[role]}" + (f"; {' and '.join(out)}" if out else "")
 
@@ -162,16 +169,23 @@ def _without_rejected(row: Document) -> Document:
 
 
 def _odd(document: Document, role: str) -> Iterator[str]:
-    """Name the points that do not go with the others, in plan and in height, and that no finding has named."""
-    named = {point for each in _open_findings(document) for point in each["points"]}
-    what = "control point {}, left out," if role == "cross_validation" else f"{role} point {{}}"
-    for name in PARTS:
-        for row in _rows(document, role):
-            if name in row["stands_out"] and row["id"] not in named:
-                yield (
-                    f"{what.format(row['id'])} stands out: {abs(row[name]):.3f} m in {name}, "
-                    f"the others have an rms of {headline_rms(document, role, name)['rms']:.3f} m"
-                )
+    """Name the points that do not go with the others, in plan and in height, and that nothing else has named."""
+    named = {point for each in (*_open_findings(document), *_on_control(document)) for point in each["points"]}
+    odd = [row for row in _rows(document, role) if row["stands_out"] and row["id"] not in named]
+    if not odd:
+        return
+    sizes = [
+        f"{row['id']} ({', '.join(f'{abs(row[part]):.3f} m in {part}' for part in row['stands_out'])})" for row in odd
+    ]
+    others = " and ".join(
+        f"{headline_rms(document, role, part)['rms']:.3f} m in {part}"
+        for part in PARTS
+        if any(part in row["stands_out"] for row in odd)
+    )
+    left_out = ", left out," if role == "cross_validation" else ""
+    noun, verb = ("point", "stands") if len(odd) == 1 else ("points", "stand")
+    who = f"{'control' if left_out else role} {noun} {listed(sizes)}{left_out} {verb} out"
+    yield f"{who}; the others have an rms of {others}"
 
 
 def _checks(document: Document) -> Iterator[str]:
@@ -184,7 +198,7 @@ def _checks(document: Document) -> Iterator[str]:
         return
     parts = [(name, check[name]) for name in PARTS if check[name]["count"]]
     chances = [part["p"] for _, part in parts] + [test["p"] for test in check["tests"]]
-    if chances and min(chances) < CHECK_LEVEL / len(chances):
+    if chances and min(chances) < _unseen_level(document) / len(chances):
         said = [
             f"in {name} {part['rms']:.1f} times, {part['inside_95']} of {part['count']} inside the 95 % {AREAS[name]}"
             for name, part in parts
@@ -198,7 +212,7 @@ def _checks(document: Document) -> Iterator[str]:
 def _cross_validation(document: Document) -> Iterator[str]:
     """Say when control that was left out contradicts the standard deviations of the points."""
     found = document.get("cross_validation")
-    if found and found["p"] is not None and found["p"] < CHECK_LEVEL:
+    if found and found["p"] is not None and found["p"] < _unseen_level(document):
         said = [
             f"in {name} {part['ratio']:.1f} times, {part['inside_95']} of {part['count']} inside the 95 % {AREAS[name]}"
             for name in PARTS
@@ -210,6 +224,12 @@ def _cross_validation(document: Document) -> Iterator[str]:
         )
 
 
+def _unseen_level(document: Document) -> float:
+    """Return the level of the test of the check points, or of the control left out in turn; they share it."""
+    both = "cross_validation" in document and any(_counts(document, "check"))
+    return TEST_LEVEL / 2 if both else TEST_LEVEL
+
+
 def _percent(chance: float) -> str:
     return f"{100 * chance:.1f} %" if chance >= SMALLEST else f"below {100 * SMALLEST:g} %"
 
@@ -219,7 +239,7 @@ def _sigma0(document: Document) -> Iterator[str]:
     found, given = summary["sigma0_um"], summary["sigma_given_um"]
     if found is None or not given or found <= SIGMA0_RATIO * given:
         return
-    if (found / given) ** 2 > chi2_quantile(1 - PAIR_LEVEL, summary["redundancy"]) / summary["redundancy"]:
+    if (found / given) ** 2 > chi2_quantile(1 - TEST_LEVEL, summary["redundancy"]) / summary["redundancy"]:
         kind = "model" if summary.get("model_scale") else "image"
         yield (
             f"the {kind} coordinates are {found / given:.1f} times worse than stated: sigma0 {found:.1f} µm, "
@@ -233,7 +253,7 @@ def _pairs(document: Document) -> Iterator[str]:
     # said of the whole project already, or explained by what the photos have in common
     quiet = any(True for _ in _sigma0(document)) or bool(document.get("bundle", {}).get("calibration"))
     pairs = [model for model in document["models"] if model["sigma0_um"] is not None]
-    level = PAIR_LEVEL / max(2 * len(pairs), 1)  # two tests of each pair
+    level = TEST_LEVEL / max(2 * len(pairs), 1)  # two tests of each pair
     squares = sum(pair["redundancy"] * pair["sigma0_um"] ** 2 for pair in pairs)
     redundancy = sum(pair["redundancy"] for pair in pairs)
     odd = []
@@ -258,12 +278,14 @@ def _pairs(document: Document) -> Iterator[str]:
 def _deformed(document: Document) -> Iterator[str]:
     """Name what all models have in common, then the models that are bent or twisted beyond chance."""
     for name, common in document.get("common_deformation", {}).items():
-        if common["p"] is not None and common["p"] < DEFORMED_LEVEL / 2:  # twist and bending
+        if (
+            common["p"] is not None and common["p"] < TEST_LEVEL / 4
+        ):  # twist and bending, of all models and of single ones
             yield (
                 f"{common['models']} models are deformed alike ({name}): {common['at_corner_m']:+.3f} m at a corner "
                 f"against the middle in the mean, t = {common['t']:.1f}; a lens, the film or the principal distance"
             )
-    odd = [row for row in document.get("deformations", []) if row.get("p", 1.0) < DEFORMED_LEVEL]
+    odd = [row for row in document.get("deformations", []) if row.get("p", 1.0) < TEST_LEVEL / 2]
     odd.sort(key=lambda row: -max(abs(row[name]["at_corner_m"]) for name in TERMS))
     for row in odd[:NAMED]:
         name = max(TERMS, key=lambda name: abs(row[name]["t"]))
@@ -304,18 +326,30 @@ def _open_findings(document: Document) -> list[Document]:
 
 
 def _findings(document: Document, severity: str) -> Iterator[str]:
-    """Name what the data say against themselves and nobody has accepted."""
+    """Name what the data say against themselves and nobody has accepted, and whether it was used."""
+    out = {row["id"] for row in document["control"] if row.get("rejected", "")}
     open_ones = [each for each in _open_findings(document) if each["severity"] == severity]
     for _, group in groupby(open_ones, key=itemgetter("code")):
         kind = list(group)
-        yield from (f"{each['code']} {each['message']}" for each in kind[:NAMED])
+        for each in kind[:NAMED]:
+            unused = bool(each["points"]) and out.issuperset(each["points"])
+            yield f"{each['code']} {each['message']}{'; not used' if unused else ''}"
         yield from _more(len(kind), "findings")
 
 
 def _notes(document: Document) -> Iterator[str]:
-    """Warnings, the first of each kind."""
-    warnings = sorted((n for n in document["notes"] if n["severity"] == "warning"), key=itemgetter("code"))
+    """Warnings, the first of each kind; not what a finding says of the same control points."""
+    named = {point for each in _open_findings(document) for point in each["points"]}
+    told = [each for each in _on_control(document) if named.issuperset(each["points"])]
+    warnings = sorted(
+        (n for n in document["notes"] if n["severity"] == "warning" and n not in told), key=itemgetter("code")
+    )
     for _, group in groupby(warnings, key=itemgetter("code")):
         kind = list(group)
         yield from (before(n["file"], n["line"], n["column"]) + n["message"] for n in kind[:NAMED])
         yield from _more(len(kind), "notes")
+
+
+def _on_control(document: Document) -> list[Document]:
+    """Return the notes on control points that do not agree with the others."""
+    return [each for each in document["notes"] if each["code"] in WRONG_CONTROL]

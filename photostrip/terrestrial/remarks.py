@@ -56,7 +56,7 @@ def _stable_points(result: Monitoring) -> Iterator[Note]:
     """Which stable points moved, and where they do not fit together."""
     for number, name in result.rejected:
         epoch = result.series.epochs[number]
-        message = f"epoch {epoch}: point {name} is given as stable and does not fit the others; it was not used as such"
+        message = f"epoch {epoch}: point {name} is given as stable but does not fit the others; it was not used as such"
         yield Note("not-stable", message, points=(name,))
     for state in result.cameras:
         turn = state.turn
@@ -85,8 +85,8 @@ def _parallaxes(result: Monitoring) -> Iterator[Note]:
             change = result.parallax_change[number, row] * MICROMETRES
             message = (
                 f"epoch {result.series.epochs[number]}: the vertical parallax of point {name} changed by"
-                f" {change:+.1f} µm, {ratio[row]:.1f} standard deviations (limit {limit:.1f}): measured wrongly, or"
-                " another point"
+                f" {change:+.1f} µm, {ratio[row]:.1f} standard deviations (limit {limit:.1f}): it was measured"
+                " wrongly, or another point was"
             )
             yield Note("parallax-change", message, points=(name,))
 

@@ -270,7 +270,7 @@ def test_a_cluster_without_workers_is_waited_for_aloud(tmp_path: Path) -> None:
     [
         ("tcp://127.0.0.1:{port}", "no Dask scheduler answers at tcp://127.0.0.1:{port} (connection refused)"),
         ("tcp://no-such-host.invalid:8786", "no Dask scheduler answers at tcp://no-such-host.invalid:8786"),
-        ("127.0.0.1:8786", "is no address of a scheduler; expected dask:tcp://HOST:PORT or dask:local"),
+        ("127.0.0.1:8786", "is not the address of a scheduler; expected dask:tcp://HOST:PORT or dask:local"),
         ("tcp://127.0.0.1:port", "no Dask scheduler answers at tcp://127.0.0.1:port"),
     ],
 )

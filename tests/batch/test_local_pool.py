@@ -124,7 +124,7 @@ def test_too_little_memory_for_anything_is_told(monkeypatch: pytest.MonkeyPatch,
         pytest.raises(InputError) as told,
     ):
         list(pool.answers(iter(tasks_of(tmp_path, ["good1"])), never))
-    assert "no process of the batch starts with 3 MB" in str(told.value)
+    assert "no process of the batch can start within 3 MB of memory" in str(told.value)
 
 
 @pytest.mark.slow
@@ -148,7 +148,7 @@ def test_workers_compute_with_one_thread(tmp_path: Path) -> None:
     [
         (0, "it ended with exit code 0"),
         (-6, "killed by SIGABRT"),
-        (-9, "killed by SIGKILL, by somebody or for want of memory"),
+        (-9, "killed by SIGKILL: by somebody, or because memory ran out"),
         (-200, "killed by signal 200"),
     ],
 )

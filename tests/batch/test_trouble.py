@@ -88,7 +88,7 @@ def test_a_disk_that_stays_full_ends_the_batch(
     assert main(["batch", "strips", "-o", "out"]) == 2
     captured = capsys.readouterr()
     assert "5 projects: 3 unwritten, 2 not run" in captured.out  # the summary is told even where it cannot be written
-    assert "error: 3 results in a row could not be written; 2 not run" in captured.err
+    assert "error: 3 results in a row could not be written; 2 projects not run" in captured.err
     assert "no space left on device" in captured.err
     assert [path for path in (here / "out").rglob("*") if path.is_file()] == [here / "out" / ".batch.lock"]
 

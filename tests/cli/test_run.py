@@ -314,7 +314,7 @@ def test_verbose_prints_every_section(result: Path, capsys: pytest.CaptureFixtur
 def test_report_into_a_file_of_unknown_kind(result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, _, err = run(capsys, "report", result, "-o", tmp_path / "r.doc")
     assert code == 2
-    assert "no report is written as '.doc'" in err
+    assert "nothing is written as '.doc'" in err
 
 
 def test_the_report_of_a_failed_result_is_a_report(

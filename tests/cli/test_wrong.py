@@ -86,6 +86,68 @@ def test_weak_geometry_ends_with_3(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("east", ["43520059", "1e15"])
+def test_a_wild_coordinate_is_told_in_its_row_and_not_as_another_crs(
+    tmp_path: Path, east: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_project(tmp_path / "p", spec())
+    table = path.parent / "control.csv"
+    rows = [row.split(",") for row in table.read_text(encoding="utf-8").splitlines()]
+    rows[3][1] = east
+    table.write_text("\n".join(map(",".join, rows)) + "\n", encoding="utf-8")
+    code, _, err = call(capsys, "run", path)
+    assert code == 2
+    first, *others = err.splitlines()
+    assert first == f"error: {table}:4: point {rows[3][0]}: outside the domain of EPSG:32633"
+    assert not any("P402" in line or "P403" in line for line in others)
+
+
+def test_a_cause_in_the_data_is_told_before_what_comes_of_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_project(tmp_path / "p", spec())
+    order = ("--set", "strips[0].photos=[1001, 1003, 1002, 1004, 1005]")
+    code, _, err = call(capsys, "run", path, *order)
+    assert code == 3
+    first, second = err.splitlines()
+    assert "P201 strip A: photos 1003 and 1002 are listed in the wrong order" in first
+    assert second.startswith("error: relative orientation of photos 1001 and 1003")
+    _, printed, _ = call(capsys, "run", path, *order, "--format", "json")
+    assert json.loads(printed)["findings"][0]["code"] == "P201"
+
+
+@pytest.mark.parametrize(("old", "new"), [("unit: mm", "unti: mm"), ("observations:", "observatons:")])
+def test_a_misspelled_key_is_not_missing_besides(
+    tmp_path: Path, old: str, new: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_project(tmp_path / "p", spec())
+    path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    code, _, err = call(capsys, "run", path)
+    assert code == 2
+    (line,) = err.splitlines()
+    assert line.endswith(f"is not known; did you mean `{old.partition(':')[0]}`?")
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("photostrip_simulation", "a specification for `photostrip simulate`"),
+        ("photostrip_plan_strip", "a plan for `photostrip plan strip`"),
+        ("photostrip_result", "a result for `photostrip report`"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_file_for_another_command_is_told_as_such(
+    tmp_path: Path, command: str, key: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text(f"{key}: 1\nname: a\n", encoding="utf-8")
+    code, out, err = call(capsys, command, file)
+    assert code == 2
+    (line,) = (line for line in (out + err).splitlines() if line.startswith("error: "))
+    assert f"{key}: this is {words}" in line
+
+
 def test_a_tolerance_that_is_not_kept_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_project(tmp_path / "p", spec())
     assert call(capsys, "run", path, "--set", "tolerances.check_rms_xy=1e-6", "-o", tmp_path / "out")[0] == 1

@@ -140,7 +140,7 @@ def test_a_shift_that_proj_knows_is_told_with_its_accuracy() -> None:
     assert given.describe().endswith(f"; datum shift: {given.datum_shift}")
     assert given.datum_shift.endswith(f"accuracy {given.datum_accuracy:g} m")
     assert output.describe() == (
-        "EPSG:32635 (WGS 84 / UTM zone 35N): east, north, up; plan in metre, ellipsoidal heights in metre"
+        "EPSG:32635 (WGS 84 / UTM zone 35N): east, north, up; plan in metres, ellipsoidal heights in metres"
     )
 
 
@@ -245,7 +245,7 @@ def test_a_constant_undulation_lifts_heights_to_the_ellipsoid() -> None:
     lifted = UTM33 + np.array([0.0, 0.0, 45.5])
     assert given.cartesian_from_ground(UTM33) == pytest.approx(output.cartesian_from_ground(lifted), abs=1e-9)
     assert given.ground_from_cartesian(output.cartesian_from_ground(lifted)) == pytest.approx(UTM33, abs=MICROMETRE)
-    assert given.describe().endswith("plan in metre, orthometric heights in metre, geoid undulation +45.500 m")
+    assert given.describe().endswith("plan in metres, orthometric heights in metres, geoid undulation +45.500 m")
 
 
 def test_a_three_dimensional_crs_has_ellipsoidal_heights() -> None:
@@ -275,7 +275,7 @@ def test_heights_above_a_geoid_grid(geoid: Path, how: str) -> None:
     assert height == pytest.approx(UTM33[:, 2] + undulation, abs=1e-5)
     assert flat.ground_from_cartesian(xyz)[:, :2] == pytest.approx(UTM33[:, :2], abs=MICROMETRE)
     assert np.abs(given.ground_from_cartesian(xyz) - UTM33).max() < MICROMETRE
-    assert given.describe().endswith(f"orthometric heights in metre (geoid grid {name})")
+    assert given.describe().endswith(f"orthometric heights in metres (geoid grid {name})")
 
 
 def test_a_geoid_grid_refers_to_wgs_84_under_a_shifted_datum(geoid: Path) -> None:
@@ -317,8 +317,8 @@ print(own.describe())
     assert done.stdout.splitlines() == [
         "144.25",
         (
-            "EPSG:32633+5773 (WGS 84 / UTM zone 33N + EGM96 height): east, north, up; plan in metre, orthometric"
-            " heights in metre (EGM96 height)"
+            "EPSG:32633+5773 (WGS 84 / UTM zone 33N + EGM96 height): east, north, up; plan in metres, orthometric"
+            " heights in metres (EGM96 height)"
         ),
     ]
 

@@ -135,7 +135,7 @@ def test_a_good_result_says_so_first_and_last(everything: bool) -> None:
 
 def test_what_to_look_at_is_listed_first() -> None:
     text = judged("look", "the first thing", "the second thing")
-    assert "LOOK at 2 things before you use this:\nRms 0.1 m.\n1. the first thing\n2. the second thing\n" in text
+    assert "LOOK at 2 things before you use this.\nRms 0.1 m.\n1. the first thing\n2. the second thing\n" in text
     assert "LOOK at 1 thing " in judged("look", "a thing")
 
 
@@ -235,7 +235,7 @@ def test_check_points_stand_apart_from_the_control() -> None:
     roles = {row["id"]: row["role"] for row in saved()["control"]}
     assert {roles[row[0]] for row in control.rows} == {"control"}
     assert {roles[row[0]] for row in check.rows} == {"check"}
-    assert [row[0] for row in check.foot] == ["rms", "mean", "largest"]
+    assert [row[0] for row in check.foot] == ["rms", "mean", "largest", "in 95 %"]
 
 
 def test_numbers_are_those_of_the_result() -> None:

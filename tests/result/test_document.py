@@ -670,7 +670,7 @@ def test_a_wrong_check_point_is_worth_a_look_and_changes_nothing() -> None:
     document = displaced("check", 23.4)
     assert document["status"] == "look"
     (text,) = document["verdict"]["look_at"]
-    assert "check point K03 stands out: 23." in text
+    assert "check point K03 (23." in text
     assert document["points"] == case("projected").document["points"]
     assert document["photos"] == case("projected").document["photos"]
 

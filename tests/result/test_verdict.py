@@ -102,7 +102,8 @@ def test_a_check_point_that_stands_out_is_taken_out_of_the_headline() -> None:
     rows = {row["id"]: row for row in document["control"]}
     assert [name for name, row in rows.items() if row["stands_out"]] == ["K01"]
     (text,) = document["verdict"]["look_at"]
-    assert text.startswith("check point K01 stands out: 447.")
+    assert text.startswith("check point K01 (447.")
+    assert "m in plan) stands out; the others have an rms of 0." in text
     with_it, without = document["summary"]["check"]["plan"]["rms"], headline_rms(document, "check", "plan")
     assert without["count"] == 7
     assert without["rms"] < 0.3
@@ -113,18 +114,71 @@ def test_a_check_point_that_stands_out_is_taken_out_of_the_headline() -> None:
     assert document["precision"]["check"]["plan"]["count"] == 7  # named once, not tested again with the others
 
 
+def test_a_check_point_that_is_known_badly_does_not_stand_out() -> None:
+    """Far off beside the others, and 1.3 times its own standard deviation: at the end of a long strip, say."""
+    values = np.array([0.1, -0.05, 0.08, 0.02, -0.07, 1.04])
+    expected = np.array([0.9, 0.9, 0.9, 0.9, 0.9, 0.19])
+    assert not stand_out(values, 1, expected).any()
+    assert stand_out(values, 1, np.where(values > 1, 1e-4, expected)).tolist() == [False] * 5 + [True]
+
+
+def a_finding(severity: str, points: list[str]) -> Document:
+    place = {"file": "", "line": 0, "column": 0, "key": "", "photos": [], "strips": [], "evidence": {}, "fix": "look"}
+    said = {"code": "P406", "title": "t", "severity": severity, "message": "off by a digit"}
+    return {**place, **said, "points": points, "accepted": False}
+
+
+def a_warning(code: str, points: list[str]) -> Document:
+    place = {"file": "", "line": 0, "column": 0, "key": "", "strip": "A", "photos": []}
+    return place | {"code": code, "severity": "warning", "message": f"{code} of {points[0]}", "points": points}
+
+
+def test_a_wrong_point_is_told_once_with_what_became_of_it() -> None:
+    document = case("projected", 2).document
+    control = [row | {"rejected": "z"} if row["id"] == "G02" else row for row in document["control"]]
+    notes = [a_warning("control-rejected", ["G02"]), a_warning("control-rejected", ["G03"]), a_warning("weak", ["G02"])]
+    changed = {**document, "control": control, "notes": notes, "findings": [a_finding("warning", ["G02"])]}
+    expected = ["P406 off by a digit; not used", "control-rejected of G03", "weak of G02"]
+    assert verdict_of(changed)["look_at"] == expected
+    changed["findings"] = [a_finding("warning", ["G02"]) | {"accepted": True}]
+    assert verdict_of(changed)["look_at"] == ["control-rejected of G02", "control-rejected of G03", "weak of G02"]
+
+
+def test_control_that_is_doubtful_does_not_stand_out_besides() -> None:
+    document = case("projected", 2).document
+    control = [row | {"stands_out": ["plan"]} if row["id"] == "G02" else row for row in document["control"]]
+    (odd,) = verdict_of({**document, "control": control})["look_at"]
+    assert odd.startswith("control point G02 (")
+    notes = [a_warning("control-doubtful", ["G02"])]
+    assert verdict_of({**document, "control": control, "notes": notes})["look_at"] == ["control-doubtful of G02"]
+
+
+def test_what_follows_from_data_that_contradict_themselves_is_not_said() -> None:
+    document = moved(8, 1.0, axis=2)
+    assert document["verdict"]["look_at"][0].startswith("the check points are farther off")
+    assert verdict_of({**document, "findings": [a_finding("error", [])]})["look_at"] == ["P406 off by a digit"]
+
+
+def test_points_that_stand_out_share_a_line() -> None:
+    document = moved(2, 447.0)
+    (text,) = document["verdict"]["look_at"]
+    assert text.startswith("check points K01 (447.")
+    assert text.count("the others have an rms of") == 1
+    assert document["verdict"]["accuracy"].endswith("m in plan with K01, K02")
+
+
 def test_wrong_check_points_do_not_hide_each_other() -> None:
     values = np.array([0.1, 447.0, -0.05, 0.08, 447.2, 0.02, -0.07, 0.11])
-    found = stand_out(values, 1, np.full(8, 100.0))
+    found = stand_out(values, 1, np.full(8, 1e-9))
     assert np.flatnonzero(found).tolist() == [1, 4]
-    assert not stand_out(values, 1, np.full(8, 2.0)).any()  # nothing beyond its standard deviation
-    assert not stand_out(np.array([np.nan, 5.0]), 1, np.full(2, 100.0)).any()
-    assert stand_out(np.array([447.0, 0.088]), 2, np.full(2, 100.0)).tolist() == [True, False]
+    assert not stand_out(values, 1, np.full(8, 0.05)).any()  # nothing beyond its standard deviation
+    assert not stand_out(np.array([np.nan, 5.0]), 1, np.full(2, 1e-9)).any()
+    assert stand_out(np.array([447.0, 0.088]), 2, np.full(2, 1e-9)).tolist() == [True, False]
 
 
 def test_sound_differences_hardly_ever_stand_out() -> None:
     rng = np.random.default_rng(20261122)
-    wrong = [stand_out(rng.normal(size=n), 1, np.full(n, 9.0)).any() for n in (2, 4, 9, 30) for _ in range(1500)]
+    wrong = [stand_out(rng.normal(size=n), 1, np.full(n, 1e-9)).any() for n in (2, 4, 9, 30) for _ in range(1500)]
     assert np.mean(wrong) < 0.002
 
 

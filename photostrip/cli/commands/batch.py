@@ -25,12 +25,13 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
         int | None, typer.Option("--jobs", "-j", min=1, metavar="N", help="Number of processes; default: one per core.")
     ] = None,
     executor: Annotated[
-        str, typer.Option(metavar="WHERE", help="local, dask:local, or dask:tcp://HOST:PORT, a cluster that runs.")
+        str, typer.Option(metavar="WHERE", help="local, dask:local, or dask:tcp://HOST:PORT, a running cluster.")
     ] = "local",
     assignments: Assignments = None,
-    force: Annotated[bool, typer.Option("--force", help="Compute what has not changed, too.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Compute again what has not changed, too.")] = False,
     timeout: Annotated[
-        float | None, typer.Option(min=0.001, metavar="SECONDS", help="Longest time for one project; default: any.")
+        float | None,
+        typer.Option(min=0.001, metavar="SECONDS", help="Longest time for one project; default: no limit."),
     ] = None,
     memory: Annotated[
         float | None,
@@ -48,9 +49,9 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """Adjust many projects, each in a process of its own, and sum them up.
 
     With -o, the result of each project goes into a folder of its own below DIR, and DIR gets summary.txt, summary.csv,
-    summary.json and junit.xml. A failure ends no other project. What has not changed since it was last computed is not
-    computed again; a batch that was interrupted or killed goes on where it was. The exit code is that of the worst
-    project, the highest: 0, 1, 2, 3 or 70.
+    summary.json and junit.xml. A failure does not stop the other projects. What has not changed since it was last
+    computed is not computed again; a batch that was interrupted or killed goes on where it was. The exit code is that
+    of the worst project, the highest: 0, 1, 2, 3 or 70.
     """
     from photostrip.batch.tasks import Limits
     from photostrip.cli.jobs.batch import BatchOptions, run_batch

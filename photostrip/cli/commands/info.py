@@ -16,7 +16,7 @@ def info(
 ) -> None:
     """Print versions, threads, formats and extras, and how to get what is missing.
 
-    Put it into every report of a problem.
+    Include it in every report of a problem.
     """
     from photostrip.cli.jobs.installation import as_text, installation
 

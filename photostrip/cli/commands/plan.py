@@ -83,7 +83,7 @@ class Flight:
     )
     scale: Annotated[str | None, typer.Option("--scale", metavar="M", help="Denominator of the photo scale.")] = None
     flying_height: Annotated[
-        str | None, typer.Option("--flying-height", metavar="M", help="Instead of the scale, metres.")
+        str | None, typer.Option("--flying-height", metavar="M", help="Flying height in metres, instead of the scale.")
     ] = None
     sigma_um: Annotated[
         str | None, typer.Option("--sigma-um", metavar="UM", help="Standard deviation of an image coordinate.")
@@ -110,7 +110,7 @@ class Delivery:
             "--set", metavar="KEY=VALUE", help="Set a key of the plan, as in end_lap_percent=70; may be repeated."
         ),
     ] = None
-    form: Annotated[Form, typer.Option("--format", help="How to print it.")] = "text"
+    form: Annotated[Form, typer.Option("--format", help="How the answer is printed.")] = "text"
     output: Annotated[
         Path | None,
         typer.Option(
@@ -255,10 +255,10 @@ def strip(  # noqa: PLR0913 (an argument for each option)
         typer.Option("--required", metavar="PLAN,HEIGHT", help="Accuracy needed everywhere, metres: how many bands?"),
     ] = None,
     place: Annotated[
-        str | None, typer.Option("--place", metavar="N", help="Find the best places for N further control points.")
+        str | None, typer.Option("--place", metavar="N", help="Find the best places for N more control points.")
     ] = None,
     into: Annotated[
-        str | None, typer.Option("--into", metavar="LAYOUT", help="With --place: layout they are added to.")
+        str | None, typer.Option("--into", metavar="LAYOUT", help="With --place: the layout that they are added to.")
     ] = None,
     delivery: Delivery,
 ) -> None:
@@ -280,7 +280,7 @@ def strip(  # noqa: PLR0913 (an argument for each option)
             **_required(required),
         }
         if into is not None and place is None and file is None:
-            raise typer.BadParameter("nothing is to be placed: give --place as well", param_hint="--into")
+            raise typer.BadParameter("there is nothing to be placed: give --place as well", param_hint="--into")
         delivery.require_output()
         with delivery.assigned(options) as assignments:
             given = load_strip_plan(file, assignments)

@@ -30,8 +30,9 @@ def report(
 ) -> int:
     """Print the accuracy report of a saved result again.
 
-    It is the report that `photostrip run` printed. FILE may end in .txt, .md, .html or .json. The exit code does not
-    depend on the verdict: the report of a failed result is a report. With --strict it is 1 unless the verdict is GOOD.
+    It is the report that `photostrip run` printed. FILE may end in .txt, .md, .html or .json. The exit code is 0
+    whatever the verdict, as the report of a failed result is a report; with --strict it is 1 unless the verdict is
+    GOOD.
     """
     from photostrip.errors import EXIT_DONE, faults_instead
     from photostrip.formats.output.result_json import read_result

@@ -29,10 +29,10 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         ),
     ] = None,
     cross_validate: Annotated[
-        bool, typer.Option("--cross-validate", help="Leave the control out in turn, and compare there.")
+        bool, typer.Option("--cross-validate", help="Leave control out in turn, and compare the result there.")
     ] = False,
     methods: Annotated[
-        bool, typer.Option("--compare-methods", help="Adjust in every way there is, side by side at check points.")
+        bool, typer.Option("--compare-methods", help="Adjust by every method, and compare them at the check points.")
     ] = False,
     html: Annotated[bool, typer.Option("--html", help="Write report.html into DIR, too.")] = False,
     strict: Strict = False,
@@ -44,8 +44,8 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
 
     The report goes to stdout, in at most 120 lines; --verbose prints all of it, --section a part. With -o, DIR gets
     result.json with everything, the tables points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv and
-    refined.csv, and project.resolved.yaml. The exit code is 1 when a tolerance of the project is not kept, with
-    --strict also when the verdict is LOOK or UNVERIFIED. A bundle adjustment adds reliability.csv. With
+    refined.csv, and project.resolved.yaml. The exit code is 1 when the verdict is FAILED, with --strict also
+    when it is LOOK or UNVERIFIED. A bundle adjustment adds reliability.csv. With
     --compare-methods and -o, each method gets a folder of its own in DIR.
     """
     from photostrip.cli.failures import failures_as

@@ -47,8 +47,8 @@ Distance = Annotated[
 ]
 AngleUnit = Annotated[Literal["deg", "gon"], typer.Option("--angles", help="Unit of angles and directions.")]
 Unit = Annotated[Literal["mm", "um"], typer.Option("--unit", help="Unit of image coordinates.")]
-Format = Annotated[Form, typer.Option("--format", help="How to print it.")]
-Plot = Annotated[Path | None, typer.Option("--plot", metavar="FILE.svg", help="Draw it, too.")]
+Format = Annotated[Form, typer.Option("--format", help="How the answer is printed.")]
+Plot = Annotated[Path | None, typer.Option("--plot", metavar="FILE.svg", help="Draw a picture, too.")]
 Step = Annotated[float, typer.Option("--step", metavar="MM", help="Distance of the points of the table.")]
 ImageTable = Annotated[str | None, typer.Argument(metavar="TABLE", help="Table `point,x,z` (CSV).", show_default=False)]
 DirectionTable = Annotated[
@@ -213,7 +213,7 @@ def theodolite(  # noqa: PLR0913 (an argument for each option)
     camera: CameraByFormat,
     sigma_um: Annotated[
         float | None,
-        typer.Option("--sigma-um", metavar="UM", help="Image accuracy wanted: tell the rounds it needs."),
+        typer.Option("--sigma-um", metavar="UM", help="Image accuracy wanted: say how many rounds it needs."),
     ] = None,
     looking: Looking,
     step: Step = 20.0,
@@ -282,7 +282,9 @@ def orient(  # noqa: PLR0913 (an argument for each option)
     camera: CameraByPoint,
     free: Annotated[
         str | None,
-        typer.Option(metavar="NAMES", help="Determine principal-distance, principal-point or both, too (A,B)."),
+        typer.Option(
+            metavar="NAMES", help="Determine these as well: principal-distance, principal-point, or both (A,B)."
+        ),
     ] = None,
     unit: Unit = "mm",
     angles: AngleUnit = "deg",
@@ -292,7 +294,9 @@ def orient(  # noqa: PLR0913 (an argument for each option)
     rounds: Rounds = 1,
     screening: Annotated[
         Literal["deletion", "stated", "none"],
-        typer.Option(help="Test points against the scatter of the others, against the stated standard errors, or not."),
+        typer.Option(
+            help="Test points against the scatter of the others, against the stated standard errors, or not at all."
+        ),
     ] = "deletion",
     significance: Annotated[float, typer.Option(help="Probability of rejecting a point of a clean photo.")] = 0.05,
     form: Format = "text",

@@ -171,7 +171,9 @@ def _say_end(batch: Batch, stop: Stop, *, quiet: bool) -> None:
     if stop.signal:
         sys.stderr.write(f"interrupted: {counted(waiting, 'project')} not run; the same command goes on from here\n")
     elif stop():
-        sys.stderr.write(f"error: {stop.refusals} results in a row could not be written; {waiting} not run\n")
+        sys.stderr.write(
+            f"error: {stop.refusals} results in a row could not be written; {counted(waiting, 'project')} not run\n"
+        )
     elif not quiet and batch.unchanged:
         computed = len(batch.outcomes) - batch.unchanged
         sys.stderr.write(f"{computed} computed, {batch.unchanged} unchanged since the last time\n")

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adjustment
 POLYNOMIAL_MODELS = 15  # models from which on, and
 POLYNOMIAL_BANDS = 4  # bands of control below which the adjustment with the covariance is proposed
-LEVEL = 0.01  # of the test of the whole
 
 
 def pair_notes(strip: Strip, oriented: Orientation) -> Iterator[Note]:
@@ -94,7 +93,7 @@ def junction_notes(strip: Strip, formed: FormedStrip) -> Iterator[Note]:
         photo = strip.photos[number + 1]
         text = (
             f"photo {photo}: its pass points contradict each other in the scale of the models by "
-            f"{junctions.doubt[number]:.2%}, and it cannot be told which is wrong; measure another pass point"
+            f"{100 * junctions.doubt[number]:.2f} %, and it cannot be told which is wrong; measure another pass point"
         )
         yield Note("contradicting-joint", text, strip=strip.id, photos=(photo,))
     for number in np.flatnonzero(count == 1).tolist():
@@ -145,7 +144,7 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
             )
             yield Note("extrapolation", text, strip=strip.id)
         if min(axis.redundancy for axis in correction.axes) < 3:
-            text = f"strip {strip.id}: the polynomial has a redundancy below 3 in an axis: its residuals say little"
+            text = f"strip {strip.id}: the polynomial has a redundancy below 3 in one axis: its residuals say little"
             yield Note("little-redundancy", text, strip=strip.id)
 
 
@@ -198,7 +197,7 @@ def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceA
             "it was used"
         )
         yield Note("control-doubtful", text, strip=strip.id, points=(name,))
-    if not len(worst) and tested.probability < LEVEL:
+    if not len(worst) and tested.probability < tested.level:
         sigma0 = float(np.sqrt(tested.squares / tested.redundancy))
         text = (
             f"strip {strip.id}: misclosures and distances are {sigma0:.2f} times as large as expected from the "

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Self, TypeVar
 
 from pydantic import AfterValidator, model_validator
 
-from photostrip.errors import InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.planning.ideal_strip import StripGeometry
 from photostrip.project.schema.values import Positive, Range, Section, Triple, Words, bounded, key, wrong
 from photostrip.project.simulation import SimulatedCamera
-from photostrip.project.yaml.document import COMMAND_LINE, Node, Place, fault_at
+from photostrip.project.yaml.document import COMMAND_LINE, Node, Place
 from photostrip.project.yaml.reading import Reading
 
 if TYPE_CHECKING:
@@ -27,11 +26,7 @@ if TYPE_CHECKING:
 T = TypeVar("T", bound=Section)
 
 SCHEMA_NUMBER = "1"
-NUMBER_KEYS = {  # and the commands that take them
-    "photostrip_plan_model": "plan model",
-    "photostrip_plan_strip": "plan strip",
-    "photostrip_plan_cameras": "plan camera",
-}
+NUMBER_KEYS = {"photostrip_plan_model", "photostrip_plan_strip", "photostrip_plan_cameras"}
 OVERLAP = Range(1.0, 99.0, "%")
 IMAGE_SIGMA_UM = Range(1e-3, 1e4, "µm")
 
@@ -79,14 +74,5 @@ def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> t
         reading = Reading(file=COMMAND_LINE, root=root, findings=Findings(), files=[])
     else:
         reading = Reading.of(str(path))
-    _require_kind(kind, reading.root)
     reading = reading.with_set(assignments)
     return reading.read(kind), reading
-
-
-def _require_kind(kind: type[Section], root: Node) -> None:
-    """Refuse a plan of something else by the command that is meant for it."""
-    given = [name for name in NUMBER_KEYS if name in root.entries]
-    if len(given) == 1 and given[0] not in kind.model_fields:
-        message = f"this is a plan for `photostrip {NUMBER_KEYS[given[0]]}`"
-        raise InputError(fault_at(root, (given[0],), message, "plan-kind"))

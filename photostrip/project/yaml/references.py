@@ -65,10 +65,15 @@ NEEDS_IMAGES = {
 OF_PHOTOS = ("observations", "fiducial_measurements", "camera_positions", "orientations")
 
 
+def _lacks(root: Node, name: str) -> bool:
+    """Whether a file has no such key, not even misspelled, which the schema tells."""
+    return not root.has(name) and not any(suggestion(each, [name]) for each in root.entries)
+
+
 def _only_photos(root: Node) -> Iterator[Fault]:
     """Ask for what image coordinates need."""
     for name, expected in NEEDED.items():
-        if not root.has(name):
+        if _lacks(root, name):
             yield fault_at(root, (name,), f"`{name}` is missing", "missing-key", expected=expected)
     for number, strip in enumerate(root.list_at("strips")):
         if isinstance(strip.value, dict) and not strip.has("camera"):
@@ -207,10 +212,10 @@ def _needs_of_the_strip_method(root: Node) -> Iterator[Fault]:
             path, fix = ("strips", number, "photos"), "or `processing.adjustment: bundle`, which takes single photos"
             message = "there is only one photo"
             yield fault_at(root, path, message, "length", expected="at least 2 photos", fix=fix)
-    if control is None:
+    if _lacks(root, "control"):
         expected = "lists of given ground coordinates, each in its own frame"
         yield fault_at(root, ("control",), "`control` is missing", "missing-key", expected=expected)
-    elif isinstance(control.value, list) and not control.value:
+    elif control is not None and isinstance(control.value, list) and not control.value:
         expected = "at least 1 control list"
         yield fault_at(root, ("control",), "there is no control list", "length", expected=expected)
 

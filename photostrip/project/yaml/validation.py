@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from photostrip.errors import InputError
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.notes import counted
@@ -14,6 +16,8 @@ from photostrip.project.schema.values import Section
 from photostrip.project.yaml.document import Node, Path, fault_at, key_path, type_names
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     from pydantic.fields import FieldInfo
 
     from photostrip.errors import Fault
@@ -21,7 +25,19 @@ if TYPE_CHECKING:
     Model = type[Section]
 
 T = TypeVar("T", bound=Section)
+MEANT = re.compile(r"did you mean `(.+)`\?")  # a suggestion
 MOST_EXPLAINED = 1000  # errors of one file; more of them are only counted
+KINDS = {  # of files, by the key that holds the number of their schema
+    "photostrip": "a project for `photostrip run`",
+    "photostrip_simulation": "a specification for `photostrip simulate`",
+    "photostrip_plan_model": "a plan for `photostrip plan model`",
+    "photostrip_plan_strip": "a plan for `photostrip plan strip`",
+    "photostrip_plan_cameras": "a plan for `photostrip plan camera`",
+    "photostrip_terrestrial": "a project for `photostrip terrestrial displacement`",
+    "photostrip_cameras": "a list of cameras for `photostrip terrestrial`",
+    "photostrip_tolerances": "a tolerance profile for `photostrip compare --tol`",
+    "photostrip_result": "a result for `photostrip report` and `photostrip compare`",
+}
 EXPECTED = {
     "model_type": type_names[dict],
     "dict_type": type_names[dict],
@@ -31,14 +47,30 @@ EXPECTED = {
 
 
 def checked(kind: type[T], root: Node, findings: Findings) -> T | None:
-    """Return a file with types and defaults; None when there are faults."""
+    """Return a file with types and defaults; None when there are faults. A file of another kind is refused at once."""
+    given = [name for name in KINDS if name in root.entries]
+    if given and not any(name in kind.model_fields for name in given):
+        raise InputError(fault_at(root, (given[0],), f"this is {KINDS[given[0]]}", "other-file"))
     try:
         return kind.model_validate(root.plain)
     except ValidationError as error:
         found = error.errors(include_url=False, include_input=False)
-        findings.add(*dict.fromkeys(_fault(kind, root, each) for each in found[:MOST_EXPLAINED]))
+        faults = dict.fromkeys(_fault(kind, root, each) for each in found[:MOST_EXPLAINED])
+        findings.add(*_once(faults))
         findings.count(root.place.file, len(found[MOST_EXPLAINED:]))
         return None
+
+
+def _once(faults: Iterable[Fault]) -> Iterator[Fault]:
+    """Leave out that a key is missing where it is misspelled."""
+    faults = list(faults)
+    meant = {
+        f"{above}.{found[1]}".removeprefix(".")
+        for fault in faults
+        if fault.code == "unknown-key" and (found := MEANT.fullmatch(fault.fix))
+        for above in [fault.key.rpartition(".")[0]]
+    }
+    return (fault for fault in faults if fault.code != "missing-key" or fault.key not in meant)
 
 
 def valid_section(kind: type[T], node: Node | None) -> T | None:

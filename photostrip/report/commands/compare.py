@@ -29,7 +29,7 @@ NAMES = {
     "rejected": "rejected measurements",
     "findings": "findings",
 }
-ONE = {"photos": "photo", "points": "point", "models": "model", "strips": "strip", "junctions": "joint at"}
+ONE = {"photos": "photo", "points": "point", "models": "model", "strips": "strip", "junctions": "junction at"}
 
 
 def compare_sections(document: Document, *, quiet: bool = False, everything: bool = False) -> tuple[Section, ...]:

@@ -52,7 +52,9 @@ def _precision(part: str) -> Callable[[Document], float | None]:
 def _verdict(document: Document) -> str:
     best = document["best"]
     if best["plan"] is None and best["height"] is None:
-        return "There are no check points: which method is better cannot be told. Give some points `role: check`."
+        return (
+            "There are no check points: which method is better cannot be told. Give some of the points `role: check`."
+        )
     if best["plan"] == best["height"]:
         return f"Smallest at check points: {best['plan']}."
     return f"Smallest at check points: {best['plan']} in plan, {best['height']} in height."

@@ -40,7 +40,7 @@ def finding_of(source: Fault | Note | Finding) -> Document:
     if isinstance(source, Finding):
         return found | _of_finding(source)
     if isinstance(source, Fault):
-        return found | {"expected": source.expected, "fix": source.fix, "photos": [], "points": []}
+        return found | {"expected": source.expected, "fix": source.fix, "photos": [], "points": list(source.points)}
     return found | {"expected": "", "fix": "", "photos": list(source.photos), "points": list(source.points)}
 
 
@@ -61,12 +61,13 @@ def _of_finding(finding: Finding) -> Document:
 
 
 def findings_of(error: InputError | GeometryError) -> list[Document]:
-    """Return what an error carries as plain values: the failure, then what the data say against themselves."""
-    causes = [finding_of(each) for each in error.findings]
+    """Return what an error carries as plain values: its causes in the data, the failure, and what else they show."""
+    causes = [finding_of(each) for each in error.findings if each.is_error]
+    others = [finding_of(each) for each in error.findings if not each.is_error]
     if isinstance(error, InputError):
-        return [finding_of(fault) for fault in error.faults] + causes
+        return [*causes, *(finding_of(fault) for fault in error.faults), *others]
     found = finding_of(Fault(str(error), error.code))
-    return [found | {"photos": list(error.photos), "points": list(error.points)}, *causes]
+    return [*causes, found | {"photos": list(error.photos), "points": list(error.points)}, *others]
 
 
 def result_findings(document: Document) -> list[Document]:

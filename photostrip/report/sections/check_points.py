@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import fixed, joined, listed, metres, ratio, signed
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 PARTS = "plan", "height"
 UNKNOWN = dict.fromkeys(("plan", "height", "p_plan", "p_height", "sigma_x", "sigma_y", "sigma_z"))
 MEANING = (
-    "σ: of the adjusted point; z: difference over its standard deviation, that of the given point included (in plan "
-    "the length in the metric of the covariance: 2.45 for 95 %); p: probability of a larger one by chance"
+    "σ: of the adjusted point; z: difference over its standard deviation, with that of the given point (in plan by the "
+    "whole covariance, 95 % lie below 2.45); p: chance of a larger one"
 )
 FAILED_SHOWN = 3
 
@@ -36,7 +36,7 @@ def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
             else "None. What lies between the control points is not proven by anything in this report."
         )
         return Section("Check points", (Words(text),))
-    text = "Adjusted minus given. These points took no part in the adjustment: they show how good the new points are."
+    text = "Adjusted minus given: how good the new points are."
     check = document.get("precision", {}).get("check")
     if check and check["points"] and "p_plan" in check["points"][0]:  # results of older versions have no probabilities
         table = _tested(document, rows, everything=everything, most=most)
@@ -56,12 +56,12 @@ def _tested(document: Document, given: Sequence[Document], *, everything: bool, 
         likely = {"z_plan": z["plan"], "z_height": z["height"], "p_plan": z["p_plan"], "p_height": z["p_height"]}
         rows.append({**row, **sigma, **likely})
     more = (words("use", "use", rank=2), words("strips", lambda row: ", ".join(row["strips"]), rank=3))
-    over = [check[part]["rms"] for part in PARTS]
+    seen = _Seen([check[part]["rms"] for part in PARTS], [_inside(check[part]) for part in PARTS])
     odd = [row["id"] for row in given if row.get("stands_out")]
     without = f"rms of z without {listed(odd, IDS_NAMED)}" if odd else ""
     where = ("points", "check", "control")
     shown, note = worst_first(rows, _unlikely, where, everything=everything, most=most)
-    return _table(document, rows, shown, more, over, joined(note, MEANING, without))
+    return _table(document, rows, shown, more, seen, joined(note, MEANING, without))
 
 
 def cross_validation_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
@@ -82,9 +82,22 @@ def cross_validation_section(document: Document, *, everything: bool, most: int 
     if rows:
         where = ("points", "cross-validation", "cross_validation")
         shown, note = worst_first(rows, _unlikely, where, everything=everything, most=most)
-        over = [block[part]["ratio"] for part in PARTS]
-        parts.append(_table(document, rows, shown, (number("time", "fold", rank=2),), over, joined(note, MEANING)))
+        seen = _Seen([block[part]["ratio"] for part in PARTS], [_inside(block[part]) for part in PARTS])
+        explained = not everything and document["summary"]["check"]["plan"]["count"]  # above, at the check points
+        below = note if explained else joined(note, MEANING)
+        parts.append(_table(document, rows, shown, (number("time", "fold", rank=2),), seen, below))
     return Section("Cross-validation", tuple(parts))
+
+
+class _Seen(NamedTuple):
+    """What the points say together, in plan and in height."""
+
+    over: Sequence[float | None]  # rms of the differences over their standard deviations
+    inside: Sequence[str]  # how many lie inside their 95 % limits
+
+
+def _inside(part: Document) -> str:
+    return f"{part['inside_95']} of {part['count']}" if part["count"] else ""
 
 
 def _table(
@@ -92,13 +105,12 @@ def _table(
     rows: Sequence[Document],
     shown: Sequence[Document],
     more: Sequence[Shown],
-    over: Sequence[float | None],
+    seen: _Seen,
     note: str,
 ) -> Table:
     """Return the table of points that the adjustment has not seen.
 
     more: further columns.
-    over: rms of the differences over their standard deviations in plan and in height.
     """
     axes = document["frame"]["axes"]
     columns = (
@@ -114,7 +126,8 @@ def _table(
     )
     found = [[row[key] for row in rows if row[key] is not None] for key in DIFFERENCES]
     blank, nothing = ("",) * 3, ("",) * len(more)
-    z = [cell for part in over for cell in (ratio(part), "")]
+    z = [cell for part in seen.over for cell in (ratio(part), "")]
+    inside = [cell for part in seen.inside for cell in (part, "")]
     foot = (
         ("rms", *(metres(_rms(values)) for values in found), *blank, *z, *nothing),
         ("mean", *(signed(_mean(values)) for values in found), *blank, *("",) * 4, *nothing),
@@ -125,6 +138,7 @@ def _table(
             *("",) * 4,
             *nothing,
         ),
+        ("in 95 %", *("",) * 6, *inside, *nothing),
     )
     return tabulated(shown, columns, foot, note)
 

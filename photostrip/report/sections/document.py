@@ -6,6 +6,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from photostrip.errors import faults_instead
+from photostrip.report.page.layout import USUAL
 from photostrip.report.page.parts import Document, Section, Words
 from photostrip.report.sections.bundle import bundle_sections
 from photostrip.report.sections.check_points import check_section, cross_validation_section
@@ -129,11 +130,19 @@ def _of_the_points(document: Document, *, everything: bool) -> Iterator[tuple[Se
 
 
 def chosen_sections(
-    document: Document, *, quiet: bool = False, everything: bool = False, names: Collection[SectionName] = ()
+    document: Document,
+    *,
+    quiet: bool = False,
+    everything: bool = False,
+    names: Collection[SectionName] = (),
+    width: int = USUAL,
 ) -> tuple[Section, ...]:
-    """Return the sections that are wanted: the verdict alone, some by name as a whole, all, or the overview."""
+    """Return the sections that are wanted: the verdict alone, some by name as a whole, all, or the overview.
+
+    width: of the page for which the overview is made.
+    """
     last = headline(document)
-    end = Section("", (Words(f"{last[:-1]}." if last.endswith(":") else last, document["status"]),))
+    end = Section("", (Words(last, document["status"]),))
     if names:
         named = list(_named(document, everything=True))
         missing = [each for each in SectionName if each in names and each not in {name for name, _ in named}]
@@ -141,7 +150,7 @@ def chosen_sections(
         return (*(section for name, section in named if name in names), *lacking)
     if quiet:
         return (Section("", (Words(last, document["status"]), accuracy(document))),)
-    return (*(sections_of(document, everything=True) if everything else overview(document)), end)
+    return (*(sections_of(document, everything=True) if everything else overview(document, width)), end)
 
 
 def require_complete(document: Document, file: str) -> None:

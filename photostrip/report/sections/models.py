@@ -67,7 +67,7 @@ MODELS = (
     words("photos", photos_of),
     number("points", "points_used"),
     number("rej.", "points_rejected"),
-    number("centers", "centers"),
+    number("centres", "centers"),
     number("scale 1:", "model_scale", 0),
     number("base", "base", 2, "m"),
     words("strip", "strip", rank=2),
@@ -113,9 +113,8 @@ def project_rows(document: Document) -> list[tuple[str, str]]:
 def measured(document: Document) -> tuple[tuple[str, str], ...]:
     """Return the counts of what was measured."""
     counts = document["counts"]
-    points = (
-        f"{counts['model_points']} of points, {counts['model_points_used']} used; {counts['model_centers']} of centers"
-    )
+    centers = f"{counts['model_centers']} of perspective centres"
+    points = f"{counts['model_points']} of points, {counts['model_points_used']} used; {centers}"
     gone = counts["rejected_in_links"]
     return (("model coordinates", points), ("rejected", f"{gone} in links" if gone else DASH))
 

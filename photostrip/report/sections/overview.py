@@ -9,7 +9,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
-from photostrip.report.page.layout import USUAL, lay_out
+from photostrip.report.page.layout import lay_out
 from photostrip.report.page.numbers import fixed, listed, metres, micrometres, percent
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.sections.check_points import check_section, cross_validation_section
@@ -31,18 +31,20 @@ if TYPE_CHECKING:
 
     Rows = Iterator[tuple[str, str]]
 
-MOST_LINES = 120  # of a report as wide as usual, its title and its last line included
-MOST_OF_A_KIND = (12, 8, 6, 4, 2)  # points, reasons, findings, notes that are shown: as many as leave the report short
+MOST_LINES = 120  # of a report, its title and its last line included
+# Points, reasons, findings, notes that are shown: as many as leave the report short.
+MOST_OF_A_KIND = (12, 8, 6, 4, 2, 1)
 STRIPS_NAMED = 8
 NAMED = 3  # worst pairs, photos and points; cameras
+SAID_BY_THE_WORST = {"rejected", "without coordinates"}
 AROUND = 4  # lines of the title and of the end
 
 
-def overview(document: Document) -> tuple[Section, ...]:
-    """Return the sections of the short report."""
+def overview(document: Document, width: int) -> tuple[Section, ...]:
+    """Return the sections of the short report for a page of a width."""
     for most in MOST_OF_A_KIND:
         sections = _overview(document, most)
-        if len(lay_out("", sections, USUAL)) <= MOST_LINES - AROUND:
+        if len(lay_out("", sections, width)) <= MOST_LINES - AROUND:
             break
     return sections
 
@@ -52,16 +54,21 @@ def _overview(document: Document, most: int) -> tuple[Section, ...]:
     found = (
         verdict_section(document, most=most),
         cures_section(document, most),
-        Section("Project", (Facts(tuple(_project(document))),)),
-        Section("Stages", (Facts(tuple(_stages(document))),)),
+        _facts("Project", _project(document, min(most, NAMED))),
+        _facts("Stages", _stages(document)),
         control_section(document, everything=False, most=most),
         check_section(document, everything=False, most=most),
         *_left_out(document, most),
-        Section("Worst", (Facts(tuple(_worst(document))),)),
+        _facts("Worst", _worst(document)),
         _notes(remarks, most),
         Section("", (Words("--verbose prints all sections, --section NAME a single one; --help lists the names."),)),
     )
     return tuple(section for section in found if section.parts)
+
+
+def _facts(title: str, rows: Rows) -> Section:
+    facts = tuple(rows)
+    return Section(title, (Facts(facts),) if facts else ())
 
 
 def _left_out(document: Document, most: int) -> Iterator[Section]:
@@ -69,16 +76,16 @@ def _left_out(document: Document, most: int) -> Iterator[Section]:
         yield cross_validation_section(document, everything=False, most=most)
 
 
-def _project(document: Document) -> Rows:
+def _project(document: Document, most: int) -> Rows:
     """Say what was adjusted, and how much of it there is."""
     yield "adjustment", adjustment_of(document)
     yield "ground frame", document["frame"]["description"]
     cameras = document["cameras"]
-    for camera in cameras[:NAMED]:
+    for camera in cameras[:most]:
         yield f"camera {camera['id']}", camera_line(camera)
-    if len(cameras) > NAMED:
-        yield "more cameras", listed((camera["id"] for camera in cameras[NAMED:]), NAMED)
-    yield from counts_rows(document)
+    if len(cameras) > most:
+        yield "more cameras", listed((camera["id"] for camera in cameras[most:]), NAMED)
+    yield from (row for row in counts_rows(document) if row[0] not in SAID_BY_THE_WORST)
 
 
 def _stages(document: Document) -> Rows:
@@ -115,9 +122,26 @@ def _pairs(document: Document) -> Rows:
         f"{counted(total, 'point')} in {counted(len(models), 'pair')} rejected, {percent(out, total)}"
     )
     yield "relative orientation", text
-    joints = document["junctions"]
-    if joints:
-        yield "scale transfer", f"{counted(len(joints), 'joint')}; {_differences(document)}"
+    junctions = document["junctions"]
+    if junctions:
+        yield (
+            "scale transfer",
+            f"{counted(len(junctions), 'junction')}{_rejected_in(document)}; {_differences(document)}",
+        )
+
+
+def _rejected_in(document: Document) -> str:
+    """Say how many points the scale transfer rejected, and how many for rays that contradict each other."""
+    counts = document["counts"]
+    parts = [
+        f"{counted(number, 'point')} rejected{why}"
+        for number, why in (
+            (counts["rejected_in_scale_transfer"], ""),
+            (counts["rejected_for_rays"], " for rays that contradict each other"),
+        )
+        if number
+    ]
+    return "".join(f", {part}" for part in parts)
 
 
 def _links(document: Document) -> Rows:
@@ -172,17 +196,6 @@ def _bundle(block: Document) -> str:
 def _precision(block: Document) -> Rows:
     for name, part in block["points"].items():
         yield f"precision in {name}", f"rms {metres(part['rms'])} m, largest {metres(part['max'])} m at {part['worst']}"
-    check = block.get("check")
-    if check:
-        inside = [
-            f"{check[name]['inside_95']} of {check[name]['count']} in {name}"
-            for name in ("plan", "height")
-            if check[name]["count"]
-        ]
-        chance = [
-            f"p = {fixed(test['p'], 3)}" for test in sorted(check["tests"], key=lambda test: float(test["p"]))[:1]
-        ]
-        yield "errors at check points", "; ".join([f"{', '.join(inside)} inside 95 % limits", *chance])
 
 
 def _worst(document: Document) -> Rows:

@@ -113,7 +113,7 @@ def junction_section(document: Document, *, everything: bool) -> Section:
     """Scale transfer: how well neighbouring models agree, and how the scale drifts."""
     junctions = document["junctions"]
     shown, note = worst_first(
-        junctions, lambda j: j["spread_ppm"] or 0.0, ("joints", "junctions", "junctions"), everything=everything
+        junctions, lambda j: j["spread_ppm"] or 0.0, ("junctions", "junctions", "junctions"), everything=everything
     )
     columns = (
         words("photo", "photo"),

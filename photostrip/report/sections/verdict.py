@@ -13,7 +13,7 @@ from photostrip.report.sections.strip import elsewhere
 HEADLINES = {
     "good": "GOOD: nothing calls for a second look.",
     "unverified": "UNVERIFIED: nothing calls for a second look, but {unverified}.",
-    "look": "LOOK at {number} before you use this:",
+    "look": "LOOK at {number} before you use this.",
     "failed": "FAILED: {failed}.",
 }
 LOOK_SHOWN = 10

@@ -8,7 +8,8 @@ import numpy as np
 
 from photostrip.result.numbers import Document, natural, rms
 from photostrip.result.points.given import PARTS, differences, size_columns
-from photostrip.result.points.precision import INSIDE, chances, normalised, point_columns
+from photostrip.result.points.own_precision import chances, normalised
+from photostrip.result.points.precision import INSIDE, point_columns
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.quantities import record, records
 
@@ -68,7 +69,8 @@ def _left_out(result: Result, fold: int) -> dict[str, Sequence[object]]:
     columns = {
         **differ,
         **{key: np.full(len(rows), np.nan) if column is None else column[at] for key, column in sigma.items()},
-        "normalised": found.normalised[rows],
+        "chance_plan": found.chance[rows, 0],
+        "chance_height": found.chance[rows, 1],
         "z_plan": over[:, 0],
         "z_height": over[:, 1],
         **chances(over),
@@ -82,9 +84,9 @@ def _summed(columns: Columns) -> Document:
     values: dict[str, Floats] = {
         name: np.array(column, float) for name, column in columns.items() if name not in {"id", "fold"}
     }
-    ratio = np.array(columns.pop("normalised"), float)
-    odd = {part: stand_out(values[part], 2 if part == "plan" else 1, ratio) for part in PARTS}
-    columns["stands_out"] = [[part for part in PARTS if odd[part][row]] for row in range(len(ratio))]
+    likely = {part: np.array(columns.pop(f"chance_{part}"), float) for part in PARTS}
+    odd = {part: stand_out(values[part], 2 if part == "plan" else 1, likely[part]) for part in PARTS}
+    columns["stands_out"] = [[part for part in PARTS if odd[part][row]] for row in range(len(columns["id"]))]
     return {
         part: {
             "count": int(np.isfinite(values[part]).sum()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import erfc, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.pipeline.given_points import rejected_control
 from photostrip.points import locate
 from photostrip.result.numbers import Document, natural_rank
+from photostrip.result.points.own_precision import chances, normalised
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.quantities import records
 
@@ -34,6 +36,7 @@ class Differences:
     # coordinate and of a point of one model together
     sigma: Floats
     normalised: Floats  # (c,): the largest difference of a point in units of that standard deviation
+    chance: Floats  # (c, 2): probability of a larger difference in plan, in height
     scale: Floats  # (c,): denominator of the photo scale at the point; NaN where it has no coordinates
     strips: tuple[tuple[str, ...], ...]
     rejected: Flags  # (c, 3): coordinates east, north, up of the control that were found wrong and not used
@@ -72,26 +75,42 @@ def differences(result: Result) -> Differences:
     sigma = _expected(result, held)
     with np.errstate(invalid="ignore"):
         ratio = np.abs(result.control_differences) / sigma
-    normalised = np.where(np.isnan(ratio).all(axis=1), np.nan, np.nan_to_num(ratio).max(axis=1, initial=0.0))
-    rejected = rejected_control(result)
+    ratios = np.where(np.isnan(ratio).all(axis=1), np.nan, np.nan_to_num(ratio).max(axis=1, initial=0.0))
+    rejected, chance = rejected_control(result), _likely(result, ratios)
     return Differences(
         axes=result.output.user_from_internal(axes),
         parts=parts,
         sigma=sigma,
-        normalised=normalised,
+        normalised=ratios,
+        chance=chance,
         scale=_scale(result, held),
         strips=tuple(tuple(s.strip.id for s, yes in zip(result.strips, row, strict=True) if yes) for row in held.T),
         rejected=rejected,
-        stands_out=_stands_out(control.check, np.where(rejected, np.nan, parts), normalised),
+        stands_out=_stands_out(control.check, np.where(rejected, np.nan, parts), chance),
     )
 
 
-def _stands_out(check: Flags, parts: Floats, normalised: Floats) -> Flags:
+def _likely(result: Result, ratio: Floats) -> Floats:
+    """Return the probability (c, 2) of a larger difference in plan and in height at every given point.
+
+    At check points from the precision of the point itself, where it is known; elsewhere from the ratio of the
+    difference to its standard deviation.
+    """
+    rows, values = normalised(result)
+    found = np.repeat([[erfc(each / sqrt(2.0))] for each in ratio.tolist()], 2, axis=1).reshape(-1, 2)
+    own = chances(values)
+    for part, column in zip(PARTS, found.T, strict=True):
+        known = np.isfinite(own[f"p_{part}"])
+        column[rows[known]] = own[f"p_{part}"][known]
+    return found
+
+
+def _stands_out(check: Flags, parts: Floats, chance: Floats) -> Flags:
     """Return which points do not go with the others of their role, in plan and in height."""
     found = np.zeros((len(check), 2), bool)
     for role in (check, ~check):
-        found[role, 0] = stand_out(np.hypot(parts[role, 0], parts[role, 1]), 2, normalised[role])
-        found[role, 1] = stand_out(parts[role, 2], 1, normalised[role])
+        found[role, 0] = stand_out(np.hypot(parts[role, 0], parts[role, 1]), 2, chance[role, 0])
+        found[role, 1] = stand_out(parts[role, 2], 1, chance[role, 1])
     return found
 
 

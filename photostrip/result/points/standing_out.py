@@ -6,25 +6,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.statistics import f_p_value
+from photostrip.statistics import TEST_LEVEL, f_p_value
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats
 
-LEVEL = 0.001  # probability that the largest of sound differences stands out
+# Probability that the largest of sound differences stands out; plan and height of control, check and left-out points.
+LEVEL = TEST_LEVEL / 6
 ODD_POINT = 4.0  # times the rms of the others: points at the ends of a strip are not as good as those within
-ODD_RATIO = 3.0  # times its standard deviation: a few good points can be better than they should be
+ODD_CHANCE = 0.0027  # of a larger difference, from its own standard deviation (3 sigma): few others may be too good
 MOST = 4  # at most one in so many points stands out
 
 
-def stand_out(size: Floats, coordinates: int, ratio: Floats) -> Flags:
+def stand_out(size: Floats, coordinates: int, chance: Floats) -> Flags:
     """Return which differences (n,) are too large for those that remain without them; NaN where there is none.
 
     The k largest stand out when the least of them does, by the F test of its square against the mean square of the
     n - k others: two wrong points must not hide each other.
 
     coordinates: coordinates in a difference, 2 in plan.
-    ratio: (n,), differences over their standard deviations.
+    chance: (n,), probability of a larger difference, from the standard deviation of each.
     """
     found = np.zeros(len(size), bool)
     known = np.flatnonzero(np.isfinite(size))
@@ -32,9 +33,9 @@ def stand_out(size: Floats, coordinates: int, ratio: Floats) -> Flags:
     count, squares = len(order), size[order] ** 2
     number = np.arange(1, min(max(1, count // MOST), count - 1) + 1)
     rest = np.cumsum(squares[::-1])[::-1][number] / (count - number)
-    far = (squares[number - 1] > ODD_POINT**2 * rest) & (ratio[order[number - 1]] > ODD_RATIO)
+    far = (squares[number - 1] > ODD_POINT**2 * rest) & (chance[order[number - 1]] < ODD_CHANCE)
     for k, mean in zip(number[far].tolist(), rest[far].tolist(), strict=True):
-        chance = f_p_value(squares[k - 1] / mean, coordinates, coordinates * (count - k)) if mean else 0.0
-        if chance * (count - k + 1) < LEVEL:
+        among = f_p_value(squares[k - 1] / mean, coordinates, coordinates * (count - k)) if mean else 0.0
+        if among * (count - k + 1) < LEVEL:
             found[order[:k]] = True
     return found

@@ -32,7 +32,7 @@ SYMBOLS = {
     "A": "rotation of a photo, image to strip, by rows",
     "BX, BY, BZ": "components of the base, scale of the strip",
     "N": "ray factor of the left ray, from the model with base 1",
-    "D, D'": "distance of a pass point from the common centre, in the model before and after the joint",
+    "D, D'": "distance of a pass point from the common centre, in the model before and after the junction",
     "k": "scale factor of a model; k_t of one pass point",
     "A0": "azimuth of X of the intermediate frame, clockwise from north",
     "M": "axes of the intermediate frame, as columns, in the Cartesian frame",

@@ -99,7 +99,7 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
         points=points.covariance * factor,
         photos=photos.covariance * factor,
         control=one.strip.misclosures,
-        tested=prediction.tested(one.system, cofactors, len(one.strip.misclosures.point)),
+        tested=prediction.tested(one.system, cofactors, len(one.strip.misclosures.point), settings.level),
         factor=factor,
         basis=basis,
         sigma=start.sigma * float(np.sqrt(factor)),

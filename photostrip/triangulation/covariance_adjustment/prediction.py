@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-LEVEL = 0.03  # probability that any control coordinate of a sound strip is called doubtful
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
 
 
@@ -58,6 +57,7 @@ class AdjustmentTest:
     normalised: Floats
     size: Floats  # (w,): error of the given coordinate, given minus true, that would explain it, metres
     distances: int  # distances of pass points that took part
+    level: float  # probability that any control coordinate of a sound strip is called doubtful
 
     @property
     def probability(self) -> float:
@@ -66,8 +66,8 @@ class AdjustmentTest:
 
     @property
     def limit(self) -> float:
-        """Test value that the largest of all control coordinates exceeds by chance in 3 % of strips."""
-        return normal_quantile(1 - LEVEL / (2 * max(len(self.normalised), 1)))
+        """Test value that the largest of all control coordinates exceeds by chance with that probability."""
+        return normal_quantile(1 - self.level / (2 * max(len(self.normalised), 1)))
 
     @property
     def doubtful(self) -> Numbers:
@@ -266,10 +266,12 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     return result
 
 
-def tested(found: system.System, cofactors: Floats, count: int) -> AdjustmentTest:
+def tested(found: system.System, cofactors: Floats, count: int, level: float) -> AdjustmentTest:
     """Test the adjustment as a whole, w^T lambda, and each control coordinate, lambda / sqrt(q).
 
-    ``cofactors`` (n,) are those of the correlates, ``count`` is the number of control coordinates.
+    cofactors: (n,), of the correlates.
+    count: number of control coordinates.
+    level: probability of calling any of them doubtful in a sound strip.
     """
     wanted, correlates = found.conditions, found.correlates
     rows = np.flatnonzero(wanted.kind == CONTROL)
@@ -284,4 +286,5 @@ def tested(found: system.System, cofactors: Floats, count: int) -> AdjustmentTes
         normalised=normalised,
         size=size,
         distances=distances,
+        level=level,
     )

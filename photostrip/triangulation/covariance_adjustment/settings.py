@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from photostrip.statistics import TEST_LEVEL
+
 # standard deviations over those of the polynomial: where the covariance does not do better than that, the polynomial
 # of the textbook stays
 BETTER = 0.90
@@ -15,3 +17,5 @@ class CovarianceSettings:
 
     # whether distances of pass points from the common centres of their models count beside the control
     distances: bool = True
+    # probability that a control coordinate of a sound strip is called doubtful; and that the strip as a whole is
+    level: float = TEST_LEVEL / 2

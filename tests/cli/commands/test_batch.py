@@ -257,12 +257,12 @@ def test_projects_may_move_together_with_their_results(here: Path, capsys: pytes
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["nowhere/*"], "nowhere/*: no project fits this pattern"),
+        (["nowhere/*"], "nowhere/*: no project matches this pattern"),
         (["empty"], "empty: there is no project.yaml in this folder or below it"),
         (["@list.txt"], "list.txt: does not exist"),
         (["strips", "--depfile", "x.d"], "a rule for make needs a target"),
         (["strips", "--executor", "slurm"], "'slurm' is not 'local'"),
-        (["strips", "--executor", "dask:nonsense"], "`dask:nonsense` is no address of a scheduler"),
+        (["strips", "--executor", "dask:nonsense"], "`dask:nonsense` is not the address of a scheduler"),
         (["strips", "-j", "0"], "greater than or equal to 1"),
         (["strips", "-o", "file.txt"], "is a file; expected a folder"),
     ],
@@ -294,7 +294,7 @@ def test_wrong_usage_is_told_in_the_form_that_was_asked_for(capsys: pytest.Captu
     assert main(["batch", "nowhere/*", "--format", "csv"]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert "no project fits this pattern" in captured.err
+    assert "no project matches this pattern" in captured.err
 
 
 @pytest.mark.slow

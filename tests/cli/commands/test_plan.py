@@ -242,7 +242,7 @@ def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Pat
         ("--control=bunds", 2, "error: --control: `bunds` is not known"),
         ("--control=bands=12", 2, "error: --control: 12 bands cannot be placed on 11 photos"),
         ("--required=a,0.1", 2, "error: --required: `a` is not a number"),
-        ("--into=corners", 2, "Invalid value for --into: nothing is to be placed"),
+        ("--into=corners", 2, "Invalid value for --into: there is nothing to be placed"),
         ("--set=layouts.a={bands: 3, every: 4}", 2, "layouts.a.every: the number of bands and their distance"),
         ("--set=layouts.a={gnss: [1, 1, 1]}", 0, ""),
     ],

@@ -97,4 +97,4 @@ def test_a_project_is_no_specification(spec: Path, capsys: pytest.CaptureFixture
     folder = spec.parent / "out"
     assert main(["simulate", str(spec), "-o", str(folder), "-q"]) == 0
     assert main(["simulate", str(folder / "project.yaml"), "-o", str(spec.parent / "other")]) == 2
-    assert "the key `photostrip` is not known" in capsys.readouterr().err
+    assert "photostrip: this is a project for `photostrip run`" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 
 import pytest
 
@@ -16,8 +17,8 @@ from tests.results import FRAMES, Document, case
 from tests.source_tree import ROOT
 
 
-def lines(document: Document) -> list[str]:
-    return to_text(title_of(document), chosen_sections(document), 100).splitlines()
+def lines(document: Document, width: int = 100) -> list[str]:
+    return to_text(title_of(document), chosen_sections(document, width=width), width).splitlines()
 
 
 def crowded() -> Document:
@@ -61,10 +62,17 @@ def test_it_is_short_with_too_much_of_everything() -> None:
     said = " ".join(printed)
     for name in ("verdict", "findings", "control", "check", "rejected", "undetermined", "notes"):
         assert f"--section {name}" in said
+    assert [width for width in (80, 120, 200) if len(lines(crowded(), width)) > MOST_LINES] == []
+
+
+@pytest.mark.parametrize("sample", ["simulated-20", "apollo15-metric-strip"])
+def test_it_is_short_on_a_terminal_of_80_columns(sample: str) -> None:
+    document = json.loads((ROOT / "sample_data" / sample / "baseline.json").read_text(encoding="utf-8"))
+    assert 60 < len(lines(document, 80)) <= MOST_LINES
 
 
 def test_each_stage_has_one_line() -> None:
-    (stages,) = (each for each in overview(case().document) if each.title == "Stages")
+    (stages,) = (each for each in overview(case().document, 100) if each.title == "Stages")
     (facts,) = stages.parts
     assert isinstance(facts, Facts)
     assert [label for label, _ in facts.rows][:4] == [
@@ -84,7 +92,7 @@ def test_the_worst_check_points_are_shown_and_the_others_counted() -> None:
     document["precision"]["check"]["points"] = [
         {**known, "id": name, "plan": float(number), "p_plan": 1.0 / (1 + number)} for number, name in enumerate(checks)
     ]
-    (section,) = (each for each in overview(document) if each.title == "Check points")
+    (section,) = (each for each in overview(document, 100) if each.title == "Check points")
     (table,) = (part for part in section.parts if isinstance(part, Table))
     assert [row[0] for row in table.rows[:2]] == ["299", "298"]
     assert f"{300 - len(table.rows)} more points: --section check, or `control` in result.json" in table.note

@@ -200,7 +200,7 @@ def test_the_control_alone_when_asked_for() -> None:
     control = blocks[0]["control_coordinates"]
     assert [block["distances"] > 0 for block in blocks] == [False, True]
     assert [block["redundancy"] - block["distances"] for block in blocks] == [control - 7, control - 7]
-    assert [document["settings"]["covariance"] for document in documents] == [{"distances": False}, {"distances": True}]
+    assert [document["settings"]["covariance"]["distances"] for document in documents] == [False, True]
     told = [project_section(document).parts[0] for document in documents]
     assert ["control alone" in str(part) for part in told] == [True, False]
     more, less = (each.precision.points for each in found if each.precision is not None)

@@ -28,6 +28,7 @@ MARGIN_SHARES = (0.6, 0.25)  # of the width and the height of the area: a neighb
 MARGIN_LIMITS_DEG = (1.0, 4.0)
 CIRCLE_DEG = 360.0
 MOST_OUTSIDE_SHARE = 0.5  # of the points: single ones are slips
+FAR = 1000.0  # times the median distance from the median place: a slip of the pen, which says nothing of the others
 MOST_ROUND_TRIP = 1.0  # units of the frame between a point and where its geocentric coordinates lead back to
 MILLION = 1e6
 TENS = (10.0, 100.0, 1000.0)  # of coordinates with lost digits, or in kilometres
@@ -48,7 +49,7 @@ def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number:
 
     enu: (n, 3), its points east, north, up, in the units of the frame.
     """
-    known = enu[np.isfinite(enu[:, :2]).all(axis=1)]
+    known = _together(enu[np.isfinite(enu[:, :2]).all(axis=1)])
     if area is None or not len(known) or frame.kind not in {"projected", "geographic"}:
         return FramePlace([], None, inside=True)
     level = np.column_stack([known[:, :2], np.zeros(len(known))])
@@ -80,6 +81,14 @@ def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number:
             return FramePlace([finding], sure=None, inside=False)
     fix = "is the crs the right one: zone, datum, false easting and northing?"
     return FramePlace([found("P402", head, fix, evidence, key=f"{key}.crs")], sure=None, inside=False)
+
+
+def _together(enu: Floats) -> Floats:
+    """Return points without those that lie so far from the others that no map reaches there."""
+    if not len(enu):
+        return enu
+    far = np.abs(enu[:, :2] - np.median(enu[:, :2], axis=0)).max(axis=1)
+    return np.asarray(enu[far <= FAR * np.median(far)], float)
 
 
 def _readings(level: Floats) -> Iterator[tuple[str, Floats, str, str]]:
