@@ -98,7 +98,8 @@ def test_the_probe_of_loaded_packages_can_see_one() -> None:
 def test_a_plain_run_loads_no_room_that_it_does_not_enter() -> None:
     names = python(
         "import sys\nfrom photostrip.cli.main import main\n"
-        "assert main(['run', 'sample_data/simulated-20/project.yaml', '--quiet']) == 0\nprint(*sys.modules)"
+        "one = '--set=processing.adjustment=polynomial'  # the default tries the covariance of the strip too\n"
+        "assert main(['run', 'sample_data/simulated-20/project.yaml', one, '--quiet']) == 0\nprint(*sys.modules)"
     ).split()
     assert "photostrip.triangulation.polynomial.correction" in names
     rooms = (
@@ -118,6 +119,30 @@ def test_a_strip_without_gross_errors_is_run_without_the_bundle_and_scipy() -> N
     ).split()
     assert "photostrip.triangulation.polynomial.correction" in names
     assert not {"photostrip.triangulation.bundle.solution", "scipy"} & set(names)
+
+
+DROP = "--set=processing.relative.drop=[1007/1007-1, 1015/1015-7]"  # the gross errors of the sample
+
+
+@pytest.mark.parametrize(
+    ("arguments", "most"),
+    [(("run", DROP, "--quiet"), 270), (("check",), 225), (("run", "--help"), 40)],
+)
+def test_modules_are_a_budget(arguments: tuple[str, ...], most: int) -> None:
+    """A module takes about a millisecond, a two-hundredth of what numpy, pyproj and yaml take together."""
+    command, *options = arguments
+    names = python(
+        "import sys\nfrom photostrip.cli.main import main\n"
+        f"assert main([{command!r}, 'sample_data/simulated-20/project.yaml', *{options!r}]) == 0\nprint(*sys.modules)"
+    ).splitlines()[-1]
+    loaded = names.split()
+    assert sum(name.startswith("photostrip") for name in loaded) <= most
+    assert not {"rich", "scipy", "jinja2", "matplotlib"} & {name.partition(".")[0] for name in loaded}
+
+
+def test_reading_a_project_does_not_load_the_walk() -> None:
+    code = "import sys, photostrip.project.loading\nprint('photostrip.pipeline.run' in sys.modules)"
+    assert python(code) == "False"
 
 
 # ---------------------------------------------------------------------------------------------------- the table

@@ -6,9 +6,15 @@ themselves stand in ``strips/``, strips together in ``block/``, covariances in `
 against themselves in ``plausibility/``. The equations are those of ``triangulation/``.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from photostrip.pipeline.inputs import ADJUSTMENTS, AUTO, METHODS, Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.pipeline.results import CHECK, CONTROL, NEW, Adjusted, Precision, Result, StripResult, Ties
-from photostrip.pipeline.run import triangulate
+
+if TYPE_CHECKING:
+    from photostrip.pipeline.run import triangulate
 
 __all__ = [
     "ADJUSTMENTS",
@@ -29,3 +35,13 @@ __all__ = [
     "Ties",
     "triangulate",
 ]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 (whatever the module has)
+    """Load the walk when it is asked for: what only reads a project does without."""
+    if name == "triangulate":
+        from photostrip.pipeline.run import triangulate
+
+        return triangulate
+    message = f"module {__name__!r} has no attribute {name!r}"
+    raise AttributeError(message)

@@ -11,7 +11,7 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.source import current, seen_from
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Result, Settings, triangulate
+from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings
 from photostrip.pipeline.frames import TiedFrames
 from photostrip.points import PhotoPoints
 from photostrip.project import conversion
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from photostrip.camera import Camera
     from photostrip.formats.text.findings import Findings
     from photostrip.notes import Finding, Note
+    from photostrip.pipeline import Result
 
 __all__ = ["Project", "adjust_project", "json_schema", "load_project"]
 
@@ -101,6 +102,8 @@ class Project:
 
 def adjust_project(project: Project) -> Result:
     """Adjust a project; what is refused has its place in the project file."""
+    from photostrip.pipeline import triangulate  # what only reads a project does without
+
     with project.places():
         return triangulate(project.inputs, project.settings, directory=project.grid_folder, tied=project.tied)
 
