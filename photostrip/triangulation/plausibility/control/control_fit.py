@@ -33,8 +33,7 @@ GOOD_SHARE = 0.55  # of the points, at least
 NO_GOOD_DRAW = 1e-3  # probability that no draw of as many points as unknowns, for a start, is of good points alone
 LEAST_DETERMINANT = 1e-9  # of such a draw, columns of size one
 PLAN_REFITS = 3
-REWEIGHTINGS, SOFT_REWEIGHTINGS = 12, 8  # of a robust fit: in all, and with weights that fall slowly
-SETTLED = 0.05  # of the middle residual: a step below it ends the weights that fall slowly
+REWEIGHTINGS = 12  # of a robust fit
 KEPT_SIGMAS = 5.0  # robust standard deviations within which a point goes with the others
 ODD_PROBABILITY = 1e-6  # that a good point is called odd
 TOGETHER_SIGMAS = 2.5  # smallest standard deviations that make sense: points that lie within all go together
@@ -199,8 +198,8 @@ def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, flo
     """Fit columns to values, with less and less weight for what does not go with the others.
 
     Where all points go together, that is the fit of all. Else it starts from the fit through as many points as unknowns
-    whose median residual is smallest, goes on with weights that fall with the residual, and ends with the points that
-    go with each other, all of one weight.
+    whose median residual is smallest, takes weights that fall with what that leaves, and ends with the points that go
+    with each other, all of one weight.
 
     columns, values: (n, c), (n,), metres; in_fit: (n,), points that may take part.
     floor: smallest standard deviation that makes sense, metres.
@@ -239,21 +238,15 @@ def _weighted(columns: NDArray[Any], values: NDArray[Any], weight: Floats) -> tu
 def _reweighted(
     columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, floor: float
 ) -> tuple[NDArray[Any], NDArray[Any], Flags]:
-    """Fit with weights that fall with the residual, then without what is far away; those kept come third."""
+    """Fit with the weights of a first fit, then without what is far away; those kept come third."""
     first = _least_median(columns, values, np.flatnonzero(in_fit))
     weight = in_fit.astype(float)
     if first is not None:
         weight = in_fit / np.maximum(first / max(_robust(first[in_fit], columns.shape[1]), floor), 0.5) ** 2
     coefficient, residual = np.zeros(columns.shape[1], values.dtype), values
-    is_soft = True
-    for step in range(REWEIGHTINGS):
-        last = residual
+    for _ in range(REWEIGHTINGS):
         coefficient, residual = _weighted(columns, values, weight)
         middle = max(_robust(np.abs(residual[in_fit]), columns.shape[1]), floor)
-        is_soft = is_soft and step < SOFT_REWEIGHTINGS and bool(np.abs(residual - last).max() > SETTLED * middle)
-        if is_soft:  # first by absolute residuals
-            weight = in_fit / np.maximum(np.abs(residual) / middle, 0.5)
-            continue
         before, weight = weight, (in_fit & (np.abs(residual) < KEPT_SIGMAS * middle)).astype(float)
         if (before == weight).all():
             break
