@@ -327,3 +327,19 @@ def test_three_photos_are_the_shortest_strip() -> None:
     assert len(strip_of(3).centers) == 3
     with pytest.raises(InputError, match="2 photos cannot make a strip"):
         strip_of(2)
+
+
+def test_what_a_run_would_choose_by_itself() -> None:
+    corners = ControlLayout("corners", kind="corners")
+    report = plan_strip(Design(StripGeometry(FILM, 7, points=SIMPLE), (corners,)))
+    chosen = report.chosen(corners)
+    assert chosen is not None
+    assert (chosen.adjustment, chosen.polynomial) == ("covariance", SIMILARITY)  # four points carry no second degree
+    found = {each.method: each.accuracy for each in report.outcomes if each.accuracy is not None}
+    rms = {
+        name: np.sqrt((found[name].plan_and_height[found[name].new] ** 2).mean(axis=0)).prod()
+        for name in (SIMILARITY, COVARIANCE)
+    }
+    assert chosen.ratio == pytest.approx(np.sqrt(rms[COVARIANCE] / rms[SIMILARITY]))
+    without = plan_strip(Design(StripGeometry(FILM, 7, points=SIMPLE), (corners,), (SIMILARITY, BUNDLE)))
+    assert without.chosen(corners) is None

@@ -310,6 +310,19 @@ def test_the_f_test_is_that_of_two_sums_of_squares() -> None:
         assert evidence.p == pytest.approx(f_distribution.sf(ratio, gained, left), rel=1e-6, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("p", "rich", "taken"), [(0.04, 0.9, True), (0.09, 0.9, False), (0.001, 1.1, False), (float("nan"), 0.9, False)]
+)
+def test_the_f_test_and_left_out_control_must_agree_on_a_step(
+    p: float, rich: float, monkeypatch: pytest.MonkeyPatch, *, taken: bool
+) -> None:
+    xyz = layout(SEVEN)
+    one = noisy(1, bent(xyz, 2.0, 2), xyz)
+    monkeypatch.setattr(correction, "_f_test", lambda *_: (1.0, p))
+    monkeypatch.setattr(correction, "_left_out_errors", lambda *_: ([1.0] + [rich] * 9, "band"))
+    assert (fit(one, PolynomialSettings()).degree > 0) == taken
+
+
 def test_no_degree_beyond_the_third_is_tried() -> None:
     xyz = layout(np.linspace(-9000, 9000, 15))
     found = fit(noisy(1, bent(xyz, 30.0, 4), xyz), PolynomialSettings())  # what only a fourth degree would take up
