@@ -3,8 +3,7 @@
 Errors that hide each other are found by no test of single points. So plan and height of every point, and every bend of
 the strip, get a variance of their own beside the covariance of the misclosures. All begin as large as the largest
 misclosure, and each is multiplied by its own test value, the root of (M w)_K^T (M w)_K / tr M_KK, as often as there are
-parts: those of wrong coordinates stay, the others fade away. What stays is a candidate; the tests decide. Multiplied by
-the square, as in the source, they fade faster and into worse sets.
+parts (by the square, as in the source, into worse sets): those of wrong coordinates stay as candidates for the tests.
 
 Source: [Förstner 1979].
 """

@@ -1,8 +1,4 @@
-"""A strip at its control: misclosures of all coordinates with their covariance, in sections of a long strip.
-
-The misclosures are correlated: the strip bends as a whole. Their covariance is that of the strip, from its measurements
-through all stages, and that of the given coordinates.
-"""
+"""A strip at its control: misclosures of all coordinates with their covariance, in sections of a long strip."""
 
 from __future__ import annotations
 

@@ -4,10 +4,6 @@ Only pairs that fail the test are touched. They are oriented with falling weight
 three points is taken out whose removal lets the pair pass. Where no such set exists, what lies beyond three standard
 deviations of the robust start goes, then one point after the other, until a set of up to three explains the rest.
 
-The work is bounded: a pair that does not converge is solved from nothing once in a search, points go one after the
-other only as long as half of them are left, and nothing is searched for where all pairs scatter by more than any
-measurement does.
-
 Nothing is taken back: in a strip of three photos or more the rays are tested all again, along the strip; in pairs of 12
 to 30 points of which up to a fifth is wrong 0.1 % of the good ones are lost.
 
