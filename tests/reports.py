@@ -45,6 +45,7 @@ def fresh() -> Document:
     control = inputs.control
     inputs = replace(inputs, control=replace(control, ids=(*control.ids[:3], "G4 bis", *control.ids[4:])))
     settings = Settings(
+        adjustment="polynomial",
         relative=replace(Settings().relative, screening="parallax+grubbs"),
         polynomial=replace(Settings().polynomial, degree="2"),
         tolerances=TOLERANCES,

@@ -126,12 +126,6 @@ class StripResult:
     model_stages: ModelStages | None = None  # None for photos
 
     @property
-    def correction(self) -> Polynomial | None:
-        """The polynomial, where it is what took the deformation out."""
-        taken = self.choice is None or self.choice.taken == "polynomial"
-        return self.polynomial if taken else None
-
-    @property
     def wrong_control(self) -> tuple[Rejection, ...]:
         """Control coordinates that were rejected."""
         return self.screened_control.rejections

@@ -72,7 +72,6 @@ def test_other_strips_get_their_covariance(name: str) -> None:
     assert choice.predicted.ratio < BETTER
     assert choice.left_out is not None
     assert choice.excess == pytest.approx(1.0, abs=0.7)
-    assert strip.correction is None
     assert strip.polynomial is not None  # shown all the same
     assert points_of(result) == points_of(adjusted(name, "covariance"))
 
@@ -109,7 +108,7 @@ def test_a_method_that_is_asked_for_is_made(method: str) -> None:
     result = adjusted("usual", method)
     (strip,) = result.strips
     assert strip.choice is None
-    assert (strip.correction is not None) == (method == "polynomial")
+    assert (strip.polynomial is not None) == (method == "polynomial")
     assert (strip.of_photos.covariance is not None) == (method == "covariance")
     document = document_of(result)
     assert document["adjustment"] == method

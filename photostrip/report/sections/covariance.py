@@ -21,8 +21,7 @@ def covariance_section(document: Document, *, everything: bool) -> Section:
     distances = document["settings"].get("covariance", {}).get("distances", True)
     text = (
         f"The misclosures at the control {'and the distances of the pass points ' if distances else 'alone '}are "
-        "distributed to every point by least-squares prediction with the covariance of the strip itself; there is no "
-        "polynomial and nothing to choose."
+        "distributed to every point by least-squares prediction with the covariance of the strip itself."
     )
     parts: list[Part] = [Words(text)]
     for block in blocks:

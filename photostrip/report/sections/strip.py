@@ -140,7 +140,7 @@ def _drift(strip: Document) -> str:
     drift, along = strip["scale_drift"], strip["discrepancy"]
     text = f"{fixed(drift['expected_ppm'], 0)} ppm expected over the strip (one standard deviation)"
     if drift["found_ppm"] is not None:
-        text += f", {fixed(drift['found_ppm'], 0)} ppm removed by the polynomial"
+        text += f", {fixed(drift['found_ppm'], 0)} ppm by the polynomial"
     if along["up"] is not None:
         text += (
             f"; rms differences between models {', '.join(f'{metres(along[name])} m {name}' for name in DIRECTIONS)}"

@@ -92,8 +92,8 @@ def _expected_drift(strip: StripResult) -> float:
 
 
 def _found_drift(strip: StripResult) -> float:
-    """Change of scale along the strip that the polynomial took out; NaN when there is none."""
-    correction = strip.correction
+    """Change of scale along the strip that the polynomial takes out; NaN when there is none."""
+    correction = strip.polynomial
     if correction is None or not correction.axes[0].terms:
         return np.nan
     start, end = (_scale_change(correction, x) for x in strip.centers[[0, -1], 0])

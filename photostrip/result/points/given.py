@@ -97,7 +97,7 @@ def _likely(result: Result, ratio: Floats) -> Floats:
     difference to its standard deviation.
     """
     rows, values = normalised(result)
-    found = np.repeat([[erfc(each / sqrt(2.0))] for each in ratio.tolist()], 2, axis=1).reshape(-1, 2)
+    found = np.array([[erfc(each / sqrt(2.0))] * 2 for each in ratio.tolist()]).reshape(-1, 2)
     own = chances(values)
     for part, column in zip(PARTS, found.T, strict=True):
         known = np.isfinite(own[f"p_{part}"])
