@@ -170,7 +170,8 @@ def errors_of(cell: Cell, seed: int) -> tuple[dict[str, Floats], str]:
     oriented = orient_on_control(formed, measured_control(inputs.control, observations), ground.control)
     screened = reject_wrong_control(oriented, settings)
     adjusted = {each: adjust(screened, replace(settings, adjustment=each)) for each in (*METHODS, AUTO)}
-    taken = "polynomial" if adjusted[AUTO].correction is not None else "covariance"
+    choice = adjusted[AUTO].choice
+    taken = "polynomial" if choice is None else choice.taken
     return {name: _rms(simulation, each, observations.point_ids) for name, each in adjusted.items()}, taken
 
 
