@@ -216,7 +216,7 @@ def test_false_alarms_prints_a_row_for_each_layout() -> None:
 
 @pytest.mark.slow
 def test_verdict_prints_what_is_seen() -> None:
-    out = printed("verdict.py", "--number", "1", "--first", "3")
+    out = printed("verdict.py", "--number", "1", "--first", "4")
     rows = re.findall(
         r"^(.{28})(check points|left out) +(\d) +(\d) +(\d) +(\d) +(\d) +\d\.\d\d +\d\.\d\d", out, re.MULTILINE
     )

@@ -37,7 +37,7 @@ PLANE_MAP = replace(
 
 
 def degree(asked: str) -> Settings:
-    return Settings(polynomial=correction.PolynomialSettings(asked))
+    return Settings(adjustment="polynomial", polynomial=correction.PolynomialSettings(asked))
 
 
 def errors(simulation: Simulation, result: Result) -> Floats:
