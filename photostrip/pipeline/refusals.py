@@ -18,13 +18,19 @@ OF_MODELS = ("auto", "polynomial", "similarity")  # adjustments that need no ima
 
 
 def require_runnable(inputs: Inputs, settings: Settings) -> None:
-    """Refuse an adjustment that does not exist, and measurements on photos whose camera nobody knows."""
+    """Refuse an adjustment that does not exist, and photos in tables that no strip has."""
     _require_adjustment(settings, ADJUSTMENTS, "is not available", "not-available")
-    cameras = inputs.cameras
-    stray = [photo for photo in inputs.observations.photo_ids if photo not in cameras]
-    if stray:
-        message = f"photo {stray[0]} is measured but belongs to no strip ({len(stray)} such photos)"
-        raise InputError(Fault(message, code="photo-without-strip", key="strips"))
+    positions, orientations = inputs.positions, inputs.orientations
+    tables = {
+        "is measured": inputs.observations.photo_ids,
+        "has a given position": () if positions is None else positions.photos,
+        "has a given orientation": () if orientations is None else orientations.photos,
+    }
+    flown = {photo for flight in inputs.flights for photo in flight.photos}
+    for what, photos in tables.items():
+        if stray := [photo for photo in photos if photo not in flown]:
+            message = f"photo {stray[0]} {what} but belongs to no strip ({len(stray)} such photos)"
+            raise InputError(Fault(message, code="photo-without-strip", key="strips"))
 
 
 def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
 
+LEAST_STATED = 0.005  # micrometres, which the document rounds to nothing
 SIGMA0_RATIO = 1.5  # of sigma0 to the stated standard deviation
 PAIR_RATIO = 1.5  # of a pair's sigma0 to that of the others, or to the stated one, when chance does not explain it
 PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
@@ -234,10 +235,15 @@ def _percent(chance: float) -> str:
     return f"{100 * chance:.1f} %" if chance >= SMALLEST else f"below {100 * SMALLEST:g} %"
 
 
+def _stated(document: Document) -> float:
+    """Return the stated standard deviation of an image or model coordinate, micrometres."""
+    return max(float(document["summary"]["sigma_given_um"]), LEAST_STATED)
+
+
 def _sigma0(document: Document) -> Iterator[str]:
     summary = document["summary"]
-    found, given = summary["sigma0_um"], summary["sigma_given_um"]
-    if found is None or not given or found <= SIGMA0_RATIO * given:
+    found, given = summary["sigma0_um"], _stated(document)
+    if found is None or found <= SIGMA0_RATIO * given:
         return
     if (found / given) ** 2 > chi2_quantile(1 - TEST_LEVEL, summary["redundancy"]) / summary["redundancy"]:
         kind = "model" if summary.get("model_scale") else "image"
@@ -249,7 +255,7 @@ def _sigma0(document: Document) -> Iterator[str]:
 
 def _pairs(document: Document) -> Iterator[str]:
     """Name the pairs that are worse than the others, or than stated, by more than chance."""
-    given = document["summary"]["sigma_given_um"]
+    given = _stated(document)
     # said of the whole project already, or explained by what the photos have in common
     quiet = any(True for _ in _sigma0(document)) or bool(document.get("bundle", {}).get("calibration"))
     pairs = [model for model in document["models"] if model["sigma0_um"] is not None]

@@ -204,6 +204,14 @@ def test_a_principal_distance_one_percent_off_over_relief_is_not_good(seed: int)
 # ------------------------------------------------------------------------------------------------------------ pairs
 
 
+def test_a_stated_standard_deviation_of_nothing_is_told() -> None:
+    """A nanometre is rounded to no micrometres."""
+    document = case("projected", 2).document
+    stated_as_nothing = {**document, "summary": {**document["summary"], "sigma_given_um": 0.0}}
+    (text, *_) = verdict_of(stated_as_nothing)["look_at"]
+    assert text.startswith("the image coordinates are")
+
+
 def with_pairs(sigma0: list[float], project: float, *, calibration: bool = False) -> list[str]:
     """Give a sound result pairs with another sigma0, that of the project being what a bundle makes of it."""
     document = case("projected", 2).document

@@ -83,7 +83,10 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
     turn = rate = relinearisation.largest_turn(one.system)
     while formations < MOST_FORMATIONS and turn * rate / 2 > ENOUGH * start.sigma / start.focal:
         fresh = turn > FRESH
-        one = _formed_again(one, settings, factor, fresh=fresh)
+        again = _formed_again(one, settings, factor, fresh=fresh)
+        if again is None:
+            break
+        one = again
         turn = relinearisation.largest_turn(one.system)
         formations, rate = formations + 1, turn if fresh else rate
     errors, formed = one.strip.errors, one.strip.formed
@@ -117,10 +120,13 @@ class _Linearised:
     system: strip_system.System
 
 
-def _formed_again(before: _Linearised, settings: CovarianceSettings, factor: float, *, fresh: bool) -> _Linearised:
+def _formed_again(
+    before: _Linearised, settings: CovarianceSettings, factor: float, *, fresh: bool
+) -> _Linearised | None:
     """Form the strip from corrected image coordinates, and adjust it with the whole errors as unknowns again.
 
     The derivatives at hand will do, unless the strip has turned too much; then they are made afresh.
+    Returns None where rays that have met meet no longer: photos that contradict each other are turned at random.
     """
     strip, targets, rows = before.strip, before.strip.targets, before.strip.control_rows
     images = relinearisation.image_errors(before.system)
@@ -130,6 +136,8 @@ def _formed_again(before: _Linearised, settings: CovarianceSettings, factor: flo
     orientation = relinearisation.oriented_again(strip.orientation, xy)
     observations = replace(strip.observations, xy=xy)
     formed = relinearisation.formed_again(strip.formed, orientation, observations, strip.photos)
+    if len(formed.point) < len(strip.formed.point) or np.isnan(formed.xyz).any():
+        return None
     # the strip fits its control by now: weights do not matter to where it lies
     oriented = absolute.orient(formed.xyz[rows], targets, targets.control.use.astype(float), formed.xyz)
     kept = replace(formed, model_xyz=np.where(np.isnan(strip.formed.model_xyz), np.nan, formed.model_xyz))

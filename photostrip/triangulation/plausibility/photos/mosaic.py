@@ -46,7 +46,6 @@ class PhotoLinks:
     turn: Complex
     shift: Complex
     misfit: Floats  # (l,): mean residual, in the unit of the image coordinates
-    spread: Floats  # (l,): rms distance of the common points from their centre, on the second photo
     mirrored: Flags  # (l,): whether one of the two is a mirror image of the other
 
     @cached_property
@@ -90,12 +89,11 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
             turn=nowhere,
             shift=nowhere,
             misfit=none,
-            spread=none,
             mirrored=np.zeros(0, bool),
         )
     starts = np.concatenate([[0], np.cumsum(count)[:-1]])
     plain, mirror = _similar(z_a, z_b, starts, count), _similar(np.conj(z_a), z_b, starts, count)
-    spread, narrow = _shape(z_b, starts, count)
+    spread, narrow = _shape(z_b, mirror.weight, starts)
     mirrored = (
         (mirror.misfit < MIRROR_MISFIT_SHARE * plain.misfit)
         & (mirror.misfit < MOST_MIRROR_MISFIT * spread)
@@ -108,7 +106,6 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
         turn=np.where(mirrored, mirror.turn, plain.turn),
         shift=np.where(mirrored, mirror.shift, plain.shift),
         misfit=np.where(mirrored, mirror.misfit, plain.misfit),
-        spread=spread,
         mirrored=mirrored,
     )
 
@@ -149,6 +146,7 @@ class _Similarities(NamedTuple):
     turn: Complex
     shift: Complex
     misfit: Floats  # mean residual
+    weight: Floats  # of each point, which falls with its residual
 
 
 def _similar(z_a: Complex, z_b: Complex, starts: Numbers, count: Numbers) -> _Similarities:
@@ -167,18 +165,19 @@ def _similar(z_a: Complex, z_b: Complex, starts: Numbers, count: Numbers) -> _Si
         size = np.abs(d_b - turn[segment] * d_a)
         misfit = np.add.reduceat(weight * size, starts) / total
         weight = 1.0 / np.maximum(size / np.maximum(misfit, TINY)[segment], 0.5)
-    return _Similarities(turn, shift, misfit)
+    return _Similarities(turn, shift, misfit, weight)
 
 
-def _shape(z: Complex, starts: Numbers, count: Numbers) -> tuple[Floats, Flags]:
-    """Rms distance from the centre, and whether the points stand nearly on one line."""
-    segment = np.repeat(np.arange(len(count)), count)
-    d = z - (np.add.reduceat(z, starts) / count)[segment]
-    squares = np.add.reduceat(np.abs(d) ** 2, starts)
-    skew = np.abs(np.add.reduceat(d**2, starts))  # length squared minus breadth squared
+def _shape(z: Complex, weight: Floats, starts: Numbers) -> tuple[Floats, Flags]:
+    """Rms distance from the centre, and whether the points stand nearly on one line; by the points that a fit kept."""
+    total = np.add.reduceat(weight, starts)
+    segment = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(z))))
+    d = z - (np.add.reduceat(weight * z, starts) / total)[segment]
+    squares = np.add.reduceat(weight * np.abs(d) ** 2, starts)
+    skew = np.abs(np.add.reduceat(weight * d**2, starts))  # length squared minus breadth squared
     with np.errstate(divide="ignore", invalid="ignore"):
         breadth = np.sqrt((squares - skew) / (squares + skew))
-    return np.sqrt(squares / count), ~(breadth > LEAST_BREADTH)
+    return np.sqrt(squares / total), ~(breadth > LEAST_BREADTH)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from photostrip.points import PhotoPoints
 from photostrip.simulate import Flight, Spec, simulate
 from photostrip.triangulation.plausibility.photos import flight_order, mosaic, units
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.notes import Finding
-    from photostrip.points import PhotoPoints
     from photostrip.simulate import Simulation
 
 PHOTOS = 7
@@ -132,6 +132,23 @@ def test_the_same_photo_twice() -> None:
     assert codes(findings) == ["P203"]
     assert set(findings[0].photos) == {photos[2], "copy"}
     assert arranged.photos == photos
+
+
+def test_photos_whose_few_points_stand_on_a_line_but_for_one_are_no_mirror_images() -> None:
+    """Mirrored about the line, all but one fit at once: neither a mirrored photo nor the same one twice."""
+    left = [(64.0, -20.7), (82.2, 15.7), (91.1, 94.6), (85.7, 2.5), (91.8, -85.4)]
+    right = [(-104.8, -21.4), (-81.1, 14.6), (-92.3, 92.7), (-78.1, 1.3), (-92.2, -86.5)]
+    both = PhotoPoints(
+        photo_ids=("1", "3"),
+        point_ids=tuple("abcde"),
+        photo=np.repeat([0, 1], 5),
+        point=np.tile(np.arange(5), 2),
+        xy=np.array(left + right),
+        sigma=np.full((10, 2), 0.005),
+    )
+    links = mosaic.link(both, ("1", "3"))
+    assert not links.mirrored.any()
+    assert abs(links.bases[1][0]) > 100.0
 
 
 def test_a_gap_is_named_by_the_photos_beside_it() -> None:
