@@ -15,6 +15,15 @@ def _keys(incomplete: str) -> list[str]:
     return keys(incomplete)
 
 
+def _page(width: int | None) -> int | None:
+    from photostrip.report.page.layout import NARROWEST, WIDEST
+
+    if width is not None and not NARROWEST <= width <= WIDEST:
+        msg = f"{width} characters; the text is {NARROWEST} to {WIDEST} wide"
+        raise typer.BadParameter(msg)
+    return width
+
+
 Assignments = Annotated[
     list[str] | None,
     typer.Option(
@@ -31,6 +40,7 @@ Width = Annotated[
         "--width",
         metavar="N",
         envvar="PHOTOSTRIP_WIDTH",
+        callback=_page,
         help="Width of the text, 60 to 200; default: that of the terminal.",
     ),
 ]

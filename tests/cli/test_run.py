@@ -166,6 +166,8 @@ def test_tolerances_that_are_kept_give_0(project: Path, capsys: pytest.CaptureFi
         (["{project}", "--format", "xml"], 2, "'xml' is not one of"),
         (["{project}", "--depfile", "x.d"], 2, "give --output as well"),
         (["{project}", "--width", "wide"], 2, "--width"),
+        (["{project}", "--width", "10"], 2, "10 characters; the text is 60 to 200 wide"),
+        (["{project}", "--width", "201"], 2, "201 characters; the text is 60 to 200 wide"),
         (["{project}", "--set", "processing.nonsense=1"], 2, "nonsense"),
         (["{project}", "-o", "{project}"], 2, "project.yaml: is a file; expected a folder"),
     ],

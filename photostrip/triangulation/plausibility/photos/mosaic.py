@@ -165,7 +165,7 @@ def _similar(z_a: Complex, z_b: Complex, starts: Numbers, count: Numbers) -> _Si
         size = np.abs(d_b - turn[segment] * d_a)
         misfit = np.add.reduceat(weight * size, starts) / total
         weight = 1.0 / np.maximum(size / np.maximum(misfit, TINY)[segment], 0.5)
-    return _Similarities(turn, shift, misfit, weight)
+    return _Similarities(turn=turn, shift=shift, misfit=misfit, weight=weight)
 
 
 def _shape(z: Complex, weight: Floats, starts: Numbers) -> tuple[Floats, Flags]:
