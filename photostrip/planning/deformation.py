@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.planning.element_errors import influence, measured_covariance
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
 from photostrip.triangulation.relative_orientation import six_points
 
@@ -55,24 +56,77 @@ class Constants(NamedTuple):
 SIDE, CENTRAL = "side", "central"
 # as printed, rounded to one decimal
 PRINTED = {SIDE: Constants(3.5, 2.3), CENTRAL: Constants(2.1, 1.6)}
+# the worked example of the source, micrometres at photo scale, and what it is computed for
+PRINTED_EXAMPLE = {SIDE: Constants(35.0, 23.0), CENTRAL: Constants(22.0, 16.0)}
+EXAMPLE_SIGMA_UM = 10.0  # m_q; f = b = a
 
 
-def rigorous_factors(xy: ArrayLike, focal: float, width: float, base: float) -> Floats:
-    """Variance of c in units of the variance of a y parallax, with the cofactors of six standard points, shape (n,).
+def assumed_constants() -> dict[str, Constants]:
+    """Return the printed constants before rounding, under the assumptions that give them.
 
-    `width` is the distance a of the side points from the middle ones, mm; the measured parallax counts 2.
+    With a = b: alpha counts 1/2, omega 3/4 and the measured x parallax 2, as if each of its two coordinates were as
+    uncertain as a y parallax. The side points take m_kappa = m_q / b for each of the two kappas, which is not what six
+    points give, omega at the left edge and plan at the right edge; c counts as independent of the left image point.
+
+    Source: [003] eq. 10.10, 10.11; the assumptions are found by trying.
+    """
+    side, central = 0.5 + 0.75 + 2.0 + 2.0, 0.5 + 2.0
+    # plan: x = b; a side point has an error in y as in x, a central point has none from c
+    return {
+        SIDE: Constants(sqrt(2 * (side + 1)), sqrt(side)),
+        CENTRAL: Constants(sqrt(central + 2), sqrt(central)),
+    }
+
+
+def orientation_factors(xy: ArrayLike, focal: float, width: float, base: float) -> Floats:
+    """Variance of c from the relative orientation, in units of the variance of a y parallax, shape (n,).
+
+    The cofactors are those of six standard points; `width` is the distance a of the side points from the middle ones.
     """
     place = np.asarray(xy, float)
     rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
-    return np.asarray(np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows) + 2, float)
+    return np.asarray(np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows), float)
 
 
-def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -> list[Constants]:
-    """Constants for any place in the model; dx and dy of the left point count 1 each, as in the source."""
+def rigorous_covariance(xy: ArrayLike, focal: float, width: float, base: float, sigma: float) -> Floats:
+    """Covariance (n, 3, 3) of new points, mm² at photo scale, from six standard points and the measuring of the point.
+
+    sigma: standard deviation of each image coordinate, mm. A y parallax has sqrt(2) times as much, an x parallax too,
+        and the left coordinate is part of the x parallax; nothing of it counts as independent that is not.
+
+    y is the mean of both rays. Left out is what eq. 10.8 and 10.9 leave out, because the absolute orientation takes it
+    back: the turn of the left photo, which is shift, azimuth and tilt, and f (dalpha2' - dalpha1'), which is scale and
+    height datum. Heights have the tilts of the base frame.
+    """
     place = np.asarray(xy, float)
-    variance = rigorous_factors(place, focal, width, base)
-    plan = np.sqrt((place**2).sum(axis=-1) / base**2 * variance + 2)
-    return [Constants(float(p), float(h)) for p, h in zip(plan, np.sqrt(variance), strict=True)]
+    level = np.column_stack([place, np.full(len(place), focal)])
+    rows = influence(level, base) @ six_points.dependent_from_base(base)
+    stretch = focal / base * np.array([-1.0, 0.0, 1.0, 0.0, 0.0])
+    rows[:, :2] -= place[:, :, None] * stretch
+    units = np.moveaxis(np.array([parallax_error(place, unit, focal, base) for unit in np.eye(5)]), 0, -1)
+    rows[:, 2] = -focal / base * units
+    cofactors = six_points.cofactors(focal, width, base)
+    return 2 * sigma**2 * rows @ cofactors @ np.swapaxes(rows, 1, 2) + measured_covariance(level, base, focal, sigma)
+
+
+def base_frame_elements(dependent: ArrayLike, base: float) -> Floats:
+    """Return alpha1', kappa1', alpha2', omega2', kappa2' for dby, dbz, dkappa, dalpha, domega of the right photo."""
+    return np.asarray(np.linalg.solve(six_points.dependent_from_base(base), np.asarray(dependent, float)), float)
+
+
+def surface_of_elements(elements: ArrayLike, scale: float, focal: float, base: float) -> Floats:
+    """Return the surface into which errors of the elements bend the heights of a model.
+
+    Returns (5,), E0, A, B, C, D of dZ = E0 + A x + B y + C x y + D x², dZ in ground mm for x, y in mm at photo scale.
+        E0, A and B go into the absolute orientation; C is twist, D is bending along the base.
+
+    Source: [003] eq. 10.12.
+    """
+    al1, ka1, al2, om2, ka2 = np.asarray(elements, float).tolist()
+    m, b = scale, base
+    return np.array(
+        [-m * b * al2, 2 * m * al2, m * om2 + m * focal / b * (ka2 - ka1), -m * om2 / b, -m * (al2 - al1) / b]
+    )
 
 
 @dataclass(frozen=True, eq=False)

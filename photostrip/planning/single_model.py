@@ -8,8 +8,8 @@ unit, for example millimetres at photo scale (then Z = f in level ground). The e
     dkappa, dalpha, domega    its turns, radians; positive: counter-clockwise, looking forward, looking to the left
 
 An error of a point has three parts, dx1 of measurement, dx2 of relative and dx3 of absolute orientation. The absolute
-orientation is a plane similarity in plan and a tilted plane in height, both fitted to control with equal weights; to
-the first order, and for a nearly level model with little relief, it is the similarity in space.
+orientation is the similarity in space to the first order, fitted to control with equal weights; on level ground it
+falls into a plane similarity in plan and a tilted plane in height, as in the source.
 
 Source: [000] eq. 1-8, with the corrections listed in docs/sources.md.
 """
@@ -23,7 +23,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.notes import counted
-from photostrip.planning.element_errors import free_influence
+from photostrip.planning.element_errors import free_influence, influence
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -73,63 +73,73 @@ def orientation_operator(points: ArrayLike, control: ModelControl) -> Floats:
         model minus given. It is subtracted from the model.
     Raises GeometryError when the control does not determine the seven parameters.
 
-    Source: [000] eq. 3-7 in operator form.
+    Source: [000] eq. 3-7 in operator form, with the terms of relief.
     """
-    where = np.asarray(points, float)
-    operator = np.zeros((len(where), 3, len(control.points), 3))
-    rows = np.flatnonzero(control.plan)
-    straight, crossed = _plan_operator(where, control)
-    operator[:, 0, rows, 0] = operator[:, 1, rows, 1] = straight
-    operator[:, 0, rows, 1], operator[:, 1, rows, 0] = crossed, -crossed
-    rows = np.flatnonzero(control.height)
-    operator[:, 2, rows, 2] = _height_operator(where, control)
-    return operator
+    solved = _solution(control)
+    return np.asarray(np.einsum("qak,knb->qanb", parameter_rows(points, control), solved), float)
 
 
-def _plan_operator(where: Floats, control: ModelControl) -> tuple[Floats, Floats]:
-    """Parts of Hx = Hy' along and across a misclosure, shape (q, control points in plan) each."""
+def orientation_parameters(control: ModelControl, misclosures: ArrayLike) -> Floats:
+    """Return the seven `PARAMETERS` that fit the misclosures (n, 3), model minus given, at the centres of the control.
+
+    Coordinates that are not given do not matter.
+    """
+    return np.asarray(np.einsum("knb,nb->k", _solution(control), np.asarray(misclosures, float)), float)
+
+
+def _solution(control: ModelControl) -> Floats:
+    """Parameters per misclosure, (7, n, 3): least squares with equal weights; zero where a coordinate is not given."""
+    _require_plan(control)
+    _require_heights(control)
+    counts = np.stack([control.plan, control.plan, control.height], axis=1)
+    rows = parameter_rows(control.points, control) * counts[:, :, None]
+    size = np.sqrt((rows**2).sum(axis=(0, 1)))
+    scaled = rows / size
+    inverse = np.linalg.inv(np.einsum("nbk,nbl->kl", scaled, scaled)) / size[:, None]
+    return np.asarray(np.einsum("kl,nbl->knb", inverse, scaled), float)
+
+
+def _require_plan(control: ModelControl) -> None:
     xy = control.points[control.plan, :2]
     if len(xy) < 2:
         message = f"{counted(len(xy), 'control point')} in plan cannot give position, azimuth and scale; two are needed"
         raise GeometryError(message, code="plan-control")
-    center = xy.mean(axis=0)
-    control_xy, point_xy = xy - center, where[:, :2] - center
-    size = float((control_xy**2).sum())  # B
+    size = float(((xy - xy.mean(axis=0)) ** 2).sum())  # B
     if size <= CLOSEST * float((xy**2).sum()):
         raise GeometryError("all control points in plan lie at one place", code="plan-control")
-    turned = control_xy[:, ::-1] * (1.0, -1.0)  # (Y_i, -X_i)
-    return np.asarray(1 / len(xy) + point_xy @ control_xy.T / size), np.asarray(point_xy @ turned.T / size)
 
 
-def _height_operator(where: Floats, control: ModelControl) -> Floats:
-    """Hz, shape (q, control points in height)."""
+def _require_heights(control: ModelControl) -> None:
     xy = control.points[control.height, :2]
     if len(xy) < 3:
         message = f"{counted(len(xy), 'control point')} in height cannot give height and tilts; three are needed"
         raise GeometryError(message, code="plan-control")
-    center = xy.mean(axis=0)
-    control_xy, point_xy = xy - center, where[:, :2] - center
+    control_xy = xy - xy.mean(axis=0)
     moments = control_xy.T @ control_xy
     area = moments[0, 0] * moments[1, 1] - moments[0, 1] ** 2
     if area <= FLATTEST * moments[0, 0] * moments[1, 1] or min(moments[0, 0], moments[1, 1]) == 0:
         message = "all control points in height lie on one line: the tilt about it is not determined"
         raise GeometryError(message, code="plan-control")
-    return np.asarray(1 / len(xy) + point_xy @ np.linalg.solve(moments, control_xy.T))
 
 
 def parameter_rows(points: ArrayLike, control: ModelControl) -> Floats:
     """Rows F, shape (q, 3, 7), that give the part dx3 of points from the seven `PARAMETERS`.
 
-    The centres of the control are the origins: that of the plan control for plan, that of the heights for heights.
+    The centres of the control are the origins: that of the plan control for plan, that of the heights for heights. In
+    level ground plan has four parameters and height three, as in the source; a point that stands higher by h than the
+    control does on the average is moved by -h deta and -h dxi in plan and by h dlambda in height as well.
+
+    Source: [000] eq. 3, 4; the terms with h are derived.
     """
     where = np.asarray(points, float)
     x, y = (where[:, :2] - control.points[control.plan, :2].mean(axis=0)).T
     u, v = (where[:, :2] - control.points[control.height, :2].mean(axis=0)).T
+    h = control.points[:, 2].mean() - where[:, 2]
     rows = np.zeros((len(where), 3, len(PARAMETERS)))
     rows[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    rows[:, 0, 3], rows[:, 0, 4] = x, -y
-    rows[:, 1, 3], rows[:, 1, 4] = y, x
-    rows[:, 2, 5], rows[:, 2, 6] = u, v
+    rows[:, 0, 3], rows[:, 0, 4], rows[:, 0, 5] = x, -y, -h
+    rows[:, 1, 3], rows[:, 1, 4], rows[:, 1, 6] = y, x, -h
+    rows[:, 2, 5], rows[:, 2, 6], rows[:, 2, 3] = u, v, h
     return rows
 
 
@@ -137,6 +147,13 @@ def deformation(points: ArrayLike, control: ModelControl, base: float) -> Floats
     """Influence of the elements `FREE` on points of the oriented model, less what control takes back, (q, 3, 4)."""
     operator, of_control = orientation_operator(points, control), free_influence(control.points, base)
     return np.asarray(free_influence(points, base) - np.einsum("qanb,nbk->qak", operator, of_control))
+
+
+def influence_after_orientation(points: ArrayLike, control: ModelControl, base: float) -> tuple[Floats, Floats]:
+    """Return the operator (q, 3, n, 3), and the influence (q, 3, 5) of all `ELEMENTS` less what control takes back."""
+    operator = orientation_operator(points, control)
+    of_control = np.einsum("qanb,nbk->qak", operator, influence(control.points, base))
+    return operator, np.asarray(influence(points, base) - of_control, float)
 
 
 def expected_errors(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.planning.deformation import CENTRAL, SIDE, Constants
+from photostrip.geometry.rotation import from_alpha_omega_kappa
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -62,30 +62,6 @@ def ground_errors(
     return found
 
 
-def source_constants() -> dict[str, Constants]:
-    """Return the printed constants before rounding, under the assumptions of the source.
-
-    Returns
-    -------
-    dict of str to Constants
-        For side points (y = b) and central points (y = 0).
-
-    Notes
-    -----
-    With a = b: alpha counts 1/2, omega 3/4 and the measured parallax 2. The side points take m_kappa = m_q / b for
-    each of the two kappas, which is not what six points give, omega at the left edge and plan at the right edge.
-
-    Source: [003] eq. 10.10, 10.11; the assumptions are found by trying.
-    """
-    found = {}
-    for name, parts, sides in ((SIDE, (0.5, 0.75, 2.0, 2.0), 2), (CENTRAL, (0.5, 2.0), 1)):
-        variance = sum(parts)
-        # plan: x = b; a side point has an error in y as in x, a central point has none from c
-        plan = np.sqrt(2 * (variance + 1)) if sides == 2 else np.sqrt(variance + 2)
-        found[name] = Constants(float(plan), float(np.sqrt(variance)))
-    return found
-
-
 def six_point_variances(sigma: float, depth: float, width: float, base: float) -> Array:
     """Variances of the elements `FREE` from six standard points.
 
@@ -107,7 +83,7 @@ def six_point_variances(sigma: float, depth: float, width: float, base: float) -
 
 
 def orientation_parameters(control: ModelControl, misclosures: ArrayLike) -> Array:
-    """Parameters of the absolute orientation.
+    """Parameters of the absolute orientation of a level model, eq. 5.
 
     Parameters
     ----------
@@ -131,14 +107,16 @@ def orientation_parameters(control: ModelControl, misclosures: ArrayLike) -> Arr
     return np.array([*in_plan.mean(axis=0), in_height.mean(), scale, turn, *tilts])
 
 
-def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> Array:
-    """Return the surface into which errors of the elements bend the heights of a model.
-
-    Returns (5,), E0, A, B, C, D of dZ = E0 + A x + B y + C x y + D x²; dZ in ground mm for x, y in mm. E0, A and B go
-        into the absolute orientation; C is twist, D is bending along the base.
-    """
-    al1, ka1, al2, om2, ka2 = np.asarray(elements, float)
-    m, b = scale, base
-    return np.array(
-        [-m * b * al2, 2 * m * al2, m * om2 + m * focal / b * (ka2 - ka1), -m * om2 / b, -m * (al2 - al1) / b]
-    )
+def intersected(xyz: Array, base: float, elements: Array, focal: float = 120.0) -> Array:
+    """Model points from the images of an exact pair whose right photo has turned and moved; y from both rays."""
+    dby, dbz, dkappa, dalpha, domega = elements
+    left = np.column_stack([xyz[:, 0], xyz[:, 1], -xyz[:, 2]])
+    right = left - (base, 0.0, 0.0)
+    in_right = -focal * right / right[:, 2:]  # what is measured: the photo was level
+    ray1 = -focal * left / left[:, 2:]
+    ray2 = in_right @ from_alpha_omega_kappa(dalpha, domega, dkappa).T
+    bx, by, bz = base, dby, dbz
+    scale1 = (bz * ray2[:, 0] - bx * ray2[:, 2]) / (ray1[:, 2] * ray2[:, 0] - ray1[:, 0] * ray2[:, 2])
+    scale2 = (scale1 * ray1[:, 2] - bz) / ray2[:, 2]
+    y = (scale1 * ray1[:, 1] + by + scale2 * ray2[:, 1]) / 2
+    return np.column_stack([scale1 * ray1[:, 0], y, scale1 * ray1[:, 2]])

@@ -15,14 +15,20 @@ from photostrip.planning.deformation import (
     CENTRAL,
     PRINTED,
     SIDE,
+    assumed_constants,
+    base_frame_elements,
     determines_paraboloid,
     fit_paraboloid,
+    orientation_factors,
     paraboloid_rows,
     parallax_error,
-    rigorous_constants,
-    rigorous_factors,
+    rigorous_covariance,
+    surface_of_elements,
 )
-from tests.planning.formulas import ground_errors, paraboloid, relative_differentials, source_constants
+from photostrip.planning.model_plan import source_example
+from photostrip.triangulation.relative_orientation import six_points
+from tests.draws import orthogonal_normal
+from tests.planning.formulas import ground_errors, relative_differentials
 from tests.vectors import cases
 
 if TYPE_CHECKING:
@@ -43,20 +49,21 @@ def test_numbers_computed_apart(vector: Vector) -> None:
     m, f, b = given_["m"], given_["f"], given_["b"]
     xy, elements, m_q = np.array(given_["points_xy"]), np.array(given_["elements_rad"]), given_["m_q_micrometre"] / 1e6
     for printed_name, name in PLACES:
-        for group, table in (("printed_constants_m", PRINTED), ("unrounded_m", source_constants())):
+        for group, table in (("printed_constants_m", PRINTED), ("unrounded_m", assumed_constants())):
             # m_q in metres: m_D = plan m m_q, m_Z = height m (f / b) m_q
             assert table[name].plan * m * m_q == pytest.approx(want[group][f"mD_{printed_name}"], rel=rel)
             assert table[name].height * m * f / b * m_q == pytest.approx(want[group][f"mZ_{printed_name}"], rel=rel)
     for printed_name, name in PLACES:
-        assert source_constants()[name].plan == pytest.approx(want["unrounded_constants"][f"mD_{printed_name}"])
-        assert source_constants()[name].height == pytest.approx(want["unrounded_constants"][f"mZ_{printed_name}"])
-    factors = rigorous_factors([[0, 0], [0, b], [b, b]], f, b, b)
+        assert assumed_constants()[name].plan == pytest.approx(want["unrounded_constants"][f"mD_{printed_name}"])
+        assert assumed_constants()[name].height == pytest.approx(want["unrounded_constants"][f"mZ_{printed_name}"])
+    # the x parallax counts 2 in the vectors, as in the source
+    factors = orientation_factors([[0, 0], [0, b], [b, b]], f, b, b) + 2
     wanted = want["rigorous_c_variance_factors"]
     assert factors == pytest.approx([wanted["central"], wanted["lateral_left"], wanted["lateral_right"]], rel=1e-9)
 
     c = parallax_error(xy, elements, f, b)
     assert c == pytest.approx(want["c_mm"], rel=rel, abs=1e-15)
-    surface = paraboloid(elements, m, f, b)
+    surface = surface_of_elements(elements, m, f, b)
     assert surface == pytest.approx([want[name] for name in ("E0", "A", "B", "C", "D")], rel=rel)
     assert paraboloid_rows(xy) @ surface == pytest.approx(want["dZ_mm"], rel=rel)
     assert ground_errors(xy, c, m, f, b)[:, 2] == pytest.approx(want["dZ_mm"], rel=1e-9)
@@ -65,18 +72,81 @@ def test_numbers_computed_apart(vector: Vector) -> None:
 def test_the_printed_22_micrometres_are_21() -> None:
     # 10 um, f = b, a central point: the text of the source says 22
     assert PRINTED[CENTRAL].plan * 10 == pytest.approx(21)
-    assert source_constants()[CENTRAL].plan * 10 == pytest.approx(21.2, abs=0.05)
+    assert assumed_constants()[CENTRAL].plan * 10 == pytest.approx(21.2, abs=0.05)
 
 
-def test_the_assumptions_of_the_printed_constants_are_not_those_of_six_points() -> None:
-    b = 70.0
-    left, right, centre = rigorous_constants([[0, b], [b, b], [b, 0]], b, b, b)
-    assert (left.height, right.height, centre.height) == pytest.approx((1.98, 1.78, 1.58), abs=0.005)
-    assert right.plan == pytest.approx(2.89, abs=0.005)
-    assert centre.plan == pytest.approx(source_constants()[CENTRAL].plan)
-    printed = source_constants()[SIDE]
-    assert printed.height > 1.15 * left.height
-    assert printed.plan > 1.2 * right.plan
+def test_the_worked_example_beside_what_six_points_give() -> None:
+    rows = {(row.place, row.quantity): row for row in source_example()}
+    assert [row.printed for row in rows.values()] == [35, 23, 22, 16]
+    assert [row.formula for row in rows.values()] == pytest.approx([35, 23, 21, 16])
+    assert [row.assumed for row in rows.values()] == pytest.approx([35.4, 22.9, 21.2, 15.8], abs=0.06)
+    # var(c) from the orientation: 1/2 + 3/4 + 2/3 left, 1/2 + 2/3 right, 1/2 in the middle; an x parallax counts 1
+    side, middle = rows[SIDE, "height"], rows[CENTRAL, "height"]
+    assert (side.left, side.right) == pytest.approx((10 * np.sqrt(35 / 12), 10 * np.sqrt(13 / 6)))
+    assert (middle.left, middle.right) == pytest.approx((10 * np.sqrt(1.5),) * 2)
+    assert side.assumed > 1.3 * side.left
+    assert rows[SIDE, "plan"].assumed > 1.8 * rows[SIDE, "plan"].left
+
+
+F, A, B, SIGMA = 153.0, 92.0, 92.0, 0.005
+CORNERS = np.array([[x, y] for y in (0.0, A, -A) for x in (0.0, B)])
+WHERE = np.array([[0.0, A], [B, A], [0.0, 0.0], [B, 0.0], [30.0, -50.0]])
+
+
+def rays(elements: Floats, left: Floats, right: Floats) -> tuple[Floats, Floats]:
+    """Rays of both photos in the base frame."""
+    al1, ka1, al2, om2, ka2 = elements
+    level = [np.column_stack([xy, np.full(len(xy), -F)]) for xy in (left, right)]
+    return level[0] @ from_alpha_omega_kappa(al1, 0.0, ka1).T, level[1] @ from_alpha_omega_kappa(al2, om2, ka2).T
+
+
+def parallaxes(elements: Floats, left: Floats, right: Floats) -> Floats:
+    one, two = rays(elements, left, right)
+    found: Floats = -F * one[:, 1] / one[:, 2] + F * two[:, 1] / two[:, 2]
+    return found
+
+
+def measured_model(errors: Floats) -> Floats:
+    """Errors of new points of a pair that six measured points orient, less shift and azimuth of the left photo, scale.
+
+    Nothing is linear here: the exact condition, the exact rays, y from both of them.
+    """
+    of_six, of_points = np.split(SIGMA * errors, [24])
+    moved, moved_points = of_six.reshape(2, 6, 2), of_points.reshape(2, len(WHERE), 2)
+    left, right = CORNERS + moved[0], CORNERS - (B, 0.0) + moved[1]
+    elements = np.zeros(5)
+    for _ in range(3):
+        step = 1e-6 * np.eye(5)
+        slope = [(parallaxes(elements + u, left, right) - parallaxes(elements - u, left, right)) / 2e-6 for u in step]
+        elements -= np.linalg.lstsq(np.array(slope).T, parallaxes(elements, left, right), rcond=None)[0]
+    one, two = rays(elements, WHERE + moved_points[0], WHERE - (B, 0.0) + moved_points[1])
+    first = -B * two[:, 2] / (one[:, 2] * two[:, 0] - one[:, 0] * two[:, 2])
+    second = first * one[:, 2] / two[:, 2]
+    model = np.column_stack([first * one[:, 0], (first * one[:, 1] + second * two[:, 1]) / 2, first * one[:, 2]])
+    error: Floats = model - np.column_stack([WHERE, np.full(len(WHERE), -F)])
+    al1, ka1, al2, *_ = elements
+    stretch = F / B * (al2 - al1)
+    error -= stretch * np.column_stack([WHERE, np.full(len(WHERE), -F)])
+    error[:, 0] += ka1 * WHERE[:, 1] - F * al1  # the left photo turns about its centre and about the vertical
+    error[:, 1] -= ka1 * WHERE[:, 0]
+    return error
+
+
+def test_the_rigorous_formulas_are_the_scatter_of_exact_models() -> None:
+    rng = np.random.default_rng(6)
+    errors = np.array([measured_model(drawn) for drawn in orthogonal_normal(rng, 352, 24 + 4 * len(WHERE))])
+    expected = np.sqrt(np.diagonal(rigorous_covariance(WHERE, F, A, B, SIGMA), axis1=1, axis2=2))
+    ratio = errors.std(axis=0) / expected
+    assert ratio == pytest.approx(np.ones_like(ratio), abs=0.08)
+    assert ratio.mean() == pytest.approx(1.0, abs=0.01)
+    # the scale: 5 µm at 1:10 000
+    assert 10 * expected[0, 2] == pytest.approx(0.2008, abs=1e-4)
+
+
+def test_elements_of_the_base_frame_and_of_the_dependent_pair() -> None:
+    elements = np.array([2e-5, -3e-5, -4e-5, 6e-5, 5e-5])
+    dependent = six_points.dependent_from_base(B) @ elements
+    assert base_frame_elements(dependent, B) == pytest.approx(elements)
 
 
 def heights(xy: Floats, elements: Floats, focal: float, base: float) -> Floats:
@@ -99,7 +169,7 @@ def test_the_paraboloid_is_what_the_exact_intersection_does(elements: tuple[floa
     found = heights(xy, np.array(elements), focal, base) + focal
     # eq. 10.9 leaves out a constant, which is scale and height datum only
     constant = -(focal**2) / base * (elements[2] - elements[0])
-    surface = paraboloid_rows(xy) @ paraboloid(elements, 1.0, focal, base) + constant
+    surface = paraboloid_rows(xy) @ surface_of_elements(elements, 1.0, focal, base) + constant
     assert surface == pytest.approx(found, abs=1e-7)  # mm, of up to 3e-3: what is left is of second order
 
 
@@ -114,7 +184,7 @@ def test_the_printed_sign_of_kappa_in_eq_10_9_bends_heights_the_wrong_way() -> N
     assert np.abs(wrong).max() > 1.9 * np.abs(exact).max() > 1e-4
 
 
-def test_rigorous_factors_are_the_scatter_of_exact_orientations() -> None:
+def test_factors_of_the_orientation_are_the_scatter_of_exact_orientations() -> None:
     f, a, b = 100.0, 65.0, 70.0
     rng = np.random.default_rng(2)
     x, y = SIX[:, 0], SIX[:, 1]
@@ -122,7 +192,7 @@ def test_rigorous_factors_are_the_scatter_of_exact_orientations() -> None:
     elements = -np.linalg.lstsq(rows, rng.normal(size=(6, 20_000)), rcond=None)[0].T
     where = np.array([[0.0, 0.0], [0.0, 65.0], [70.0, -65.0], [35.0, 30.0]])
     c = np.array([parallax_error(np.broadcast_to(p, (20_000, 2)), elements, f, b) for p in where])
-    expected = rigorous_factors(where, f, a, b) - 2
+    expected = orientation_factors(where, f, a, b)
     assert c.var(axis=1) == pytest.approx(expected, rel=0.04)
 
 
@@ -147,7 +217,7 @@ FIVE = np.array([[0.0, 65.0], [70.0, 65.0], [0.0, -65.0], [70.0, -65.0], [35.0, 
 def test_five_points_give_the_elements_back() -> None:
     elements = np.array([2e-5, -3e-5, -4e-5, 6e-5, 5e-5])
     m, f, b = 10_000.0, 100.0, 70.0
-    surface = paraboloid(elements, m, f, b)
+    surface = surface_of_elements(elements, m, f, b)
     fitted = fit_paraboloid(FIVE, paraboloid_rows(FIVE) @ surface, 1.0)
     assert fitted.coefficients == pytest.approx(surface, rel=1e-9)
     assert fitted.redundancy == 0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.planning.closed_form import ORDER, control_sums
+from photostrip.planning.closed_form import ORDER, coefficients, control_sums, kernels
 from photostrip.planning.element_errors import ELEMENTS, influence
 from photostrip.planning.single_model import ModelControl, orientation_operator
 
@@ -98,6 +98,30 @@ def test_a_misprint_of_eq_9_or_10_shows(misprint: str, row: int, column: str) ->
     wrong, right = as_printed((misprint,)), direct()[:2]
     bad = np.abs(wrong - right) > VISIBLE * np.abs(right).max(axis=0)
     assert [(r, ORDER[k]) for r, k in np.argwhere(bad)] == [(row, column)]
+
+
+def test_what_the_command_calls_printed_has_every_misprint_and_no_other() -> None:
+    found = coefficients([POINT], XY, BASE, DEPTH, printed=True)[0]
+    assert found[:2] == pytest.approx(as_printed((*X_PRINTED[:2], *Y_PRINTED[:3])), rel=ROUNDING)
+    assert found[2] == pytest.approx(coefficients([POINT], XY, BASE, DEPTH)[0, 2])
+    right, printed = kernels([POINT], XY), kernels([POINT], XY, printed=True)
+    operator = orientation_operator([[*POINT, DEPTH]], control())[0]
+    for values, row, column in (
+        (right[0], 0, 0),
+        (right[1], 0, 1),
+        (right[2], 1, 0),
+        (right[3], 1, 1),
+        (right[4], 2, 2),
+    ):
+        assert values[0] == pytest.approx(operator[row, :, column])
+    X, Y = (XY - XY.mean(axis=0)).T
+    x, y = POINT - XY.mean(axis=0)
+    c1, c2, c3 = control_sums(XY)[:3]
+    B, A, n = c1 + c2, c1 * c2 - c3**2, len(XY)
+    assert printed.across_across[0] == pytest.approx(1 / n + (y * X + x * Y) / B)
+    assert printed.across_along[0] == pytest.approx((y * Y - x * X) / B)
+    assert printed.up[0] == pytest.approx(1 / n + (-x * (c2 * X + c3 * Y) - y * (c3 * X - c1 * Y)) / A)
+    assert printed.along_along[0] == pytest.approx(right.along_along[0])
 
 
 def test_the_printed_symbols_of_eq_9_and_10_cannot_be_meant() -> None:

@@ -31,7 +31,7 @@ from photostrip.planning.single_model import (
 )
 from photostrip.triangulation.relative_orientation import six_points
 from tests.draws import orthogonal_normal
-from tests.planning.formulas import orientation_parameters, six_point_variances
+from tests.planning.formulas import intersected, orientation_parameters, six_point_variances
 from tests.vectors import cases
 
 if TYPE_CHECKING:
@@ -145,21 +145,6 @@ def test_expected_errors_computed_apart(vector: Vector) -> None:
 
 
 # ---------------------------------------------------------------------------------------- what needs no source
-
-
-def intersected(xyz: Floats, base: float, elements: Floats, focal: float = 120.0) -> Floats:
-    """Model points from the images of an exact pair whose right photo has turned and moved; y from both rays."""
-    dby, dbz, dkappa, dalpha, domega = elements
-    left = np.column_stack([xyz[:, 0], xyz[:, 1], -xyz[:, 2]])
-    right = left - (base, 0.0, 0.0)
-    in_right = -focal * right / right[:, 2:]  # what is measured: the photo was level
-    ray1 = -focal * left / left[:, 2:]
-    ray2 = in_right @ from_alpha_omega_kappa(dalpha, domega, dkappa).T
-    bx, by, bz = base, dby, dbz
-    scale1 = (bz * ray2[:, 0] - bx * ray2[:, 2]) / (ray1[:, 2] * ray2[:, 0] - ray1[:, 0] * ray2[:, 2])
-    scale2 = (scale1 * ray1[:, 2] - bz) / ray2[:, 2]
-    y = (scale1 * ray1[:, 1] + by + scale2 * ray2[:, 1]) / 2
-    return np.column_stack([scale1 * ray1[:, 0], y, scale1 * ray1[:, 2]])
 
 
 places = st.tuples(st.floats(-20.0, 110.0), st.floats(-100.0, 100.0), st.floats(60.0, 300.0))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from photostrip.errors import Fault
+    from photostrip.planning.model_plan import ModelSpec
     from photostrip.report.page.parts import Document
 
 Options = dict[str, tuple[str, str | None]]  # by the key that it sets: name of an option, and its value
@@ -196,8 +197,14 @@ def _listed(value: str | None) -> str | None:
     return None if value is None else f"[{value}]"
 
 
-@_command("model", "--camera film --overlap 60 --scale 10000 --control corners", "model.yaml -o model.svg")
-def model(
+@_command(
+    "model",
+    "--camera film --overlap 60 --scale 10000 --control corners",
+    "model.yaml -o model.svg",
+    "--elements 5,-3,10,-8,12 -o bent.svg",
+    "--closed-form --as-printed",
+)
+def model(  # noqa: PLR0913 (an argument for each option)
     *,
     file: PlanFile = None,
     camera: PlanCamera,
@@ -206,27 +213,72 @@ def model(
         str | None, typer.Option("--control", metavar="LAYOUT", help="corners, corners+centre or six.")
     ] = None,
     control_sigma: ControlSigma = None,
+    elements: Annotated[
+        str | None,
+        typer.Option(
+            "--elements",
+            metavar="DBY,DBZ,DK,DA,DO",
+            help="Given errors of the elements dby, dbz (µm), dkappa, dalpha, domega (seconds of arc).",
+        ),
+    ] = None,
+    closed_form: Annotated[
+        bool, typer.Option("--closed-form", help="Operators and closed form side by side, with c1 to c15.")
+    ] = False,
+    as_printed: Annotated[
+        bool, typer.Option("--as-printed", help="With --closed-form: what the source prints, misprints and all.")
+    ] = False,
+    source_table: Annotated[
+        bool, typer.Option("--source-table", help="The worked example of the source, with what is misprinted in it.")
+    ] = False,
     delivery: Delivery,
 ) -> None:
     """Compute the expected errors all over one model, and what each source of errors does alone."""
     with failures_as(delivery.form):
-        from photostrip.formats.output.plans import model_document
-        from photostrip.planning.model_plan import plan_model
+        from photostrip.formats.output.plan_model import model_document, source_example_document
+        from photostrip.planning.model_plan import both_forms, given_errors, plan_model
         from photostrip.project.plans.model import load_model_plan
 
+        if as_printed and not closed_form:
+            message = "the printed form stands beside the closed form: give --closed-form as well"
+            raise typer.BadParameter(message, param_hint="--as-printed")
         options = {
             **camera.keys,
             **flight.keys,
             "control.layout": ("--control", control),
             "control.sigma": ("--control-sigma", _listed(control_sigma)),
+            **_elements(elements),
         }
         drawn = delivery.require_output()
+        if source_table:
+            if file is not None or any(value is not None for _, value in options.values()):
+                message = "the worked example of the source has its own numbers: nothing else goes with it"
+                raise typer.BadParameter(message, param_hint="--source-table")
+            delivery.deliver(source_example_document(), ())
+            return
         with delivery.assigned(options) as assignments:
             given = load_model_plan(file, assignments)
-        document = fine = model_document(given.name, given.camera, plan_model(given.spec))
-        if drawn:
-            fine = model_document(given.name, given.camera, plan_model(replace(given.spec, grid=(FINE, FINE))))
+        forms = both_forms(given.spec) if closed_form else None
+
+        def planned(spec: ModelSpec) -> Document:
+            forecast = plan_model(spec)
+            return model_document(given.name, given.camera, forecast, given_errors(spec), forms, printed=as_printed)
+
+        document = planned(given.spec)
+        fine = planned(replace(given.spec, grid=(FINE, FINE))) if drawn else None
         delivery.deliver(document, given.files, fine)
+
+
+ELEMENT_KEYS = ("dby_um", "dbz_um", "dkappa_arcsec", "dalpha_arcsec", "domega_arcsec")
+
+
+def _elements(text: str | None) -> Options:
+    """Split the five errors of ``--elements``."""
+    values = [] if text is None else text.split(",")
+    if values and len(values) != len(ELEMENT_KEYS):
+        message = f"{len(values)} values are given; the elements are five: dby, dbz, dkappa, dalpha, domega"
+        raise typer.BadParameter(message, param_hint="--elements")
+    keys = (f"element_errors.{key}" for key in ELEMENT_KEYS)
+    return {key: ("--elements", value.strip()) for key, value in zip(keys, values, strict=False)}
 
 
 @_command("strip", "--models 15 --control bands=3 --control every=5", "strip.yaml -o strip.svg")

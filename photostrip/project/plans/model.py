@@ -2,30 +2,70 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
 
-from pydantic import AfterValidator, BeforeValidator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 
-from photostrip.planning.model_plan import LAYOUTS, ControlPoint, ModelSpec, control_layout
+from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.schema.values import Pair, Positive, Range, Section, Whole, Words, bounded, key, one_of
+from photostrip.project.schema.values import (
+    Id,
+    Number,
+    Pair,
+    Positive,
+    Range,
+    Section,
+    Triple,
+    Whole,
+    Words,
+    bounded,
+    key,
+    one_of,
+    wrong,
+)
 from photostrip.project.simulation import camera_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+MICROMETRES = 1000.0  # in a millimetre
+MILLIMETRES = 1000.0  # in a metre
+ARCSECONDS = 206264.806  # in a radian
 USES = ("xyz", "xy", "z")
 REACH = Range(5.0, 100.0, "%")
 GRID = Range(2, 101, "points")
 ZONE_POINTS = Range(1, 1000, "points")
+RELIEF = 0.9  # of the flying height: what stands higher is no ground
+PLACE = "x along the base and y to the left on the ground, from the left nadir, at photo scale"
 
 
-class ModelControlPoint(Section):
+class ModelPoint(Section):
+    """A point whose errors are wanted."""
+
+    name: Id = key("Name")
+    at: Pair = key(PLACE, unit="mm")
+    height: Number = key("Height above the level to which the photo scale belongs", 0.0, unit="m")
+    measured_error: Triple = key("Error of the measured model coordinates", NO_ERROR, unit="m")
+
+
+class ModelControlPoint(ModelPoint):
     """One control point."""
 
-    at: Pair = key("x along the base and y to the left, from the left nadir, at photo scale", unit="mm")
+    name: Id = key("Name; default: C and its number", "")
     use: Annotated[Words, AfterValidator(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    misclosure: Triple | None = key("Model minus given, where it has been measured", None, unit="m")
+    given_error: Triple = key("Error of the given coordinates", NO_ERROR, unit="m")
+
+
+class ElementErrors(Section):
+    """Given errors of the elements of the right photo, the left one held."""
+
+    dby_um: Number = key("Perspective centre to the left, at photo scale", 0.0, unit="um")
+    dbz_um: Number = key("Perspective centre upwards, at photo scale", 0.0, unit="um")
+    dkappa_arcsec: Number = key("Turn, counter-clockwise", 0.0, unit="arcsec")
+    dalpha_arcsec: Number = key("Turn, to look forward", 0.0, unit="arcsec")
+    domega_arcsec: Number = key("Turn, to look to the left", 0.0, unit="arcsec")
 
 
 def _control_point(value: object) -> object:
@@ -71,6 +111,34 @@ class ModelPlanFile(Flown):
     orientation: ModelOrientation = key("Points that orient the pair", ModelOrientation.model_construct())
     control: ModelControl = key("Control", ModelControl.model_construct())
     grid: Grid = key("Where errors are computed", Grid.model_construct())
+    points: list[ModelPoint] = key("Further points, with names and heights", [])
+    element_errors: ElementErrors = key("Given errors of the elements", ElementErrors.model_construct())
+
+    @model_validator(mode="after")
+    def _errors_or_misclosures(self) -> Self:
+        measured = [point for point in self.control.points if point.misclosure is not None]
+        if not measured:
+            return self
+        if len(measured) < len(self.control.points):
+            message = "some control points have a misclosure, and others have none"
+            raise wrong(message, code="missing-key", at="control", fix="give it for all control points, or for none")
+        every: list[ModelPoint] = [*self.control.points, *self.points]
+        made = [point for point in every if any(point.measured_error)]
+        if made or any(any(point.given_error) for point in measured) or any(vars(self.element_errors).values()):
+            message = "misclosures that were found, and errors that would make some, are both given"
+            raise wrong(message, code="two-keys", at="control", fix="remove the one or the other")
+        return self
+
+    @model_validator(mode="after")
+    def _points_are_seen(self) -> Self:
+        camera = camera_of(self.camera)
+        flying_height = self.scale_of(camera) * camera.principal_distance / MILLIMETRES
+        for name, points in (("control", self.control.points), ("points", self.points)):
+            highest = max((point.height for point in points), default=0.0)
+            if highest > RELIEF * flying_height:
+                message = f"a point {highest:g} m high is not seen from {flying_height:g} m"
+                raise wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
+        return self
 
 
 class ModelPlan(NamedTuple):
@@ -89,17 +157,41 @@ def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
     along, across = camera.format or (230.0, 230.0)
     base = given.base or along * (1.0 - given.end_lap_percent / 100.0)
     width = across / 2.0 * given.reach_percent / 100.0
-    points = tuple(ControlPoint(point.at, str(point.use)) for point in given.control.points)
+    points = tuple(_control_of(point, number) for number, point in enumerate(given.control.points, 1))
+    scale = given.scale_of(camera)
     spec = ModelSpec(
         focal=camera.principal_distance,
         base=base,
         width=width,
-        scale=given.scale_of(camera),
+        scale=scale,
         image_sigma=given.image_sigma_um / 1000.0,
         zone_points=given.orientation.zone_points,
         orientation_points=tuple(given.orientation.points),
         control=points or control_layout(str(given.control.layout), base, width),
         control_sigma=given.control.sigma,
         grid=(given.grid.columns, given.grid.rows),
+        points=tuple(
+            NamedPoint(point.at, name=str(point.name), height=point.height, measured_error=point.measured_error)
+            for point in given.points
+        ),
+        element_errors=_elements(given.element_errors),
     )
     return ModelPlan(name=str(given.name), camera=camera.name, spec=spec, files=reading.files)
+
+
+def _control_of(point: ModelControlPoint, number: int) -> ControlPoint:
+    return ControlPoint(
+        at=point.at,
+        use=str(point.use),
+        name=str(point.name or f"C{number}"),
+        height=point.height,
+        misclosure=point.misclosure,
+        measured_error=point.measured_error,
+        given_error=point.given_error,
+    )
+
+
+def _elements(given: ElementErrors) -> tuple[float, ...]:
+    lengths = (given.dby_um / MICROMETRES, given.dbz_um / MICROMETRES)
+    angles = (given.dkappa_arcsec, given.dalpha_arcsec, given.domega_arcsec)
+    return (*lengths, *(angle / ARCSECONDS for angle in angles))

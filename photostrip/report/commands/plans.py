@@ -4,117 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.notes import counted
+from photostrip.report.commands.plan_model import model_sections, source_example_sections
 from photostrip.report.commands.plan_strip import strip_sections
-from photostrip.report.page.numbers import calibrated, fixed, metres, micrometres, short
-from photostrip.report.page.parts import Column, Document, Facts, Part, Section, Table, Words
-from photostrip.report.page.tables import number, over_plane, tabulated, words
+from photostrip.report.page.numbers import calibrated, fixed, short
+from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}
 
 
 def plan_report(document: Document) -> tuple[str, tuple[Section, ...]]:
     """Make the report of a plan."""
     title, build = BUILDERS[document["kind"]]
     return title, build(document)
-
-
-def _model(document: Document) -> tuple[Section, ...]:
-    geometry, worst = document["geometry"], document["worst"]
-    sigmas = "; ".join(
-        f"{each['element']} {fixed(each['sigma'], 1)}{' µm' if each['unit'] == 'um' else '″'}"
-        for each in document["orientation"]["sigmas"]
-    )
-    facts = Facts(
-        (
-            ("camera", f"{document['camera']['name']}, f {short(document['camera']['principal_distance_mm'], 9)} mm"),
-            (
-                "photos",
-                (
-                    f"1:{geometry['scale']:g}, {fixed(geometry['flying_height_m'], 0)} m above the ground; base"
-                    f" {fixed(geometry['base_mm'], 1)} mm, {fixed(geometry['base_m'], 0)} m"
-                ),
-            ),
-            (
-                "measuring",
-                (
-                    f"{micrometres(document['image_sigma_um'])} µm for an image coordinate,"
-                    f" {micrometres(document['parallax_sigma_um'])} µm for a y parallax"
-                ),
-            ),
-            ("orientation", f"{counted(document['orientation']['points'], 'point')}: {sigmas}"),
-            ("control", _control(document)),
-            (
-                "worst height",
-                f"{metres(worst['sigma_z_m'])} m at x {fixed(worst['x_mm'], 1)}, y {fixed(worst['y_mm'], 1)} mm",
-            ),
-        )
-    )
-    return (
-        Section("", (facts,)),
-        Section("Standard deviation in plan (both coordinates), m", (_grid(document, "sigma_plan_m"),)),
-        Section("Standard deviation in height, m", (_grid(document, "sigma_z_m"),)),
-        Section("What each source of errors does alone", (_sources(document),)),
-        Section("At the control", (_at_control(document),)),
-        Section("The simple formulas, relative orientation and measuring only", (_simple(document),)),
-    )
-
-
-def _control(document: Document) -> str:
-    points = document["control"]
-    kinds = [f"{sum(p['use'] == use for p in points)} {word}" for use, word in USES.items()]
-    given = ", ".join(kind for kind in kinds if not kind.startswith("0 "))
-    sigma = ", ".join(metres(value) for value in document["control_sigma_m"])
-    return f"{given}; given to {sigma} m along, across and in height"
-
-
-def _grid(document: Document, name: str) -> Table:
-    corner = Column("y \\ x", "mm")
-    return over_plane(document["points"], ("x_mm", "y_mm"), name, corner, metres, lambda at: fixed(at, 0))
-
-
-def _sources(document: Document) -> Table:
-    columns = (
-        words("source", "source"),
-        number("plan rms", "plan_rms_m", 3, "m"),
-        number("plan max", "plan_max_m", 3, "m"),
-        number("height rms", "z_rms_m", 3, "m"),
-        number("height max", "z_max_m", 3, "m"),
-    )
-    *single, each, together = document["sources"]
-    foot = tabulated((each, together), columns).rows
-    note = "over the points above; dalpha2 is the turn of the right photo against the base"
-    return tabulated(single, columns, foot, note)
-
-
-def _at_control(document: Document) -> Table:
-    return tabulated(
-        document["control"],
-        (
-            number("x", "x_mm", 1, "mm"),
-            number("y", "y_mm", 1, "mm"),
-            words("given", lambda point: USES[point["use"]]),
-            number("plan", "sigma_plan_m", 3, "m"),
-            number("height", "sigma_z_m", 3, "m"),
-        ),
-        note="of the adjusted model point; the given coordinates stay what they are",
-    )
-
-
-def _simple(document: Document) -> Table:
-    return tabulated(
-        document["simple"],
-        (
-            words("place", "place"),
-            number("plan", "source_plan_m", 3, "source, m"),
-            number("height", "source_z_m", 3, "source, m"),
-            number("plan", "rigorous_plan_m", 3, "rigorous, m"),
-            number("height", "rigorous_z_m", 3, "rigorous, m"),
-        ),
-    )
 
 
 def _cameras(document: Document) -> tuple[Section, ...]:
@@ -191,7 +94,8 @@ def _misprints(document: Document) -> tuple[Part, ...]:
 
 
 BUILDERS = {
-    "model": ("Expected errors over one model", _model),
+    "model": ("Expected errors over one model", model_sections),
+    "model-source-table": ("Accuracy of a model: the worked example of the source", source_example_sections),
     "strip": ("Expected accuracy of a strip", strip_sections),
     "cameras": ("Efficiency of cameras", _cameras),
     "source-table": ("Efficiency of cameras: the table of the source", _source_table),

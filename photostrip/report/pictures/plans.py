@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from photostrip.arrays import Floats
     from photostrip.report.page.parts import Document
 
+ARROWS = 8  # along an axis
 ENDINGS = (".png", ".svg")
 
 
@@ -41,19 +43,47 @@ def plan_picture(document: Document, ending: str) -> bytes:
 
 def _model(document: Document) -> Figure:
     title = f"{document['name']}: {document['camera']['name']}, 1:{document['geometry']['scale']:g},"
-    figure = new_figure(10, 5.6, f"{title} {document['image_sigma_um']:g} µm")
+    bent = document.get("bent")
+    figure = new_figure(10, 11.2 if bent else 5.6, f"{title} {document['image_sigma_um']:g} µm")
+    rows = 2 if bent else 1
     points = document["points"]
     x = np.unique([point["x_mm"] for point in points])
     y = np.unique([point["y_mm"] for point in points])
     for place, (name, title) in enumerate((("sigma_plan_m", "plan"), ("sigma_z_m", "height")), 1):
-        axes = figure.add_subplot(1, 2, place, aspect="equal", title=f"standard deviation in {title}, m")
-        value = {(point["x_mm"], point["y_mm"]): point[name] for point in points}
-        surface = np.array([[value[a, b] for a in x.tolist()] for b in y.tolist()])
-        isolines(axes, x, y, surface, filled=True)
-        axes.set_xlabel("x along the flight, mm at photo scale")
-        axes.set_ylabel("y, mm")
-        _control(axes, document["control"])
+        axes = figure.add_subplot(rows, 2, place, aspect="equal", title=f"standard deviation in {title}, m")
+        isolines(axes, x, y, _over_grid(points, name, x, y), filled=True)
+        _axes(axes, document["control"])
+    if bent:
+        for place, (name, title) in enumerate(
+            (("raised", "bent by the elements, before levelling"), ("left", "what the absolute orientation leaves")), 3
+        ):
+            axes = figure.add_subplot(rows, 2, place, aspect="equal")
+            isolines(axes, x, y, _over_grid(bent["points"], f"{name}_z_m", x, y), filled=False)
+            longest = _arrows(axes, bent["points"], name, x, y)
+            axes.set_title(f"{title}\nheights, m; longest arrow in plan {longest:.2g} m")
+            _axes(axes, document["control"])
     return figure
+
+
+def _over_grid(points: list[Document], name: str, x: Floats, y: Floats) -> Floats:
+    value = {(point["x_mm"], point["y_mm"]): point[name] for point in points}
+    return np.array([[value[a, b] for a in x.tolist()] for b in y.tolist()])
+
+
+def _axes(axes: Axes, control: list[Document]) -> None:
+    axes.set_xlabel("x along the flight, mm at photo scale")
+    axes.set_ylabel("y, mm")
+    _control(axes, control)
+
+
+def _arrows(axes: Axes, points: list[Document], name: str, x: Floats, y: Floats) -> float:
+    """Draw errors in plan at every few points of the grid; return the longest, metres."""
+    step_x, step_y = (max(1, (len(axis) - 1) // ARROWS) for axis in (x, y))
+    along, across = (_over_grid(points, f"{name}_{axis}_m", x, y)[::step_y, ::step_x] for axis in ("x", "y"))
+    longest = float(np.hypot(along, across).max())
+    if longest > 0:
+        axes.quiver(x[::step_x], y[::step_y], along, across, angles="xy", scale=longest * ARROWS, width=0.004)
+    return longest
 
 
 def _control(axes: Axes, control: list[Document]) -> None:
@@ -79,9 +109,29 @@ def _cameras(document: Document) -> Figure:
     return figure
 
 
+def _example(document: Document) -> Figure:
+    rows = document["rows"]
+    figure = new_figure(9, 4, "accuracy of a model: the worked example of the source, µm at photo scale")
+    axes = figure.add_subplot(1, 1, 1)
+    heads = (
+        ("printed_um", "printed"),
+        ("assumed_um", "under its assumptions"),
+        ("rigorous_left_um", "rigorous, left"),
+        ("rigorous_right_um", "rigorous, right"),
+    )
+    for number, (name, label) in enumerate(heads):
+        places = np.arange(len(rows)) + 0.2 * (number - 1.5)
+        bars = axes.bar(places, [row[name] for row in rows], 0.2, label=label, color=SERIES[number])
+        axes.bar_label(bars, fmt="%.0f", fontsize=SMALL_TEXT)
+    axes.set_xticks(range(len(rows)), [f"{row['quantity']}, {row['place']}" for row in rows])
+    axes.legend(fontsize=SMALL_TEXT)
+    return figure
+
+
 DRAWINGS: dict[str, Callable[[Document], Figure]] = {
     "model": _model,
     "strip": strip_figure,
     "cameras": _cameras,
     "source-table": _cameras,
+    "model-source-table": _example,
 }

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.planning.model_plan import ModelSpec, control_layout, plan_model
+from photostrip.planning.model_plan import ModelSpec, control_layout, given_errors, plan_model
+from photostrip.project.plans.model import load_model_plan
 from photostrip.report.pictures.plan_strip import strip_figure
 from tests.loops import nonempty
 
@@ -137,6 +138,113 @@ def test_one_of_list_and_source_table_is_needed(capsys: pytest.CaptureFixture[st
     assert "exclude each other" in capsys.readouterr().err
 
 
+GIVEN = """\
+photostrip_plan_model: 1
+camera: {principal_distance: 150}
+base: 90
+control:
+  points:
+    - {at: [2, 80], height: 60, measured_error: [0.02, -0.03, 0.05]}
+    - {name: P, at: [88, 78], height: -40, given_error: [0, 0.04, 0]}
+    - {at: [-3, -82]}
+    - {at: [91, -75]}
+points: [{name: A, at: [20, 30], height: 120}]
+element_errors: {dby_um: 4, dbz_um: -3, dkappa_arcsec: 6, dalpha_arcsec: -4, domega_arcsec: 8}
+"""
+
+
+def test_given_errors_come_out_as_errors_of_points(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "m.yaml"
+    file.write_text(GIVEN)
+    document = json.loads(answer(capsys, "plan", "model", str(file), "--format", "json"))
+    given = document["given"]
+    assert [point["point"] for point in given["errors"]] == ["A", "C1", "P", "C3", "C4"]
+    for point in nonempty(given["errors"]):
+        part = {each["part"]: each for each in point["parts"]}
+        for axis in "xyz":
+            sizes = {name: each[f"error_{axis}_m"] for name, each in part.items()}
+            total = sizes["measuring"] + sizes["orientation"] - sizes["absolute"]
+            assert sizes["total"] == pytest.approx(total, abs=2e-4)
+            assert sum(each[f"error_{axis}_m"] for each in point["causes"]) == pytest.approx(total, abs=3e-4)
+    spec = load_model_plan(file, []).spec
+    found = given_errors(spec)
+    assert found is not None
+    assert found.parts is not None
+    shown = [next(p for p in point["parts"] if p["part"] == "total")["error_z_m"] for point in given["errors"]]
+    assert shown == pytest.approx(found.parts.total[:, 2] * 10, abs=1e-4)
+    assert document["named"][0]["height_m"] == 120
+    assert [each["value"] for each in given["elements"]] == [4, -3, 6, -4, 8]
+    text = answer(capsys, "plan", "model", str(file))
+    for words in ("relative orientation, dx2", "Corrections from the misclosures", "before levelling", "At the points"):
+        assert words in text
+    # the same from the command line
+    options = ("--elements", "4,-3,6,-4,8", "--set", "element_errors.dby_um=4")
+    again = json.loads(answer(capsys, "plan", "model", str(file), *options, "--format", "json"))
+    assert again["given"] == given
+
+
+def test_misclosures_come_out_as_corrections(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "m.yaml"
+    points = "".join(f"    - {{at: [{x}, {y}], misclosure: [0.1, -0.2, 0.3]}}\n" for x in (0, 90) for y in (-80, 80))
+    file.write_text(f"photostrip_plan_model: 1\ncontrol:\n  points:\n{points}points: [{{name: A, at: [20, 30]}}]\n")
+    given = json.loads(answer(capsys, "plan", "model", str(file), "--format", "json"))["given"]
+    assert "errors" not in given
+    # a shift of the whole control is a shift of the model, and no sign of wrong elements
+    wanted = [0.1, -0.2, 0.3]
+    assert [given["corrections"][0][f"plain_{axis}_m"] for axis in "xyz"] == pytest.approx(wanted, abs=1e-4)
+    assert [given["corrections"][0][f"adjusted_{axis}_m"] for axis in "xyz"] == pytest.approx(wanted, abs=1e-4)
+    assert [each["value"] for each in given["adjusted_elements"]] == pytest.approx([0, 0, 0, 0], abs=0.01)
+
+
+def test_both_forms_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
+    points = ("--set", "points=[{name: A, at: [20, 30]}]")
+    forms = json.loads(answer(capsys, "plan", "model", "--closed-form", *points, "--format", "json"))["closed_form"]
+    assert len(forms["sums"]) == 15
+    assert len(forms["coefficients"]) == 3 * 4
+    assert len(forms["weights"]) == 4 * 5
+    for row in nonempty(forms["coefficients"] + forms["weights"]):
+        assert row["closed"] == pytest.approx(row["operators"], rel=1e-6, abs=1e-8)
+        assert "printed" not in row
+    text = answer(capsys, "plan", "model", "--closed-form", "--as-printed", *points)
+    assert text.count("misprint") > 5
+    assert "c15" in text
+
+
+def test_the_worked_example_of_the_source(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = json.loads(answer(capsys, "plan", "model", "--source-table", "--format", "json"))["rows"]
+    assert [row["printed_um"] for row in rows] == [35, 23, 22, 16]
+    assert "constant of the same text gives 21" in " ".join(answer(capsys, "plan", "model", "--source-table").split())
+    assert answer(capsys, "plan", "model", "--source-table", "--format", "csv").startswith("place,quantity,printed_um")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--as-printed",), "give --closed-form as well"),
+        (("--source-table", "--control", "six"), "nothing else goes with it"),
+        (("--elements", "1,2,3"), "3 values are given; the elements are five"),
+        (("--elements", "1,2,x,4,5"), "error: --elements: `x` is not a number"),
+        (("--closed-form", "--set", "points=[{name: A, at: [1, 2], height: 3}]"), "level ground, and A lie"),
+        (("--set", "points=[{name: A, at: [1, 2], height: 1500}]"), "is not seen from 1530 m; expected at most 1377 m"),
+        (("--set", "control.points=[{at: [1, 2], misclosure: [0, 0, 1]}, [3, 4]]"), "others have none"),
+        (
+            (
+                "--elements",
+                "1,2,3,4,5",
+                "--set",
+                "control.points=[{at: [1, 2], misclosure: [0, 0, 1]}]",
+            ),
+            "are both given; remove the one",
+        ),
+    ],
+)
+def test_wrong_questions_about_a_model(
+    arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", "model", *arguments]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+
+
 @pytest.mark.parametrize("ending", [".json", ".csv", ".md", ".txt"])
 def test_files_are_what_is_printed(ending: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     target = tmp_path / f"plan{ending}"
@@ -155,6 +263,8 @@ def test_pictures_are_the_same_every_time(capsys: pytest.CaptureFixture[str], tm
         (("model",), [".svg", ".svg", ".png", ".png"]),
         (("camera", str(file)), [".svg", ".svg", ".png"]),
         (("camera", "--source-table"), [".svg", ".svg", ".png"]),
+        (("model", "--source-table"), [".svg", ".svg", ".png"]),
+        (("model", "--elements", "5,-3,10,-8,12"), [".svg", ".svg", ".png"]),
     ):
         found: dict[str, set[bytes]] = {}
         for ending in endings:

@@ -1,0 +1,183 @@
+"""Given errors carried to the points of a model, beside the exact intersection and a fit of its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.errors import InputError
+from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.planning.deformation import paraboloid_rows
+from photostrip.planning.model_plan import ControlPoint, ModelSpec, NamedPoint, both_forms, given_errors, plan_model
+from tests.draws import orthogonal_normal
+from tests.planning.formulas import intersected
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+F, B, A, SCALE = 150.0, 90.0, 85.0, 10_000.0
+UNIT = SCALE / 1e3  # metres of a millimetre at photo scale
+ELEMENTS = (4e-3, -3e-3, 3e-5, -2e-5, 4e-5)
+CONTROL = (
+    ControlPoint((2.0, 80.0), "1", height=60.0, measured_error=(0.02, -0.03, 0.05), given_error=(0.01, 0.04, -0.03)),
+    ControlPoint((88.0, 78.0), "2", height=-40.0, measured_error=(-0.04, 0.01, 0.02)),
+    ControlPoint((-3.0, -82.0), "3", height=20.0, given_error=(0.02, 0.0, 0.05)),
+    ControlPoint((91.0, -75.0), "4", height=90.0),
+    ControlPoint((40.0, 5.0), "5", use="z", measured_error=(0.0, 0.0, -0.06)),
+)
+LEVEL = tuple(ControlPoint(point.at, point.name) for point in CONTROL)
+POINTS = (
+    NamedPoint((20.0, 30.0), "A", height=120.0, measured_error=(0.01, 0.02, -0.04)),
+    NamedPoint((70.0, -60.0), "B"),
+)
+SPEC = ModelSpec(F, base=B, width=A, scale=SCALE, control=CONTROL, points=POINTS, element_errors=ELEMENTS)
+
+
+def xyz(points: tuple[NamedPoint, ...]) -> Floats:
+    """Give x, y and depth, mm at photo scale."""
+    found: Floats = np.array([[*point.at, F - point.height / UNIT] for point in points])
+    return found
+
+
+def errors_of_the_exact_model(points: tuple[NamedPoint, ...], elements: tuple[float, ...] = ELEMENTS) -> Floats:
+    """Errors of measured points of the exact pair, metres."""
+    where = xyz(points)
+    truth = where * (1.0, 1.0, -1.0)
+    moved = (intersected(where, B, np.array(elements), F) - truth) * UNIT
+    found: Floats = moved + np.array([point.measured_error for point in points])
+    return found
+
+
+def fitted(errors: Floats, points: tuple[NamedPoint, ...]) -> Floats:
+    """Errors that a similarity in space leaves, found from its exact form by differences and iteration."""
+    truth = xyz(points) * (1, 1, -1)
+    counts = np.array([["xy" in point.use, "xy" in point.use, "z" in point.use] for point in CONTROL])
+    model = truth + errors / UNIT
+    given = truth[: len(CONTROL)] + np.array([point.given_error for point in CONTROL]) / UNIT
+    unknowns = np.zeros(7)
+
+    def moved(unknowns: Floats, model: Floats) -> Floats:
+        shift, scale, turn = unknowns[:3], 1 + unknowns[3], from_alpha_omega_kappa(*unknowns[4:])
+        found: Floats = scale * model @ turn.T + shift
+        return found
+
+    for _ in range(3):
+        value = (moved(unknowns, model[: len(CONTROL)]) - given)[counts]
+        step = 1e-6 * np.eye(7)
+        slope = [(moved(unknowns + u, model[: len(CONTROL)]) - given)[counts] - value for u in step]
+        unknowns -= 1e-6 * np.linalg.lstsq(np.array(slope).T, value, rcond=None)[0]
+    left: Floats = (moved(unknowns, model) - truth) * UNIT
+    return left
+
+
+def test_given_errors_are_those_of_the_exact_model_and_its_fit() -> None:
+    found = given_errors(SPEC)
+    assert found is not None
+    assert found.parts is not None
+    assert found.names == ("A", "B", "1", "2", "3", "4", "5")
+    every = (*CONTROL, *POINTS)
+    expected = np.roll(fitted(errors_of_the_exact_model(every), every), len(POINTS), axis=0)
+    # of the first order: elements of 3e-5 leave 1e-4 of themselves
+    assert found.parts.total * UNIT == pytest.approx(expected, abs=2e-4)
+    assert np.abs(expected).max() > 0.05
+    causes = found.parts.from_measuring + found.parts.from_elements + found.parts.from_control
+    assert causes == pytest.approx(found.parts.total, abs=1e-12)
+
+
+def test_misclosures_give_the_same_orientation_as_the_errors_that_make_them() -> None:
+    made = given_errors(SPEC)
+    assert made is not None
+    assert made.parts is not None
+    model = errors_of_the_exact_model(CONTROL)
+    misclosures = model - np.array([point.given_error for point in CONTROL])
+    control = tuple(
+        ControlPoint(point.at, point.name, height=point.height, use=point.use, misclosure=tuple(each))
+        for point, each in zip(CONTROL, misclosures.tolist(), strict=True)
+    )
+    found = given_errors(ModelSpec(F, base=B, width=A, scale=SCALE, control=control, points=POINTS))
+    assert found is not None
+    assert found.parts is None
+    assert found.bent is None
+    assert found.correction.plain * UNIT == pytest.approx(made.parts.absolute * UNIT, abs=2e-4)
+    assert found.correction.parameters == pytest.approx(made.correction.parameters, abs=1e-6)
+
+
+def test_without_errors_nothing_is_said() -> None:
+    assert given_errors(ModelSpec(F, base=B, width=A, control=LEVEL)) is None
+
+
+def test_the_bent_model_is_the_exact_one_less_its_datum() -> None:
+    found = given_errors(SPEC)
+    assert found is not None
+    assert found.bent is not None
+    places = plan_model(SPEC).places
+    assert found.bent.raised[:, 2] == pytest.approx(paraboloid_rows(places) @ found.bent.surface, abs=1e-12)
+    # shift, tilts, azimuth and scale taken out of both: what is left is the same
+    level = np.column_stack([places, np.full(len(places), F)])
+    exact = intersected(level, B, np.array(ELEMENTS), F) - level * (1, 1, -1)
+    tilted = np.column_stack([np.ones(len(places)), places])
+
+    def bent(heights: Floats) -> Floats:
+        left: Floats = heights - tilted @ np.linalg.lstsq(tilted, heights, rcond=None)[0]
+        return left
+
+    assert bent(found.bent.raised[:, 2]) == pytest.approx(bent(exact[:, 2]), abs=3e-6)
+    assert bent(found.bent.left[:, 2]) == pytest.approx(bent(exact[:, 2]), abs=3e-6)
+    assert np.abs(bent(exact[:, 2])).max() > 1e-3
+
+
+def similarity_left(model: Floats, given: Floats, every: Floats) -> Floats:
+    """Transform points by the similarity in space that fits a model to its control with equal weights."""
+    a, b = model - model.mean(axis=0), given - given.mean(axis=0)
+    u, s, vt = np.linalg.svd(b.T @ a)
+    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    scale = (s * [1.0, 1.0, np.linalg.det(u @ vt)]).sum() / (a**2).sum()
+    found: Floats = scale * (every - model.mean(axis=0)) @ turn.T + given.mean(axis=0)
+    return found
+
+
+@pytest.mark.slow
+def test_points_with_relief_scatter_as_expected_after_a_similarity_in_space() -> None:
+    # heights from -120 to 120 m at 1500 m; without the terms of relief plan would be 14 % off, heights 8 %
+    heights = (120.0, -60.0, -100.0, 80.0, 30.0)
+    places = ((2.0, 80.0), (88.0, 78.0), (-3.0, -82.0), (91.0, -75.0), (40.0, 5.0))
+    control = tuple(ControlPoint(at, str(k), height=h) for k, (at, h) in enumerate(zip(places, heights, strict=True)))
+    points = (NamedPoint((20.0, 30.0), "A", height=120.0), NamedPoint((70.0, -60.0), "B", height=-120.0))
+    spec = ModelSpec(F, base=B, width=A, scale=SCALE, control=control, points=points, control_sigma=(0.02, 0.02, 0.03))
+    forecast = plan_model(spec)
+    every = xyz((*control, *points))
+    truth = every * (1, 1, -1)
+    six = np.array([[x, y, F] for y in (0.0, A, -A) for x in (0.0, B)])
+    rows = np.column_stack([six[:, 0] * six[:, 1] / F, six[:, 0], -(six[:, 0] - B) * six[:, 1] / F])
+    rows = np.column_stack([rows, -(F + six[:, 1] ** 2 / F), -(six[:, 0] - B)])
+    turn = np.array([[0, -B, 0, 0, 0], [-B, 0, 0, 0, 0], [0, -1, 0, 0, 1], [-1, 0, 1, 0, 0], [0, 0, 0, 1.0, 0]])
+    errors = []
+    for drawn in orthogonal_normal(np.random.default_rng(9), 420, 6 + 4 * len(every) + 15):
+        of_six, of_points, of_control = np.split(drawn, [6, 6 + 4 * len(every)])
+        elements = turn @ -np.linalg.lstsq(rows, np.sqrt(2) * spec.image_sigma * of_six, rcond=None)[0]
+        left, right = spec.image_sigma * of_points.reshape(2, len(every), 2)
+        # the image errors move the point of the exact pair; the elements then move it on
+        one, two = (F * (every[:, :2] - (x, 0)) / every[:, 2:] + e for x, e in ((0.0, left), (B, right)))
+        depth = B * F / (one[:, 0] - two[:, 0])
+        seen = np.column_stack([depth * one[:, 0] / F, depth * (one[:, 1] + two[:, 1]) / 2 / F, depth])
+        model = intersected(seen, B, elements, F)
+        given = truth[:5] + of_control.reshape(5, 3) * np.array([0.02, 0.02, 0.03]) / UNIT
+        errors.append((similarity_left(model[:5], given, model) - truth)[5:] * UNIT)
+    ratio = np.std(errors, axis=0) / forecast.at_points
+    assert ratio == pytest.approx(np.ones_like(ratio), abs=0.07)
+    assert ratio.mean() == pytest.approx(1.0, abs=0.02)
+
+
+def test_both_forms_at_named_points_and_where_they_do_not_hold() -> None:
+    points = (NamedPoint((20.0, 30.0), "A"),)
+    forms = both_forms(ModelSpec(F, base=B, width=A, control=LEVEL, points=points))
+    assert forms.closed == pytest.approx(forms.operators, rel=1e-9, abs=1e-9)
+    assert np.abs(forms.printed - forms.closed).max() > 1
+    with pytest.raises(InputError, match="in full"):
+        both_forms(ModelSpec(F, base=B, width=A, control=CONTROL, points=points))
+    with pytest.raises(InputError, match="level ground, and 1, 2, 3, 4 lie"):
+        both_forms(ModelSpec(F, base=B, width=A, control=CONTROL[:4]))
