@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from photostrip import camera
+from photostrip.geodesy.curvature import mean_radius, radius_in_azimuth
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
+from photostrip.geodesy.ground_frame import WGS84
 from photostrip.pipeline import Settings, Strip
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.points import ControlPoints, PhotoPoints
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from photostrip.project.schema.cameras import Camera, Distortion
     from photostrip.project.schema.ground import CameraPositions as PositionsBlock
     from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
+    from photostrip.project.schema.processing import Processing
     from photostrip.project.schema.project_file import ProjectFile
     from photostrip.project.schema.values import Section
     from photostrip.triangulation.image_coordinates.certificate import Certificate
@@ -299,9 +302,20 @@ def _filled(sigma: Floats, default: Sequence[float] | float | None) -> Floats:
     return sigma if default is None else np.where(np.isnan(sigma), default, sigma)
 
 
+def _earth_radius(wanted: Processing) -> float:
+    """Radius of the Earth for eq. 153: as given, or of the ellipsoid at a latitude, in an azimuth."""
+    if wanted.earth_latitude is None:
+        return wanted.earth_radius
+    latitude = np.radians(wanted.earth_latitude)
+    if wanted.earth_azimuth is None:
+        return float(mean_radius(latitude, WGS84))
+    return float(radius_in_azimuth(latitude, np.radians(wanted.earth_azimuth), WGS84))
+
+
 def settings(project: ProjectFile) -> Settings:
     """Return the settings of every operation; what the project does not give keeps the default that stands there."""
     wanted, usual = project.processing, Settings()
+    radius = _earth_radius(wanted)
     return Settings(
         adjustment=wanted.adjustment,
         precision=wanted.precision,
@@ -309,7 +323,7 @@ def settings(project: ProjectFile) -> Settings:
         relative=_laid_over(usual.relative, wanted.relative),
         links=_laid_over(usual.links, wanted.links),
         formation=replace(usual.formation, scale_transfer=wanted.scale_transfer),
-        absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=wanted.earth_radius),
+        absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=radius),
         polynomial=_laid_over(usual.polynomial, wanted.polynomial),
         covariance=_laid_over(usual.covariance, wanted.covariance),
         bundle=_laid_over(usual.bundle, wanted.bundle),
@@ -321,7 +335,7 @@ def settings(project: ProjectFile) -> Settings:
             refraction=wanted.refraction,
             flying_height=wanted.flying_height,
             ground_height=wanted.ground_height,
-            earth_radius=wanted.earth_radius if wanted.earth_curvature == "image" else None,
+            earth_radius=radius if wanted.earth_curvature == "image" else None,
         ),
         angle_system=project.output.angles.system,
         angle_unit=project.output.angles.unit,

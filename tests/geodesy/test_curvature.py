@@ -28,18 +28,6 @@ def ellipsoid_named(text: str) -> tuple[float, float]:
     return a, a * (1.0 - 1.0 / inverse)
 
 
-def mean_radius(lat: ArrayLike, ellipsoid: curvature.Ellipsoid) -> NDArray[np.float64]:
-    """Mean radius of curvature, sqrt(M N): wrong by at most 0.06 m at 20 km, in whatever direction."""
-    return np.sqrt(curvature.meridian_radius(lat, ellipsoid) * curvature.prime_vertical_radius(lat, ellipsoid))
-
-
-def radius_in_azimuth(lat: ArrayLike, azimuth: ArrayLike, ellipsoid: curvature.Ellipsoid) -> NDArray[np.float64]:
-    """Radius of the normal section in a direction, R_A = M N / (N cos^2 A + M sin^2 A) (Euler's formula)."""
-    m, n = curvature.meridian_radius(lat, ellipsoid), curvature.prime_vertical_radius(lat, ellipsoid)
-    angle = np.asarray(azimuth, dtype=np.float64)
-    return np.asarray(m * n / (n * np.cos(angle) ** 2 + m * np.sin(angle) ** 2))
-
-
 def height_on_sphere(z: ArrayLike, distance: ArrayLike, radius: ArrayLike) -> NDArray[np.float64]:
     """Height above a sphere, h = sqrt(D^2 + (R + Z)^2) - R, without the difference of two numbers of the size of R."""
     up = np.asarray(z, dtype=np.float64)
@@ -54,8 +42,8 @@ def test_vectors(example: Vector) -> None:
     lat, azimuth = np.radians([inside["B_deg"], inside["azimuth_of_point_deg"]])
     ellipsoid = ellipsoid_named(inside["ellipsoid"])
     distance = np.hypot(inside["X"], inside["Y"])
-    mean = mean_radius(lat, ellipsoid)
-    directed = radius_in_azimuth(lat, azimuth, ellipsoid)
+    mean = curvature.mean_radius(lat, ellipsoid)
+    directed = curvature.radius_in_azimuth(lat, azimuth, ellipsoid)
     found = {
         "D": distance,
         "M": curvature.meridian_radius(lat, ellipsoid),
@@ -82,7 +70,7 @@ def errors_on_the_ellipsoid(distance_km: float, azimuth_deg: float, height: floa
     tangent = IntermediateFrame(geocentric_from_geodetic([[0.0, LAT, 0.0]], GRS80)[0], axes_matrix(LAT, 0.0, 0.0))
     x, y, z = tangent.intermediate_from_cartesian(point)[0]
     distance, azimuth = np.hypot(x, y), np.arctan2(-y, x)
-    radii = mean_radius(LAT, GRS80), radius_in_azimuth(LAT, azimuth, GRS80)
+    radii = curvature.mean_radius(LAT, GRS80), curvature.radius_in_azimuth(LAT, azimuth, GRS80)
     mean, directed = (float(z + curvature.curvature_correction(distance, radius)) - height for radius in radii)
     return abs(mean), abs(directed)
 
@@ -102,7 +90,7 @@ def test_table_of_the_formula_s_accuracy(
 ) -> None:
     """At latitude 42.5 degrees, along the meridian and across it, the larger one."""
     found = [errors_on_the_ellipsoid(distance_km, azimuth) for azimuth in (0.0, 90.0)]
-    correction = curvature.curvature_correction(distance_km * 1e3, mean_radius(LAT, GRS80))
+    correction = curvature.curvature_correction(distance_km * 1e3, curvature.mean_radius(LAT, GRS80))
     assert round(float(correction), digits[0]) == size
     assert round(max(error for error, _ in found), digits[1]) == mean
     assert round(max(error for _, error in found), digits[2]) == directed
@@ -118,16 +106,16 @@ def test_high_terrain_is_off_by_half_a_centimetre_at_20_km() -> None:
 )
 def test_radii_keep_their_order(lat: float, azimuth: float) -> None:
     m, n = curvature.meridian_radius(lat, GRS80), curvature.prime_vertical_radius(lat, GRS80)
-    directed = radius_in_azimuth(lat, azimuth, GRS80)
+    directed = curvature.radius_in_azimuth(lat, azimuth, GRS80)
     assert m <= n * (1.0 + 1e-15)
     assert m * (1.0 - 1e-12) <= directed <= n * (1.0 + 1e-12)
-    assert m * (1.0 - 1e-12) <= mean_radius(lat, GRS80) <= n * (1.0 + 1e-12)
+    assert m * (1.0 - 1e-12) <= curvature.mean_radius(lat, GRS80) <= n * (1.0 + 1e-12)
 
 
 def test_radii_in_the_cardinal_directions() -> None:
     lat = np.radians([-80.0, 0.0, 42.5])
-    assert radius_in_azimuth(lat, 0.0, GRS80) == pytest.approx(curvature.meridian_radius(lat, GRS80))
-    across = radius_in_azimuth(lat, np.pi / 2, GRS80)
+    assert curvature.radius_in_azimuth(lat, 0.0, GRS80) == pytest.approx(curvature.meridian_radius(lat, GRS80))
+    across = curvature.radius_in_azimuth(lat, np.pi / 2, GRS80)
     assert across == pytest.approx(curvature.prime_vertical_radius(lat, GRS80))
 
 

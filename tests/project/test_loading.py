@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from photostrip.camera import Distortion
+from photostrip.errors import InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.pipeline import Settings
 from photostrip.project.loading import Project, load_project
@@ -367,6 +368,19 @@ def test_curvature_of_eq_153_is_for_local_coordinates(tmp_path: Path) -> None:
     project.change("project.yaml", "EPSG:32633", "local")
     project.change("project.yaml", "processing:", "processing:\n  earth_curvature: model\n  earth_radius: 6380000")
     assert project.load().settings.absolute.earth_radius == 6_380_000
+    # at a place: R = M N / (N cos² A + M sin² A), M and N of WGS 84 at 42.5 degrees
+    project.change("project.yaml", "earth_radius: 6380000", "earth_latitude: 42.5\n  earth_azimuth: 90")
+    assert project.load().settings.absolute.earth_radius == pytest.approx(6_387_903.5, abs=0.1)
+    project.change("project.yaml", "earth_azimuth: 90", "earth_azimuth: 0")
+    assert project.load().settings.absolute.earth_radius == pytest.approx(6_364_587.2, abs=0.1)
+    project.change("project.yaml", "\n  earth_azimuth: 0", "")
+    assert project.load().settings.absolute.earth_radius == pytest.approx((6_387_903.5 * 6_364_587.2) ** 0.5, abs=0.1)
+    project.change("project.yaml", "earth_latitude: 42.5", "earth_latitude: 425")
+    with pytest.raises(InputError, match="earth_latitude: 425 is out of range; expected -90 to 90 deg"):
+        project.load()
+    project.change("project.yaml", "earth_latitude: 425", "earth_azimuth: 30")
+    with pytest.raises(InputError, match="at a latitude only; give `earth_latitude` as well"):
+        project.load()
 
 
 # -------------------------------------------------------------------------------------------------- what is noted

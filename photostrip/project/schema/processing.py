@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Self
 
-from pydantic import BeforeValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
@@ -17,10 +17,13 @@ from photostrip.project.schema.values import (
     Flag,
     Fraction,
     Id,
+    Number,
     NumberOrAuto,
     Positive,
     PositiveOrAuto,
+    Range,
     Section,
+    bounded,
     choice,
     if_empty,
     key,
@@ -139,6 +142,9 @@ class Bundle(Section):
         return self
 
 
+Latitude = Annotated[Number, AfterValidator(bounded(Range(-90.0, 90.0, "deg")))]
+
+
 class Processing(Section):
     """What is computed and how."""
 
@@ -165,6 +171,14 @@ class Processing(Section):
     earth_radius: Positive = key(
         "Radius of the Earth for `earth_curvature: model` and `image`", DEFAULTS.absolute.earth_radius, unit="m"
     )
+    earth_latitude: Latitude | None = key(
+        "Latitude of the strip: the radius of the ellipsoid there takes the place of `earth_radius`", None, unit="deg"
+    )
+    earth_azimuth: Number | None = key(
+        "Azimuth of the strip: the radius in this direction; without it the mean radius at the latitude",
+        None,
+        unit="deg",
+    )
     precision: Flag = key("Compute standard deviations and covariances of points and photos", DEFAULTS.precision)
     cross_validation: Flag = key(
         "Adjust again without each point of the control, or each of ten groups of it, and compare there",
@@ -186,3 +200,10 @@ class Processing(Section):
         unit="m",
     )
     interior: Interior = key("Interior orientation", Interior.model_construct())
+
+    @model_validator(mode="after")
+    def _azimuth_of_a_place(self) -> Self:
+        if self.earth_azimuth is not None and self.earth_latitude is None:
+            message = "a direction has a radius of curvature at a latitude only"
+            raise wrong(message, code="missing-key", at="earth_azimuth", fix="give `earth_latitude` as well")
+        return self
