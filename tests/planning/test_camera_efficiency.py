@@ -7,13 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.camera import Distortion
+from photostrip.errors import InputError
 from photostrip.planning.camera_efficiency import (
     PRINTED_BASE,
     PRINTED_TABLE,
     ComparedCamera,
+    Survey,
+    Terrain,
     by_efficiency,
     compare,
+    sigma_from_distortion,
+    sigma_from_mean_distortion,
     source_cameras,
+    suitability,
 )
 from tests.vectors import cases
 
@@ -107,3 +114,91 @@ def test_the_best_camera_is_that_of_the_largest_area_at_equal_heights() -> None:
         "abc", key=lambda name: -flown(next(c for c in cameras if c.name == name), 1.0)
     )
     assert [c.focal for c in by_efficiency(source_cameras())] == [70, 100, 140, 200]
+
+
+# --------------------------------------------------------------------------------- distortion, ground and what it costs
+
+FILM = ComparedCamera("film", focal=153.0, sigma=0.007, base=92.0, width=161.0, length=230.0)
+
+
+def test_a_parallax_from_measuring_and_mean_distortion_scatters_so() -> None:
+    rng = np.random.default_rng(7)
+    count, measuring, spread = 200_000, 0.004, 0.006
+    radial = spread * rng.normal(size=(count, 2))
+    turned = np.cos(rng.uniform(0, 2 * np.pi, size=(count, 2)))
+    x = measuring * rng.normal(size=(count, 2)) + radial * turned
+    found = sigma_from_mean_distortion(measuring, float(np.abs(radial).mean()))
+    assert (x[:, 0] - x[:, 1]).std() == pytest.approx(found, rel=0.01)
+    assert sigma_from_mean_distortion(measuring, 0.0) == pytest.approx(np.sqrt(2) * measuring)
+
+
+def test_a_parallax_with_a_known_distortion_is_its_scatter_over_the_model() -> None:
+    k1, base, length, width = 4e-9, 92.0, 230.0, 161.0
+    rng = np.random.default_rng(8)
+    x, y = rng.uniform(base - length / 2, length / 2, 400_000), rng.uniform(-width / 2, width / 2, 400_000)
+    parallax = k1 * (x * (x**2 + y**2) - (x - base) * ((x - base) ** 2 + y**2))
+    brown = Distortion("brown", "image_to_ideal", k=(k1, 0.0, 0.0))
+    found = sigma_from_distortion(0.0, brown, base, length, width)
+    assert found == pytest.approx(parallax.std(), rel=0.06)  # a grid reaches the edges, drawn points hardly do
+    measured = sigma_from_distortion(0.003, brown, base, length, width)
+    assert measured == pytest.approx(np.hypot(found, 0.003 * np.sqrt(2)))
+    short = Distortion("radial-table", "image_to_ideal", radius=(0.0, 60.0), distortion=(0.0, 0.002))
+    with pytest.raises(InputError, match="beyond the distortion table"):
+        sigma_from_distortion(0.0, short, base, length, width)
+
+
+@pytest.mark.parametrize("survey", [Survey(scale=8000), Survey(flying_height=1224), Survey(height_sigma=0.0931304)])
+def test_what_a_height_and_an_area_cost(survey: Survey) -> None:
+    flown = survey.flown(FILM)
+    # m_h = H m_p / b: a height at the distance H from a base of b m, of which a parallax is known to m_p m
+    assert flown.scale == pytest.approx(8000, rel=1e-5)
+    assert flown.flying_height == pytest.approx(1224, rel=1e-5)
+    assert flown.height_sigma == pytest.approx(1224 * 0.007 / 92, rel=1e-5)
+    assert flown.area == pytest.approx(0.736 * 1.288, rel=1e-5)
+
+
+def photos_of(place: float, height: float, flying_height: float, camera: ComparedCamera) -> int:
+    """Count the photos of a long strip that show a point of its axis, by projecting it."""
+    assert camera.length is not None
+    centres = np.arange(-20, 21) * camera.base * flying_height / camera.focal
+    x = camera.focal * (place - centres) / (flying_height - height)
+    return int((np.abs(x) < camera.length / 2).sum())
+
+
+def test_the_largest_relief_is_where_no_point_is_left_on_three_photos() -> None:
+    survey = Survey(flying_height=1500.0)
+    highest = suitability(FILM, survey).relief / 2
+    assert highest == pytest.approx(300.0)  # H (1 - 2 b / L), a fifth of H at 60 % overlap
+    places = np.linspace(0.0, 2000.0, 4001)
+    most = [max(photos_of(x, h, 1500.0, FILM) for x in places.tolist()) for h in (highest - 5, highest + 5)]
+    assert most == [3, 2]
+    found = suitability(FILM, Survey(flying_height=1500.0, terrain=Terrain(relief=400.0)))
+    overlap = (230.0 - 92.0 * 1500 / 1300) / 230.0
+    assert found.lap == pytest.approx(overlap)
+    assert found.suits
+    assert not suitability(FILM, Survey(flying_height=1500.0, terrain=Terrain(relief=700.0))).suits
+
+
+def test_the_steepest_slope_is_that_which_the_outermost_ray_grazes() -> None:
+    steepest = suitability(FILM, Survey(scale=8000)).slope
+    ray = np.array([92.0, 80.5, -153.0])  # from the left photo to the corner of the model beside the right nadir
+    away = np.append(ray[:2] / np.hypot(*ray[:2]), 0.0)
+    for change, seen in ((-1e-3, True), (1e-3, False)):
+        slope = steepest + change
+        normal = np.array([0.0, 0.0, np.cos(slope)]) + away * np.sin(slope)  # a slope that falls away from the photo
+        assert (ray @ normal < 0) is np.bool_(seen)
+
+
+def test_the_least_principal_distance_just_takes_the_terrain() -> None:
+    for terrain in (
+        Terrain(relief=500.0),
+        Terrain(slope=np.radians(55.0)),
+        Terrain(relief=300.0, slope=np.radians(40)),
+    ):
+        survey = Survey(scale=8000.0, terrain=terrain)
+        least = suitability(FILM, survey).least_focal
+        assert suitability(FILM._replace(focal=least * 1.0001), survey).suits
+        assert not suitability(FILM._replace(focal=least * 0.9999), survey).suits
+    # at a given flying height the principal distance does not change what relief asks for
+    too_much = Survey(flying_height=1500.0, terrain=Terrain(relief=700.0))
+    assert suitability(FILM, too_much).least_focal == np.inf

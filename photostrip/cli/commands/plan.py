@@ -349,7 +349,7 @@ def _required(text: str | None) -> Options:
     }
 
 
-@_command("camera", "cameras.yaml", "--source-table")
+@_command("camera", "cameras.yaml", "cameras.yaml --set height_sigma=0.2 --set relief=400", "--source-table")
 def camera(
     *,
     file: PlanFile = None,
@@ -372,4 +372,4 @@ def camera(
             delivery.deliver(source_document(), ())
         else:
             given = load_camera_plan(file, delivery.assignments or [])
-            delivery.deliver(camera_document(given.name, given.cameras, given.reference), given.files)
+            delivery.deliver(camera_document(given.name, given.cameras, given.reference, given.survey), given.files)

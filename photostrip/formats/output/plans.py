@@ -4,25 +4,70 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.plan_strip import along_rows
-from photostrip.planning.camera_efficiency import PRINTED_TABLE, ComparedCamera, by_efficiency, compare, source_cameras
+from photostrip.planning.camera_efficiency import (
+    PRINTED_TABLE,
+    ComparedCamera,
+    Survey,
+    by_efficiency,
+    compare,
+    source_cameras,
+    suitability,
+)
 from photostrip.result.numbers import Document, micrometres, rounded, significant
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-def camera_document(name: str, cameras: Sequence[ComparedCamera], reference: ComparedCamera) -> Document:
+def camera_document(
+    name: str, cameras: Sequence[ComparedCamera], reference: ComparedCamera, survey: Survey | None = None
+) -> Document:
     """Return a comparison of cameras as a document, one row for each camera in the order given."""
     order = [camera.name for camera in by_efficiency(cameras)]
-    return {
+    document: Document = {
         "kind": "cameras",
         "name": name,
         "reference": reference.name,
         "fewest_photos": order[0],
         "smallest_coefficient": min(cameras, key=lambda camera: camera.coefficient).name,
         "cameras": [{**_camera(camera, reference), "rank": order.index(camera.name) + 1} for camera in cameras],
+    }
+    return document if survey is None else document | _survey(cameras, survey, order)
+
+
+def _survey(cameras: Sequence[ComparedCamera], survey: Survey, order: Sequence[str]) -> Document:
+    """Return what each camera does in one survey, and which of them takes its terrain."""
+    terrain = survey.terrain
+    rows, suited = [], []
+    for camera in cameras:
+        flown = survey.flown(camera)
+        found = suitability(camera, survey)
+        if found.suits:
+            suited.append(camera.name)
+        rows.append(
+            {
+                "camera": camera.name,
+                "scale": significant(flown.scale, 6),
+                "flying_height_m": rounded(flown.flying_height, 1),
+                "sigma_z_m": rounded(flown.height_sigma, 4),
+                "area_km2": significant(flown.area),
+                "sigma_z_per_area_m_km2": significant(flown.height_sigma / flown.area),
+                "photos_per_100_km2": rounded(100 / flown.area, 1),
+                "largest_relief_m": rounded(found.relief, 1),
+                "lap_at_highest_percent": rounded(100 * found.lap, 1),
+                "steepest_slope_deg": rounded(np.degrees(found.slope), 2),
+                "least_principal_distance_mm": rounded(found.least_focal, 1),
+                "suits": found.suits,
+            }
+        )
+    return {
+        "survey": rows,
+        "terrain": {"relief_m": terrain.relief, "slope_deg": rounded(np.degrees(terrain.slope), 3)},
+        "recommended": next((name for name in order if name in suited), None),
     }
 
 
@@ -33,6 +78,8 @@ def _camera(camera: ComparedCamera, reference: ComparedCamera) -> Document:
         "principal_distance_mm": significant(camera.focal, 9),
         "sigma_um": micrometres(camera.sigma),
         "base_mm": rounded(camera.base, 3),
+        "useful_width_mm": rounded(camera.width, 3),
+        "base_ratio": rounded(camera.focal / camera.base, 4),
         "coefficient_mm2": rounded(camera.coefficient, 4),
         "height_ratio": rounded(camera.height_ratio, 2),
         "scale_ratio": rounded(beside.scale, 4),

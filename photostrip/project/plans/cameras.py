@@ -2,25 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
+from photostrip.errors import InputError
 from photostrip.planning import camera_efficiency
+from photostrip.project.conversion import distortion_of
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Percent, SigmaUm, read_plan
-from photostrip.project.schema.values import Id, Positive, Section, Words, key, one_of, wrong
+from photostrip.project.schema.cameras import Distortion
+from photostrip.project.schema.values import Id, Number, Positive, Range, Section, Words, bounded, key, one_of, wrong
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
 
+MICROMETRES = 1000.0  # in a millimetre
+Lap = Annotated[Number, AfterValidator(bounded(Range(0.0, 90.0, "%")))]
+Relief = Annotated[Number, AfterValidator(bounded(Range(0.0, 9000.0, "m")))]
+Slope = Annotated[Number, AfterValidator(bounded(Range(0.0, 89.0, "deg")))]
+FLOWN = ("scale", "flying_height", "height_sigma")
+
+
 class PlanCamera(Section):
     """One camera to compare."""
 
     principal_distance: Positive = key("Principal distance", unit="mm")
-    sigma_um: SigmaUm = key("Standard deviation of an x parallax in the photo", unit="um")
+    sigma_um: SigmaUm | None = key("Standard deviation of an x parallax in the photo", None, unit="um")
+    image_sigma_um: SigmaUm | None = key(
+        "Standard deviation of an image coordinate, instead of that of a parallax", None, unit="um"
+    )
+    mean_distortion_um: Positive | None = key("Mean size of the radial distortion that is left", None, unit="um")
+    distortion: Distortion | None = key("The distortion that is left, instead of its mean size", None)
     base: Positive | None = key("Photo base; default: from `format` and the overlap", None, unit="mm")
     format: tuple[Positive, Positive] | None = key("Length along and width across the flight", None, unit="mm")
 
@@ -28,6 +44,24 @@ class PlanCamera(Section):
     def _has_a_base(self) -> Self:
         if self.base is None and self.format is None:
             raise wrong("nothing says how long the photo base is", code="missing-key", expected="`base` or `format`")
+        return self
+
+    @model_validator(mode="after")
+    def _has_one_precision(self) -> Self:
+        if (self.sigma_um is None) == (self.image_sigma_um is None):
+            what = "nothing says" if self.sigma_um is None else "two keys say"
+            message = f"{what} how well an x parallax is known"
+            raise wrong(message, code="missing-key", expected="`sigma_um` or `image_sigma_um`")
+        left = [name for name in ("mean_distortion_um", "distortion") if getattr(self, name) is not None]
+        if left and self.sigma_um is not None:
+            message = f"`{left[0]}` adds to the errors of measuring, and `sigma_um` has all errors in it"
+            raise wrong(message, code="two-keys", at=left[0], fix="give `image_sigma_um` instead of `sigma_um`")
+        if len(left) > 1:
+            message = "the distortion that is left and its mean size are both given"
+            raise wrong(message, code="two-keys", at=left[0], fix="remove one")
+        if self.distortion is not None and self.format is None:
+            message = "where the distortion lies in a model follows from the format, which is not given"
+            raise wrong(message, code="missing-key", at="distortion", expected="`format`")
         return self
 
 
@@ -38,6 +72,12 @@ class CameraPlanFile(Section):
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the comparison", "cameras")
     end_lap_percent: Percent = key("Overlap, for cameras without `base`", 60.0, unit="%")
+    side_lap_percent: Lap = key("Overlap of neighbouring strips: what is left of the width is useful", 0.0, unit="%")
+    scale: Positive | None = key("Denominator of the photo scale that all are flown at", None)
+    flying_height: Positive | None = key("Height above the ground that all are flown at, instead", None, unit="m")
+    height_sigma: Positive | None = key("Standard deviation that heights shall have, instead", None, unit="m")
+    relief: Relief = key("Difference between the highest and the lowest ground", 0.0, unit="m")
+    slope_deg: Slope = key("Steepest slope that is to be seen", 0.0, unit="deg")
     reference: Id | None = key("Camera that the others stand beside; default: the last", None)
     cameras: Annotated[dict[Id, PlanCamera], Field(min_length=1)] = key("Cameras by name")
 
@@ -55,6 +95,22 @@ class CameraPlanFile(Section):
             raise wrong(message, code="missing-key", at="cameras", fix="give `format` for all cameras, or for none")
         return self
 
+    @model_validator(mode="after")
+    def _flown_one_way(self) -> Self:
+        given = [name for name in FLOWN if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise wrong(f"`{given[0]}` and `{given[1]}` are both given", code="two-keys", at=given[1], fix="remove one")
+        ground = [name for name in ("relief", "slope_deg") if getattr(self, name)]
+        if ground and not given:
+            message = "what a camera takes of a terrain depends on how it is flown"
+            raise wrong(
+                message, code="missing-key", at=ground[0], expected="`scale`, `flying_height` or `height_sigma`"
+            )
+        if self.relief and any(camera.format is None for camera in self.cameras.values()):
+            message = "how far photos overlap on high ground follows from their format, which is not given"
+            raise wrong(message, code="missing-key", at="relief", fix="give `format` for all cameras")
+        return self
+
 
 class CameraPlan(NamedTuple):
     """Cameras to compare."""
@@ -62,28 +118,63 @@ class CameraPlan(NamedTuple):
     name: str
     cameras: tuple[camera_efficiency.ComparedCamera, ...]
     reference: camera_efficiency.ComparedCamera
+    survey: camera_efficiency.Survey | None  # nothing where only the cameras are compared
     files: Sequence[str]
 
 
 def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
     """Read a list of cameras to compare, or raise every fault of it."""
     given, reading = read_plan(CameraPlanFile, path, assignments)
-    cameras = tuple(_plan_camera(str(name), each, given.end_lap_percent) for name, each in given.cameras.items())
+    cameras = tuple(_plan_camera(str(name), each, given) for name, each in given.cameras.items())
     named = {camera.name: camera for camera in cameras}
     return CameraPlan(
         name=str(given.name),
         cameras=cameras,
         reference=named.get(str(given.reference), cameras[-1]),
+        survey=_survey(given),
         files=reading.files,
     )
 
 
-def _plan_camera(name: str, given: PlanCamera, end_lap: float) -> camera_efficiency.ComparedCamera:
-    base = given.base
-    if base is None and given.format is not None:
-        base = given.format[0] * (1.0 - end_lap / 100.0)
-    # without a format all cameras count as equally wide
-    width = given.format[1] if given.format is not None else camera_efficiency.PRINTED_BASE
-    return camera_efficiency.ComparedCamera(
-        name=name, focal=given.principal_distance, sigma=given.sigma_um / 1000.0, base=base or np.nan, width=width
+def _survey(given: CameraPlanFile) -> camera_efficiency.Survey | None:
+    if all(getattr(given, name) is None for name in FLOWN):
+        return None
+    return camera_efficiency.Survey(
+        scale=given.scale,
+        flying_height=given.flying_height,
+        height_sigma=given.height_sigma,
+        terrain=camera_efficiency.Terrain(given.relief, float(np.radians(given.slope_deg))),
     )
+
+
+def _plan_camera(name: str, given: PlanCamera, plan: CameraPlanFile) -> camera_efficiency.ComparedCamera:
+    # without a format all cameras count as equally wide
+    length, width = given.format or (None, camera_efficiency.PRINTED_BASE)
+    base = given.base
+    if base is None and length is not None:
+        base = length * (1.0 - plan.end_lap_percent / 100.0)
+    useful = width * (1.0 - plan.side_lap_percent / 100.0)
+    return camera_efficiency.ComparedCamera(
+        name=name,
+        focal=given.principal_distance,
+        sigma=_sigma(name, given, base or np.nan, useful),
+        base=base or np.nan,
+        width=useful,
+        length=length,
+    )
+
+
+def _sigma(name: str, given: PlanCamera, base: float, width: float) -> float:
+    """Return m_p, mm."""
+    if given.sigma_um is not None:
+        return given.sigma_um / MICROMETRES
+    measuring = (given.image_sigma_um or 0.0) / MICROMETRES
+    if given.distortion is None or given.format is None:
+        mean = (given.mean_distortion_um or 0.0) / MICROMETRES
+        return camera_efficiency.sigma_from_mean_distortion(measuring, mean)
+    try:
+        return camera_efficiency.sigma_from_distortion(
+            measuring, distortion_of(given.distortion), base=base, length=given.format[0], width=width
+        )
+    except InputError as error:
+        raise InputError(replace(fault, key=f"cameras.{name}.distortion") for fault in error.faults) from None

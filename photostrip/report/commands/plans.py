@@ -28,7 +28,57 @@ def _cameras(document: Document) -> tuple[Section, ...]:
             ("beside", f"{document['reference']}: all ratios are to it"),
         )
     )
-    return (Section("", (facts, _camera_table(document["cameras"]))),)
+    models = tabulated(
+        document["cameras"],
+        (
+            words("camera", "camera"),
+            number("base b", "base_mm", 1, "mm"),
+            number("useful width", "useful_width_mm", 1, "mm"),
+            number("f/b", "base_ratio", 2),
+        ),
+    )
+    sections = [Section("", (facts, _camera_table(document["cameras"]))), Section("Their models", (models,))]
+    if "survey" in document:
+        sections += _survey(document)
+    return tuple(sections)
+
+
+def _survey(document: Document) -> list[Section]:
+    """Show the survey that all cameras are flown for, and what they take of the terrain."""
+    rows, terrain = document["survey"], document["terrain"]
+    cost = tabulated(
+        rows,
+        (
+            words("camera", "camera"),
+            number("scale", lambda row: f"1:{row['scale']:.0f}"),
+            number("H", "flying_height_m", 0, "m"),
+            number("m_h", "sigma_z_m", 3, "m"),
+            number("area S", "area_km2", short, "km²"),
+            number("m_h/S", "sigma_z_per_area_m_km2", short, "m/km²"),
+            number("photos", "photos_per_100_km2", 0, "per 100 km²"),
+        ),
+        note="S: what a model covers, of its useful width",
+    )
+    sections = [Section("What heights and areas cost", (cost,))]
+    if terrain["relief_m"] or terrain["slope_deg"]:
+        taken = tabulated(
+            rows,
+            (
+                words("camera", "camera"),
+                number("overlap", "lap_at_highest_percent", 1, "highest, %"),
+                number("relief", "largest_relief_m", 0, "largest, m"),
+                number("slope", "steepest_slope_deg", 1, "steepest, °"),
+                number("f", "least_principal_distance_mm", calibrated, "least, mm"),
+                words("takes it", lambda row: "yes" if row["suits"] else "no"),
+            ),
+            note="least f: of a camera with this format and base",
+        )
+        asked = f"relief {fixed(terrain['relief_m'], 0)} m, slopes up to {fixed(terrain['slope_deg'], 0)}°"
+        best = document["recommended"]
+        chosen = "none of these cameras" if best is None else f"{best}, the most efficient of those that take it"
+        facts = Facts((("terrain", asked), ("recommended", chosen)))
+        sections.append(Section("What the cameras take of the terrain", (facts, taken)))
+    return sections
 
 
 def _camera_table(rows: Sequence[Document]) -> Table:
@@ -38,7 +88,6 @@ def _camera_table(rows: Sequence[Document]) -> Table:
             words("camera", "camera"),
             number("f", "principal_distance_mm", calibrated, "mm"),
             number("m_p", "sigma_um", 1, "µm"),
-            number("base", "base_mm", 1, "mm", rank=1),
             number("K = f m_p", "coefficient_mm2", 3, "mm²"),
             number("H/m_h", "height_ratio", 0),
             number("m_h", "eta_height", 3, "equal area"),

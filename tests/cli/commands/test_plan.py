@@ -115,6 +115,15 @@ def test_a_wrong_plan_is_refused(text: str, message: str, capsys: pytest.Capture
         ("  a: {principal_distance: 153, sigma_um: 7}\n", "nothing says how long the photo base is"),
         (CAMERAS.partition("cameras:\n")[2] + "  c: {principal_distance: 9, sigma_um: 7, base: 3}\n", "no format"),
         (CAMERAS.partition("cameras:\n")[2] + "reference: wild\n", "there is no camera `wild`"),
+        ("  a: {principal_distance: 153, base: 60}\n", "nothing says how well an x parallax is known"),
+        ("  a: {principal_distance: 153, base: 60, sigma_um: 3, image_sigma_um: 3}\n", "two keys say how well"),
+        ("  a: {principal_distance: 153, base: 60, sigma_um: 3, mean_distortion_um: 3}\n", "has all errors in it"),
+        (CAMERAS.partition("cameras:\n")[2] + "relief: 300\n", "depends on how it is flown"),
+        (CAMERAS.partition("cameras:\n")[2] + "scale: 3\nflying_height: 300\n", "`flying_height` are both given"),
+        (
+            "  a: {principal_distance: 153, base: 60, sigma_um: 3}\nscale: 3000\nrelief: 9\n",
+            "follows from their format",
+        ),
     ],
 )
 def test_a_wrong_list_of_cameras_is_refused(
@@ -124,6 +133,28 @@ def test_a_wrong_list_of_cameras_is_refused(
     file.write_text(f"photostrip_plan_cameras: 1\ncameras:\n{text}")
     assert main(["plan", "camera", str(file)]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_cameras_over_ground(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "c.yaml"
+    file.write_text(CAMERAS + "side_lap_percent: 30\nheight_sigma: 0.2\nrelief: 400\nslope_deg: 60\n")
+    document = json.loads(answer(capsys, "plan", "camera", str(file), "--format", "json"))
+    assert [row["useful_width_mm"] for row in document["cameras"]] == pytest.approx([161, 72.702])
+    assert document["cameras"][0]["base_ratio"] == pytest.approx(153 / 92, abs=1e-4)
+    for row in nonempty(document["survey"]):
+        assert row["sigma_z_m"] == 0.2
+        assert row["sigma_z_per_area_m_km2"] == pytest.approx(0.2 / row["area_km2"], rel=1e-3)
+        assert row["photos_per_100_km2"] == pytest.approx(100 / row["area_km2"], rel=3e-3)
+    assert [row["suits"] for row in document["survey"]] == [False, True]
+    assert document["recommended"] == "digital"
+    text = answer(capsys, "plan", "camera", str(file))
+    assert "recommended  digital, the most efficient" in text
+    text = answer(capsys, "plan", "camera", str(file), "--set", "slope_deg=80")
+    assert "recommended  none of these cameras" in text
+    left = "{model: radial-table, direction: image_to_ideal, radius: [0, 50], distortion: [0, 0.003]}"
+    camera = f"cameras.b={{principal_distance: 88, image_sigma_um: 4, format: [230, 230], distortion: {left}}}"
+    assert main(["plan", "camera", str(file), "--set", camera]) == 2
+    assert "cameras.b.distortion: a point" in capsys.readouterr().err
 
 
 def test_weak_control_is_weak_geometry(capsys: pytest.CaptureFixture[str]) -> None:
