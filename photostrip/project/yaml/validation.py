@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     Model = type[Section]
 
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would look for some in every installed package
 T = TypeVar("T", bound=Section)
 MEANT = re.compile(r"did you mean `(.+)`\?")  # a suggestion
 MOST_EXPLAINED = 1000  # errors of one file; more of them are only counted
