@@ -68,10 +68,22 @@ def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
 
 def natural_rank(names: Sequence[str]) -> Numbers:
     """Place of each name in natural order, from 0."""
-    keys = [natural(name) for name in names]
+    keys: Sequence[Any] = _padded(names) or [natural(name) for name in names]
     rank = np.empty(len(names), np.intp)
     rank[sorted(range(len(names)), key=keys.__getitem__)] = np.arange(len(names))
     return rank
+
+
+def _padded(names: Sequence[str]) -> list[tuple[str, str]]:
+    """Return texts in the order of ``natural``, all numbers filled up to one length; none where an id has odd signs."""
+    text = "\n".join(names)
+    if text.count("\n") != len(names) - 1 or "\0" in text:
+        return []
+    parts = DIGITS.split(text)
+    numbers = [part.lstrip("0") for part in parts[1::2]]
+    width = max(map(len, numbers), default=0)
+    parts[1::2] = ["\0" + digits.rjust(width, "0") for digits in numbers]  # a number comes before any other sign
+    return list(zip("".join(parts).split("\n"), names, strict=True))
 
 
 def rms(values: Floats) -> float:

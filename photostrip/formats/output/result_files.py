@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from photostrip.result.columns import Column
     from photostrip.result.description import Quantity
 
+ODD = re.compile(r'[",\s]')  # without these no id needs quotes
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
 BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column
 
@@ -101,32 +102,31 @@ def _table(columns: Sequence[Column], rows: Iterable[Document]) -> str:
     """Write a table; an empty cell is a number that does not exist."""
     listed = list(rows)
     cells = [_cells(column.quantity, [row.get(column.key) for row in listed]) for column in columns]
-    return "\n".join([_header(columns), *map(",".join, zip(*cells, strict=True))]) + "\n"
+    line = ",".join(form for form, _ in cells)
+    return "\n".join([_header(columns), *(line % row for row in zip(*(each for _, each in cells), strict=True))]) + "\n"
 
 
 def _header(columns: Iterable[Column]) -> str:
     return ",".join(column.name for column in columns)
 
 
-def _cells(quantity: Quantity, values: Sequence[Any]) -> list[str]:
-    """Write the cells of a column."""
+def _cells(quantity: Quantity, values: Sequence[Any]) -> tuple[str, Sequence[Any]]:
+    """Return the form of the cells of a column, and what is written in that form."""
     decimals = BY_UNIT_DECIMALS if quantity.unit_key else quantity.decimals
-    if decimals is not None:
-        form = f"%.{decimals}f"
-        return ["" if value is None else form % value for value in values]
-    if quantity.kind == "text":
-        return _texts(values)
-    whole = quantity.kind in {"count", "flag"}
-    return ["" if value is None else str(int(value)) if whole else str(value) for value in values]
+    if quantity.kind == "text" and decimals is None:
+        return "%s", _texts(values)
+    form = f"%.{decimals}f" if decimals is not None else "%d" if quantity.kind in {"count", "flag"} else "%s"
+    if None not in values:
+        return form, values
+    return "%s", ["" if value is None else form % value for value in values]
 
 
 def _texts(values: Sequence[str | Sequence[str] | None]) -> list[str]:
-    """Quote ids where CSV needs it; each is looked at once."""
-    known: dict[str, str] = {}
-    return [
-        known.get(value) or known.setdefault(value, _cell(value)) if isinstance(value, str) else _cell(value)
-        for value in values
-    ]
+    """Quote ids where CSV needs it; all are looked at together first."""
+    known = {value: value for value in values if isinstance(value, str)}
+    if "" in known or ODD.search("".join(known)):
+        known = {value: _cell(value) for value in known}
+    return [known[value] if isinstance(value, str) else _cell(value) for value in values]
 
 
 def _cell(text: str | Sequence[str] | None) -> str:
@@ -142,11 +142,13 @@ def _grouped(columns: Sequence[Column], groups: Iterable[Document]) -> str:
     """Write points that stand together under a photo or a pair: its ids, then a line for each point."""
     first = [column.key for column in columns].index("points")
     heads, numbers = columns[:first], columns[first + 1 : -1]
-    cells: dict[str, str] = {}
+    groups = list(groups)
+    names = dict.fromkeys(point for group in groups for point in group["points"])
+    cells = dict(zip(names, _texts(list(names)), strict=True))
     blocks = [f"{_header(columns)}\n"]
     for group in groups:
         head = ",".join(_cell(group[column.key]) for column in heads).replace("%", "%%")
-        points = [cells.get(point) or cells.setdefault(point, _cell(point)) for point in group["points"]]
+        points = [cells[point] for point in group["points"]]
         values, forms = [group[column.key] for column in numbers], [f"%.{each.quantity.decimals}f" for each in numbers]
         if any(None in column for column in values):
             values = [

@@ -42,6 +42,7 @@ LEAST_RAYS = 2  # photos that must show a given point
 OBLIQUE_DEG = 20.0  # between the cameras and the normal of the ground: more than a tilt, or a slope
 FLAT_SHARE = 0.3  # third over second extent of the points of a strip whose ground has a normal
 MOSAIC_SIGMA = 0.02  # of the flying height: what relief and tilts leave in a mosaic
+AT_A_TIME = 256  # given points whose nearest photo is looked for together
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,13 +204,23 @@ def stretches(rows: Numbers, on_strip: StripPoints) -> Iterator[tuple[Numbers, S
         return
     up = on_strip.axes.mean(axis=0)
     points, centers = (each - np.outer(each @ up, up) for each in (on_strip.xyz, on_strip.centers))
-    near = np.array([int(((centers - point) ** 2).sum(axis=1).argmin()) for point in points], np.intp)
+    near = _nearest(points, centers)
     count = min(STRETCHES, photos // STRETCH_PHOTOS)
     for start in np.unique(np.linspace(0, photos - STRETCH_PHOTOS, count).astype(np.intp)).tolist():
         part = slice(start, start + STRETCH_PHOTOS)
         inside = (near >= part.start) & (near < part.stop)
         axes, centers = on_strip.axes[part], on_strip.centers[part]
         yield rows[inside], replace(on_strip, xyz=on_strip.xyz[inside], axes=axes, centers=centers)
+
+
+def _nearest(points: Floats, centers: Floats) -> Numbers:
+    """Find the nearest centre of each point."""
+    middle = centers.mean(axis=0)
+    squares, found = ((centers - middle) ** 2).sum(axis=1), np.empty(len(points), np.intp)
+    for start in range(0, len(points), AT_A_TIME):
+        part = slice(start, start + AT_A_TIME)
+        found[part] = (squares - 2 * (points[part] - middle) @ (centers - middle).T).argmin(axis=1)
+    return found
 
 
 def mosaic_points(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,9 +69,10 @@ def model_deformations(strip: StripResult, frames: Sequence[GroundFrame]) -> tup
     number = formed.point[strip.control_rows[height]]
     order = np.argsort(number)
     found = []
-    usable = oriented.used & np.isfinite(formed.model_xyz).all(axis=1) & np.isin(oriented.point, number)
-    for model in range(oriented.pairs.size):
-        rows = np.flatnonzero(usable & (oriented.pairs.pair == model))
+    usable = np.flatnonzero(oriented.used & np.isfinite(formed.model_xyz).all(axis=1) & np.isin(oriented.point, number))
+    ends = np.searchsorted(oriented.pairs.pair[usable], np.arange(oriented.pairs.size + 1))
+    for model, (start, stop) in enumerate(pairwise(ends.tolist())):
+        rows = usable[start:stop]
         control = height[order[np.searchsorted(number[order], oriented.point[rows])]]
         deformed = _of_model(strip, frames, model, rows, control)
         if deformed is not None:

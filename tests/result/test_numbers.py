@@ -1,0 +1,20 @@
+"""Natural order of ids."""
+
+from __future__ import annotations
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from photostrip.result.numbers import natural, natural_rank
+
+
+@given(st.lists(st.text("ab-_. 0019\n\0é", max_size=6)))
+@example(["P10", "P2", "p2", "7", "07", "a-1", "a1", "a", ""])
+@example(["1" * 5000, "9", "line\nbreak", "P2"])
+def test_the_rank_of_many_ids_is_the_order_of_the_keys_of_single_ones(names: list[str]) -> None:
+    rank = natural_rank(names)
+    assert sorted(names, key=natural) == [names[row] for row in rank.argsort()]
+
+
+def test_numbers_count_as_numbers() -> None:
+    assert natural_rank(["P10", "P2", "P02", "P1"]).tolist() == [3, 2, 1, 0]
