@@ -92,11 +92,13 @@ def find_double_ids(
     expected = len(formed.xyz) ** 2 * near**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
     if expected > MOST_BY_CHANCE:
         return
+    flown = set(photos)
+    inside = np.flatnonzero(np.array([name in flown for name in observations.photo_ids], bool)[observations.photo])
     for a, b in zip(one.tolist(), two.tolist(), strict=True):
         if abs(formed.xyz[a, 2] - formed.xyz[b, 2]) > tall:
             continue
         numbers = (int(formed.point[a]), int(formed.point[b]))
-        together = _together(observations, numbers, photos)
+        together = _together(observations, inside, numbers)
         if together is False or (together is None and apart > MOST_BY_CHANCE):
             continue
         names = tuple(observations.point_ids[number] for number in numbers)
@@ -207,10 +209,9 @@ def _near(xyz: Floats, reach: float) -> tuple[Numbers, Numbers]:
     return np.concatenate(ones), np.concatenate(twos)
 
 
-def _together(observations: PhotoPoints, numbers: tuple[int, int], photos: Sequence[str]) -> bool | None:
+def _together(observations: PhotoPoints, inside: Numbers, numbers: tuple[int, int]) -> bool | None:
     """Whether two points lie at the same place on the photos that show both; None when there is no such photo."""
-    inside = np.array([name in set(photos) for name in observations.photo_ids], bool)[observations.photo]
-    rows = [np.flatnonzero((observations.point == number) & inside) for number in numbers]
+    rows = [inside[observations.point[inside] == number] for number in numbers]
     _, one, two = np.intersect1d(observations.photo[rows[0]], observations.photo[rows[1]], return_indices=True)
     if not len(one):
         return None
