@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
-    from photostrip.arrays import Floats
     from photostrip.report.page.parts import Document
+
+    Floats = NDArray[np.float64]
 
 ARROWS = 8  # along an axis
 ENDINGS = (".png", ".svg")
