@@ -12,7 +12,7 @@ control point identified wrongly, ``long`` a fifth as many strips of 1000 photos
 An error along the base moves a point that stands on two photos along its other ray, and nothing contradicts it; points
 with a wrong measurement of their own are therefore left out of the errors.
 
-Usage: python benchmarks/gross_errors.py [PROJECTS] [--kind KIND] [--first-seed N] [--workers N]
+Usage: python benchmarks/gross_errors.py [PROJECTS] [--kind KIND] [--searched] [--first-seed N] [--workers N]
 """
 
 from __future__ import annotations
@@ -351,14 +351,14 @@ def loses_anything(project: Project, run: Run) -> bool:
     return len(run.placing) < len(project.names) or bool(run.rejected)
 
 
-def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range) -> None:
+def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range, wanted: Sequence[str]) -> None:
     """Print the errors of the new points of every kind of project, then what was found and lost."""
     tallies = {kind: Tally() for kind in kinds}
     print("project    adjusted         rms along  across      up   plan ratio  height ratio   failed", flush=True)
     for kind, tally in tallies.items():
-        for project, runs in pool.imap(partial(runs_of, kind), seeds):
+        for project, runs in pool.imap(partial(runs_of, kind, wanted=wanted), seeds):
             tally.add(project, runs)
-        for name in RUNS:
+        for name in wanted:
             (plan, height), value = tally.ratio(name), tally.rms(name)
             row = f"{kind:11s}{name:16s}{value[0]:10.3f}{value[1]:8.3f}{value[2]:8.3f}{plan:13.3f}{height:14.3f}"
             print(f"{row}{tally.counts[f'failed {name}']:9d}", flush=True)
@@ -504,13 +504,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("projects", type=int, nargs="?", default=60, help="projects of each kind (default 60)")
     parser.add_argument("--kind", choices=[*KINDS, *OTHERS, "all"], default="all")
+    parser.add_argument("--searched", action="store_true", help="leave out the runs without the search")
     parser.add_argument("--first-seed", type=int, default=1, help="number of the first project (default 1)")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one for each core)")
     options = parser.parse_args()
     seeds = range(options.first_seed, options.first_seed + options.projects)
     with get_context("fork").Pool(options.workers, maxtasksperchild=1) as pool:
         if kinds := [kind for kind in KINDS if options.kind in {kind, "all"}]:
-            print_kinds(pool, kinds, seeds)
+            print_kinds(pool, kinds, seeds, [name for name in RUNS if name != NONE or not options.searched])
         for kind, show in OTHERS.items():
             if options.kind in {kind, "all"}:
                 show(pool, seeds)

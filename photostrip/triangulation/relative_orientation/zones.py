@@ -73,9 +73,3 @@ class Support:
         last = self.counts[pair, self.zone - 1] <= 1
         flags: Flags = enough[pair] & (~last | (self.empty[pair] == 0))
         return flags
-
-    def holds_without(self, pair: int, rows: Numbers) -> bool:
-        """Whether a pair keeps six points without some rows, and no second zone becomes empty."""
-        counts = self.counts[pair] - np.bincount(self.zone[rows] - 1, minlength=ZONES)
-        empty = int((counts == 0).sum())
-        return bool(counts.sum() >= MINIMUM_LEFT and empty <= max(1, int(self.empty[pair])))

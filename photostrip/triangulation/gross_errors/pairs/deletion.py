@@ -19,7 +19,7 @@ import numpy as np
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
+    from photostrip.arrays import Floats, Numbers
 
 
 LARGEST = 3  # points of a set
@@ -68,11 +68,11 @@ def _form(v: list[Floats], m: dict[tuple[int, int], Floats]) -> tuple[Floats, Fl
     return a * aa + b * bb + c * cc, form
 
 
-def search(residuals: Floats, matrix: Floats, target: Floats, forbidden: Flags | None = None) -> list[Numbers]:
+def search(residuals: Floats, matrix: Floats, target: Floats) -> list[Numbers]:
     """Find for each adjustment the smallest set whose removal brings the sum of squares below its target.
 
     Empty when no set does it. ``target`` (k,) is the largest sum allowed after one to k points are gone, -inf where so
-    many may not go; k is three at most. Points ``forbidden`` (g, n) stay.
+    many may not go; k is three at most.
     """
     total = (residuals**2).sum(axis=1)
     found = [np.zeros(0, np.intp) for _ in range(len(residuals))]
@@ -83,9 +83,6 @@ def search(residuals: Floats, matrix: Floats, target: Floats, forbidden: Flags |
         v, m = residuals[todo], matrix[todo]
         sets = subsets(residuals.shape[1], k) if k < LARGEST else _triples(v, m)
         gain = gains(v, m, sets)
-        if forbidden is not None:
-            place = np.broadcast_to(sets, (len(todo), *sets.shape[-2:]))
-            gain[forbidden[todo][np.arange(len(todo))[:, None, None], place].any(axis=2)] = -np.inf
         best = gain.argmax(axis=1)
         rows = np.arange(len(todo))
         enough = total[todo] - gain[rows, best] <= target[k - 1]

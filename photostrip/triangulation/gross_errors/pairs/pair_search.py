@@ -23,7 +23,7 @@ from photostrip.triangulation.gross_errors.pairs.global_test import FIFTH_WRONG,
 from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again
 from photostrip.triangulation.relative_orientation.robust import RobustElements, orient_robustly
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes
-from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT, Support
+from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT
 from photostrip.triangulation.robust import TUNING, scales
 
 if TYPE_CHECKING:
@@ -125,8 +125,7 @@ class _Log:
         """Take the smallest set out of each pair that explains its misfit, or the ``worst`` point where none does."""
         with np.errstate(all="ignore"):
             _, jacobian = linearised_parallaxes(part.elements, part.pairs)
-        support = Support.of(part)
-        spare, count = support.spare(part.pairs.pair), part.points_used
+        count = part.points_used
         size, most = test.standardised(part), test.largest_limits(count)
         weight, pairs = part.pairs.weight.copy(), part.pairs.pair
         for some in _alike(todo, count):
@@ -135,32 +134,31 @@ class _Log:
             residual, matrix = _studentised(part, jacobian, rows, test.sigma[some])
             left = number - np.arange(1, largest + 1)
             target = np.where(left >= MINIMUM_LEFT, test.limits(left), -np.inf)
-            found = deletion.search(residual, matrix, target, ~spare[rows])
+            found = deletion.search(residual, matrix, target)
             total, limit = (residual**2).sum(axis=1), test.limits(np.array([number]))[0]
             for place, (pair, chosen) in enumerate(zip(some.tolist(), found, strict=True)):
                 gone = rows[place, chosen]
-                if len(gone) and support.holds_without(pair, gone):
+                if len(gone):
                     self._remove(weight, gone, "deletion", float(total[place]), float(limit))
-                elif worst:
-                    row = rows[place, np.where(spare[rows[place]], size[rows[place]], -np.inf).argmax()]
-                    if spare[row] and size[row] > most[pair]:
+                elif worst and number > MINIMUM_LEFT:
+                    row = rows[place, size[rows[place]].argmax()]
+                    if size[row] > most[pair]:
                         self._remove(weight, np.array([row]), "residual", float(size[row]), float(most[pair]))
         changed = np.unique(pairs[weight != part.pairs.weight])
         return orient_again(part, weight, changed, self.lost)
 
     def without_beyond(self, part: Orientation, test: GlobalTest, todo: Numbers) -> Orientation:
-        """Take all points out that lie far from the robust elements, the farthest first, as long as support lasts."""
+        """Take all points out that lie far from the robust elements, the farthest first, as long as six are left."""
         pairs = part.pairs
         size = np.abs(part.parallax) * np.sqrt(pairs.weight)
         size = np.where(np.isfinite(size), size, np.inf)
         scale = np.maximum(test.sigma, scales(size, pairs.weight, pairs.pair, pairs.size))
         rows = np.flatnonzero(part.used & (size > TUNING * scale[pairs.pair]) & np.isin(pairs.pair, todo))
-        weight = pairs.weight.copy()
-        support = Support.of(part)
+        weight, left = pairs.weight.copy(), part.points_used
         for row in rows[np.argsort(-size[rows], kind="stable")].tolist():
             pair = int(pairs.pair[row])
-            if support.holds_without(pair, np.array([row])):
-                support.counts[pair, support.zone[row] - 1] -= 1
+            if left[pair] > MINIMUM_LEFT:
+                left[pair] -= 1
                 value, limit = size[row] / test.sigma[pair], TUNING * scale[pair] / test.sigma[pair]
                 self._remove(weight, np.array([row]), "robust", float(value), float(limit))
         return orient_again(part, weight, todo, self.lost)

@@ -76,19 +76,6 @@ def test_a_set_that_empties_a_parameter_gains_nothing() -> None:
     assert deletion.gains(np.zeros((1, 4)), matrix[None], np.array([[3]]))[0, 0] == -np.inf
 
 
-def test_points_that_may_not_go_do_not_go() -> None:
-    rng = np.random.default_rng(3)
-    design = rng.normal(size=(12, 5))
-    matrix = np.eye(12) - design @ np.linalg.pinv(design)
-    error = np.zeros(12)
-    error[4] = 50.0
-    residual = (matrix @ (rng.normal(size=12) + error))[None]
-    target = np.full(3, 25.0)
-    assert deletion.search(residual, matrix[None], target)[0].tolist() == [4]
-    forbidden = np.arange(12)[None] == 4
-    assert 4 not in deletion.search(residual, matrix[None], target, forbidden)[0]
-
-
 # -------------------------------------------------------------------------------------------- printed results
 
 
@@ -138,6 +125,14 @@ def test_two_equal_errors_in_a_corner_zone_come_out_although_the_third_point_loo
     assert {int(found.zone[r.row]) for r in found.rejections if not r.readmitted} == {3}
     by_tau = ~examined(pairs, RelativeSettings(screening="tau")).orientation.used.reshape(50, 18)
     assert not by_tau[:, 6:8].all(axis=1).any()
+
+
+def test_wrong_points_that_stand_alone_in_their_zones_go_rather_than_good_ones() -> None:
+    flown = level(25, 20, (4, 1, 4, 1, 4, 1))
+    errors = np.zeros((20, 15))
+    errors[:, [4, 9]] = [0.5, 10.0]  # the only points of zones 2 and 4
+    found = examined(spoiled(flown, errors))
+    assert (~found.orientation.used.reshape(20, 15) == (errors > 0)).all()
 
 
 def test_the_estimated_size_is_that_of_the_error() -> None:
