@@ -3,7 +3,7 @@
 ``parallax+grubbs`` tests the residual y parallax against a limit, then by Grubbs' test; ``tau`` tests studentised
 residuals. Every round takes at most one point from a pair, the worst, and orients that pair again: removing several
 at once also throws out good points that a bad neighbour has pulled. All pairs go through a round together. No
-rejection leaves a pair or a standard zone without support.
+rejection of theirs leaves a pair or a standard zone without support.
 
 ``deletion``, ``robust`` and ``auto`` are in ``pair_search``.
 
