@@ -2,6 +2,10 @@
 
 Measured are the image coordinates of the points and, with a theodolite at the same station, their directions. Both have
 errors: every point enters with the covariance of its directions plus that of its ray.
+
+Where the front nodal point of the lens is not on the axes of the theodolite, but ahead of them on the optical axis, a
+point is seen from two places; the distance of the point says how far apart its two directions are. Directions that were
+computed from coordinates have no refraction in them, and the photo has: beta of the photo is larger by k D / 2R.
 """
 
 from __future__ import annotations
@@ -23,7 +27,12 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
 ANGLES = ("alpha", "omega", "kappa")
-FREE = {"principal-distance": ("f",), "principal-point": ("x0", "z0")}  # what may be determined besides
+INTERIOR = ("f", "x0", "z0")
+REFRACTION = "k"
+UNKNOWNS = (*ANGLES, *INTERIOR, REFRACTION)
+# what may be determined besides the angles
+FREE = {"principal-distance": ("f",), "principal-point": ("x0", "z0"), "refraction": (REFRACTION,)}
+EARTH_RADIUS = 6_371_000.0  # metres
 SCREENINGS = ("deletion", "stated", "none")
 MOST_ITERATIONS = 50
 CONVERGED = 1e-11  # of the normalised unknowns: rad, and mm over the principal distance
@@ -42,6 +51,8 @@ class Sightings:
     directions: Floats  # (n, 2): horizontal and vertical directions in radians; NaN where none was measured
     sigma_xz: Floats  # (n, 2): standard deviations of the image coordinates, mm
     sigma_directions: Floats  # (n, 2): standard deviations of the directions, radians
+    # (n,): distances of the points from the theodolite, metres, for eccentricity and refraction; NaN where not given
+    distances: Floats
 
     @cached_property
     def measured(self) -> Flags:
@@ -53,23 +64,26 @@ class Sightings:
 class OrientationSettings:
     """How a photo is oriented."""
 
-    free: tuple[str, ...] = ()  # what is determined besides the angles: ``"principal-distance"``, ``"principal-point"``
+    free: tuple[str, ...] = ()  # what is determined besides the angles: keys of `FREE`
     # ``"deletion"`` tests each point against the scatter of the others, ``"stated"`` against the stated standard
     # deviations, ``"none"`` tests nothing
     screening: str = "deletion"
     # probability of rejecting any point of a photo without gross errors, and of a false global test
     significance: float = 0.05
+    eccentricity: float = 0.0  # of the front nodal point, ahead of the axes of the theodolite, metres
+    refraction: float = 0.0  # coefficient k that the directions lack; the start value when it is free
 
 
 @dataclass(frozen=True, eq=False)
 class PhotoOrientation:
     """A photo oriented by directions."""
 
-    names: tuple[str, ...]  # unknowns: alpha, omega, kappa, then what else was determined: f, x0, z0
-    values: Floats  # (u,): radians and mm
+    names: tuple[str, ...]  # unknowns: alpha, omega, kappa, then what else was determined: f, x0, z0, k
+    values: Floats  # (u,): radians and mm; k is a ratio
     cofactors: Floats  # (u, u): their covariance for the stated standard deviations
     principal_distance: float  # f in mm
     principal_point: tuple[float, float]  # x0, z0 in mm
+    refraction: float  # coefficient k
     # (n, 2): computed minus measured directions in radians; NaN where not measured. Of rejected points the misclosure
     residuals: Floats
     redundancy: Floats  # (n, 2): redundancy numbers of the directions; NaN where they were not used
@@ -129,14 +143,15 @@ def orient(
     principal_point: x0, z0 in mm; the start values when they are free.
     Raises GeometryError when the points do not determine what is asked for, or the solution does not converge.
 
-    Source: the condition is [002] eq. 1; its least-squares solution is derived.
+    Source: the condition is [002] eq. 1; its least-squares solution, eccentricity and refraction are derived.
     """
     chosen = settings or OrientationSettings()
     names = (*ANGLES, *(name for key, keys in FREE.items() if key in chosen.free for name in keys))
-    interior = np.array([principal_distance, *principal_point])
+    interior = np.array([principal_distance, *principal_point, chosen.refraction])
+    _refuse_without_distances(sightings, chosen)
     used = np.asarray(sightings.measured.any(axis=1), bool)
     _refuse_too_few(sightings, used, names)
-    solution = _solve(sightings, used, names, interior)
+    solution = _solve(sightings, used, names, interior, chosen.eccentricity)
     rejected: list[Rejection] = []
     while chosen.screening != "none":
         found = _worst(solution, sightings, chosen)
@@ -144,9 +159,24 @@ def orient(
             break
         used = used.copy()
         used[found.row] = False
-        solution = _solve(sightings, used, names, interior)
+        solution = _solve(sightings, used, names, interior, chosen.eccentricity)
         rejected.append(replace(found, size=tuple(solution.residuals[found.row].tolist())))
     return replace(solution, rejected=tuple(rejected))
+
+
+def _refuse_without_distances(sightings: Sightings, settings: OrientationSettings) -> None:
+    if not settings.eccentricity and not settings.refraction and "refraction" not in settings.free:
+        return
+    without = [name for name, each in zip(sightings.ids, sightings.distances, strict=True) if not each > 0]
+    if without:
+        what = "eccentricity" if settings.eccentricity else "refraction"
+        more = f" and {len(without) - 1} more" if len(without) > 1 else ""
+        msg = f"{what} acts according to the distance of a point, and that of {without[0]}{more} is not given"
+        raise GeometryError(msg, points=without, code="no-distance")
+    nearest = float(sightings.distances.min())
+    if abs(settings.eccentricity) >= nearest / 2:
+        msg = f"an eccentricity of {settings.eccentricity:g} m with a point {nearest:g} m away: is it in metres?"
+        raise GeometryError(msg, points=sightings.ids, code="eccentricity")
 
 
 def _refuse_too_few(sightings: Sightings, used: Flags, names: Sequence[str]) -> None:
@@ -160,13 +190,15 @@ def _refuse_too_few(sightings: Sightings, used: Flags, names: Sequence[str]) -> 
         raise GeometryError(msg, points=sightings.ids, code="too-few-directions")
 
 
-def _solve(sightings: Sightings, used: Flags, names: tuple[str, ...], interior: Floats) -> PhotoOrientation:
+def _solve(
+    sightings: Sightings, used: Flags, names: tuple[str, ...], interior: Floats, eccentricity: float
+) -> PhotoOrientation:
     """Gauss-Newton from a start that needs no approximate values."""
     values = np.concatenate([_start(sightings, used, interior), interior])
-    active = np.flatnonzero([name in names for name in (*ANGLES, "f", "x0", "z0")])
-    scale = np.where(active < len(ANGLES), 1.0, interior[0])
+    active = np.flatnonzero([name in names for name in UNKNOWNS])
+    scale = np.array([interior[0] if UNKNOWNS[each] in INTERIOR else 1.0 for each in active])
     for _ in range(MOST_ITERATIONS):
-        system = _linearised(sightings, values, active)
+        system = _linearised(sightings, values, active, eccentricity)
         normal, right = _normal(system, used)
         condition = _condition(normal, names, sightings)
         step = np.linalg.solve(normal, right)
@@ -174,14 +206,14 @@ def _solve(sightings: Sightings, used: Flags, names: tuple[str, ...], interior: 
         if not np.isfinite(values).all() or values[3] <= 0:
             break
         if np.abs(step / scale).max() < CONVERGED:
-            return _result(sightings, used, names, values, active, condition)
+            return _result(sightings, used, names, values, active, condition, eccentricity)
     msg = "the orientation of the photo does not converge: are the points the same in the photo and at the theodolite?"
     raise GeometryError(msg, points=sightings.ids, code="not-converged")
 
 
 def _start(sightings: Sightings, used: Flags, interior: Floats) -> Floats:
     """Angles from the rotation that brings the rays closest to the directions; level where that is not determined."""
-    ray = frame.rays(sightings.xz - interior[1:], interior[0])
+    ray = frame.rays(sightings.xz - interior[1:3], interior[0])
     both = used & sightings.measured.all(axis=1)
     if both.sum() >= LEAST_POINTS:
         unit = ray[both] / np.linalg.norm(ray[both], axis=1, keepdims=True)
@@ -196,11 +228,27 @@ def _start(sightings: Sightings, used: Flags, interior: Floats) -> Floats:
     return np.array([np.arctan2(np.sin(turned).mean(), np.cos(turned).mean()), 0.0, 0.0])
 
 
-def _linearised(sightings: Sightings, values: Floats, active: Numbers) -> _System:
+def _from_the_axes(ray: Floats, distances: Floats, eccentricity: float) -> Floats:
+    """Rays (n, 3) as they are from the axes of the theodolite, with the front nodal point ahead of them.
+
+    The point is `distances` from the axes and t from the node, on the ray r: e + t r / |r|, e along the optical axis;
+    that is the ray with the principal distance f + e |r| / t.
+    """
+    length = np.linalg.norm(ray, axis=1)
+    along = -eccentricity * ray[:, 2] / length  # e . r / |r|
+    from_node = np.sqrt(distances**2 - eccentricity**2 + along**2) - along
+    found = ray.copy()
+    found[:, 2] -= eccentricity * length / from_node
+    return found
+
+
+def _linearised(sightings: Sightings, values: Floats, active: Numbers, eccentricity: float) -> _System:
     """Directions of all points under the present orientation, and their derivatives."""
     alpha, omega, kappa, f = values[:4]
     turn = frame.ground_from_photo(alpha, omega, kappa)
-    ray = frame.rays(sightings.xz - values[4:], f)
+    ray = frame.rays(sightings.xz - values[4:6], f)
+    if eccentricity:
+        ray = _from_the_axes(ray, sightings.distances, eccentricity)
     ground = ray @ turn.T
     gradient = frame.direction_gradient(ground)
     # the roll turns the ray about the photo's third axis, the elevation about the ground's x axis before the azimuth
@@ -208,13 +256,15 @@ def _linearised(sightings: Sightings, values: Floats, active: Numbers) -> _Syste
     roll = np.cross([0.0, 0.0, 1.0], ray) @ turn.T
     tilt = np.cross([1.0, 0.0, 0.0], ray @ frame.ground_from_photo(0.0, omega, kappa).T) @ about_vertical.T
     by_photo = gradient @ turn
-    design = np.empty((len(ray), 2, 6))
+    design = np.empty((len(ray), 2, len(UNKNOWNS)))
     design[:, :, 0] = [1.0, 0.0]  # alpha is added to every azimuth
     design[:, :, 1] = np.einsum("nij,nj->ni", gradient, tilt)
     design[:, :, 2] = np.einsum("nij,nj->ni", gradient, roll)
     design[:, :, 3] = -by_photo[:, :, 2]
-    design[:, :, 4:] = -by_photo[:, :, :2]
-    miss = sightings.directions - frame.directions_of(ground)
+    design[:, :, 4:6] = -by_photo[:, :, :2]
+    risen = np.column_stack([np.zeros(len(ray)), np.nan_to_num(sightings.distances) / (2 * EARTH_RADIUS)])
+    design[:, :, 6] = -risen
+    miss = sightings.directions - (frame.directions_of(ground) - values[6] * risen)
     miss[:, 0] = (miss[:, 0] + np.pi) % (2 * np.pi) - np.pi
     return _System(design[:, :, active], miss, _weights(sightings, by_photo[:, :, :2]))
 
@@ -258,9 +308,15 @@ def _undetermined(lost: Sequence[str], sightings: Sightings) -> GeometryError:
 
 
 def _result(
-    sightings: Sightings, used: Flags, names: tuple[str, ...], values: Floats, active: Numbers, condition: float
+    sightings: Sightings,
+    used: Flags,
+    names: tuple[str, ...],
+    values: Floats,
+    active: Numbers,
+    condition: float,
+    eccentricity: float,
 ) -> PhotoOrientation:
-    system = _linearised(sightings, values, active)
+    system = _linearised(sightings, values, active, eccentricity)
     normal, _ = _normal(system, used)
     cofactors = np.asarray(np.linalg.inv(normal), float)
     miss = np.nan_to_num(system.misclosure)
@@ -276,6 +332,7 @@ def _result(
         cofactors=cofactors,
         principal_distance=float(values[3]),
         principal_point=(float(values[4]), float(values[5])),
+        refraction=float(values[6]),
         residuals=-system.misclosure,
         redundancy=redundancy,
         used=used,
@@ -294,7 +351,7 @@ def _worst(solution: PhotoOrientation, sightings: Sightings, settings: Orientati
     if solution.dof < 2 or solution.weighted_sum < NEGLIGIBLE_SQUARES:
         return None
     rows = np.flatnonzero(solution.used)
-    drop, parts = _drops(solution, sightings, rows)
+    drop, parts = _drops(solution, sightings, rows, settings.eccentricity)
     left = solution.dof - parts
     testable = (left >= 1) & (sightings.measured[rows].sum(axis=1) == parts)
     if not testable.any():
@@ -323,11 +380,13 @@ def _worst(solution: PhotoOrientation, sightings: Sightings, settings: Orientati
     return Rejection(kind="direction", row=int(rows[worst]), test="deletion", value=float(p_values[worst]), limit=level)
 
 
-def _drops(solution: PhotoOrientation, sightings: Sightings, rows: Numbers) -> tuple[Floats, Numbers]:
+def _drops(
+    solution: PhotoOrientation, sightings: Sightings, rows: Numbers, eccentricity: float
+) -> tuple[Floats, Numbers]:
     """By how much the sum of squares falls without each point, and with how many degrees of freedom."""
-    values = np.array([*solution.values[:3], solution.principal_distance, *solution.principal_point])
-    active = np.flatnonzero([name in solution.names for name in (*ANGLES, "f", "x0", "z0")])
-    system = _linearised(sightings, values, active)
+    values = [*solution.values[:3], solution.principal_distance, *solution.principal_point, solution.refraction]
+    active = np.flatnonzero([name in solution.names for name in UNKNOWNS])
+    system = _linearised(sightings, np.array(values), active, eccentricity)
     drop, parts = np.zeros(len(rows)), np.zeros(len(rows), np.intp)
     for number, row in enumerate(rows):
         measured = sightings.measured[row]

@@ -46,6 +46,7 @@ def sightings(angles: tuple[float, float, float], seed: int | None = None, place
         exact + SIGMA_DIRECTION * noise[1],
         np.full(places.shape, SIGMA_XZ),
         np.full(places.shape, SIGMA_DIRECTION),
+        np.full(len(places), np.nan),
     )
 
 
@@ -238,3 +239,94 @@ def test_directions_of_other_points_are_refused_or_scatter() -> None:
         assert error.code in {"not-converged", "undetermined"}  # noqa: PT017
     else:
         assert found.sigma0 > 100
+
+
+# ---------------------------------------------------------------------- eccentricity of the front node, refraction
+
+DISTANCES = np.array([40.0, 65.0, 300.0, 1200.0, 55.0, 90.0, 35.0, 48.0, 150.0, 2500.0, 700.0])
+RADIUS = 6_371_000.0
+
+
+def from_the_theodolite(angles: tuple[float, float, float], eccentricity: float, refraction: float = 0.0) -> Sightings:
+    """Directions from a theodolite to points that a camera with its node ahead of the axes has photographed.
+
+    Every point is placed on the ray of the node, as far as makes its distance from the axes right.
+    """
+    turn = attitude(*angles)
+    rays = np.column_stack([PLACES[:, 0] - CENTRE[0], np.full(len(PLACES), F), PLACES[:, 1] - CENTRE[1]]) @ turn.T
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    node = eccentricity * turn[:, 1]
+    far = np.array([_farther(node, ray, distance) for ray, distance in zip(rays, DISTANCES, strict=True)])
+    points = node + far[:, None] * rays
+    seen = np.column_stack(
+        [np.arctan2(points[:, 0], points[:, 1]), np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))]
+    )
+    seen[:, 1] -= refraction * DISTANCES / (2 * RADIUS)
+    return replace(sightings(angles), directions=seen, distances=DISTANCES)
+
+
+def _farther(node: Floats, ray: Floats, distance: float) -> float:
+    """Find how far a ray goes from the node until it is so far from the axes, by halving."""
+    near, far = 0.0, 2 * distance
+    for _ in range(80):
+        middle = (near + far) / 2
+        near, far = (middle, far) if np.linalg.norm(node + middle * ray) < distance else (near, middle)
+    return near
+
+
+@pytest.mark.parametrize("eccentricity", [0.12, -0.08])
+def test_a_node_ahead_of_the_axes_is_taken_into_account(eccentricity: float) -> None:
+    angles = (0.4, 0.08, -0.02)
+    given_ = from_the_theodolite(angles, eccentricity)
+    found = orient(given_, F, CENTRE, OrientationSettings(eccentricity=eccentricity))
+    assert found.values == pytest.approx(np.array(angles), abs=1e-11)
+    assert np.abs(found.residuals).max() < 1e-11
+    left_out = orient(given_, F, CENTRE, OrientationSettings(screening="none"))
+    assert np.abs(left_out.residuals).max() > 30 * ARCSECOND
+    everything = orient(given_, F - 0.4, settings=OrientationSettings(EVERYTHING, eccentricity=eccentricity))
+    assert everything.values[3:] == pytest.approx(np.array([F, *CENTRE]), abs=1e-7)
+
+
+def test_a_refraction_coefficient_is_found_or_given() -> None:
+    angles = (0.4, 0.08, -0.02)
+    given_ = from_the_theodolite(angles, 0.12, refraction=0.7)
+    found = orient(given_, F, CENTRE, OrientationSettings(("refraction",), eccentricity=0.12))
+    assert found.names[-1] == "k"
+    assert found.values == pytest.approx(np.array([*angles, 0.7]), abs=1e-8)
+    assert found.refraction == pytest.approx(0.7)
+    fixed = orient(given_, F, CENTRE, OrientationSettings(eccentricity=0.12, refraction=0.7))
+    assert fixed.values == pytest.approx(np.array(angles), abs=1e-11)
+
+
+def test_the_standard_deviation_of_the_coefficient_is_its_scatter() -> None:
+    angles, found = (0.4, 0.08, -0.02), []
+    exact = from_the_theodolite(angles, 0.0, refraction=0.13)
+    for seed in range(150):
+        noise = Draws(seed, Purpose.IMAGE).normal(2, *PLACES.shape)
+        given_ = replace(
+            exact, xz=exact.xz + SIGMA_XZ * noise[0], directions=exact.directions + SIGMA_DIRECTION * noise[1]
+        )
+        found.append(orient(given_, F, CENTRE, OrientationSettings(("refraction",), screening="none")))
+    values = np.array([each.values[-1] for each in found])
+    assert values.std(ddof=1) == pytest.approx(found[0].sigma[-1], rel=0.2)
+    assert abs(values.mean() - 0.13) < 3 * found[0].sigma[-1] / np.sqrt(150)
+
+
+@pytest.mark.parametrize(
+    ("settings", "distances", "message"),
+    [
+        (
+            OrientationSettings(eccentricity=0.1),
+            np.nan,
+            "eccentricity acts according to the distance .* P0 and 10 more",
+        ),
+        (OrientationSettings(("refraction",)), np.nan, "refraction acts according to the distance"),
+        (OrientationSettings(eccentricity=9.0), 15.0, "is it in metres"),
+    ],
+)
+def test_what_distances_do_not_determine_is_refused(
+    settings: OrientationSettings, distances: float, message: str
+) -> None:
+    given_ = replace(sightings((0.4, 0.0, 0.0)), distances=np.full(len(PLACES), distances))
+    with pytest.raises(GeometryError, match=message):
+        orient(given_, F, CENTRE, settings)

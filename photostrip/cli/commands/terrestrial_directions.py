@@ -277,15 +277,25 @@ def orient(  # noqa: PLR0913 (an argument for each option)
     *,
     table: Annotated[
         str,
-        typer.Argument(metavar="TABLE", help="Table `point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta]` (CSV)."),
+        typer.Argument(
+            metavar="TABLE", help="Table `point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]` (CSV)."
+        ),
     ],
     camera: CameraByPoint,
     free: Annotated[
         str | None,
         typer.Option(
-            metavar="NAMES", help="Determine these as well: principal-distance, principal-point, or both (A,B)."
+            metavar="NAMES", help="Determine these as well: principal-distance, principal-point, refraction (A,B)."
         ),
     ] = None,
+    eccentricity: Annotated[
+        float,
+        typer.Option(metavar="M", help="Front nodal point ahead of the theodolite's axes; needs a column `distance`."),
+    ] = 0.0,
+    refraction: Annotated[
+        float,
+        typer.Option(metavar="K", help="Coefficient that computed directions lack; needs a column `distance`."),
+    ] = 0.0,
     unit: Unit = "mm",
     angles: AngleUnit = "deg",
     sigma_um: Annotated[float, typer.Option("--sigma-um", metavar="UM", help="Standard error of x and z.")] = 5.0,
@@ -309,12 +319,16 @@ def orient(  # noqa: PLR0913 (an argument for each option)
     with failures_as(form):
         from photostrip.formats.output.terrestrial_directions import oriented
         from photostrip.project.terrestrial import options
-        from photostrip.project.terrestrial.ranges import SIGNIFICANCE, within
+        from photostrip.project.terrestrial.ranges import ECCENTRICITY, REFRACTION, SIGNIFICANCE, within
         from photostrip.terrestrial import orientation
 
         chosen = camera.chosen()
         settings = orientation.OrientationSettings(
-            options.free_elements(free), screening, within("--significance", significance, SIGNIFICANCE)
+            options.free_elements(free),
+            eccentricity=within("--eccentricity", eccentricity, ECCENTRICITY),
+            refraction=within("--refraction", refraction, REFRACTION),
+            screening=screening,
+            significance=within("--significance", significance, SIGNIFICANCE),
         )
         measured = options.theodolite_sigmas(sigma_arcsec, vertical_arcsec, rounds)
         given = options.SightingOptions(

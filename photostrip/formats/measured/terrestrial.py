@@ -36,7 +36,7 @@ SIGHTINGS = (
     POINT,
     *IMAGE,
     *(Column(each.name, number=True, filled=False, aliases=each.aliases) for each in DIRECTIONS),
-    *_optional("sx", "sz", "s_lambda", "s_beta", positive=True),
+    *_optional("sx", "sz", "s_lambda", "s_beta", "distance", positive=True),
 )
 COORDINATES = (EPOCH, Column("photo", words=SIDES), POINT, *IMAGE, *_optional("sx", "sz", positive=True))
 PSEUDO_PARALLAXES = (

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.formats.output.csv_text import to_csv
-from photostrip.result.numbers import Document, rounded, significant
+from photostrip.result.numbers import EXACT, Document, rounded, significant
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite, directions_from_photo, photo_from_directions
-from photostrip.terrestrial.orientation import ANGLES, OrientationSettings, PhotoOrientation, Sightings
+from photostrip.terrestrial.orientation import ANGLES, REFRACTION, OrientationSettings, PhotoOrientation, Sightings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -218,6 +218,10 @@ def oriented(
 ) -> Document:
     """Return a photo oriented by directions."""
     document = head("photo-orientation", camera)
+    if settings.eccentricity:
+        document["eccentricity_m"] = rounded(settings.eccentricity, EXACT)
+    if found.refraction and REFRACTION not in found.names:
+        document["refraction"] = rounded(found.refraction, EXACT)
     lower, upper = found.sigma0_range(settings.significance)
     document["summary"] = {
         "points": len(sightings.ids),
@@ -257,6 +261,14 @@ def _element(name: str, value: float, sigma: float, unit: str) -> Document:
         angle = positive(value) if name == "alpha" else value
         found = {"value": rounded(angle * PER_RADIAN[unit], ANGLE), "unit": unit}
         return {"name": name, **found, "sigma": rounded(sigma * ARCSECONDS, ARCSEC), "sigma_unit": "arcsec"}
+    if name == REFRACTION:
+        return {
+            "name": name,
+            "value": rounded(value, RATIO),
+            "unit": "",
+            "sigma": rounded(sigma, RATIO),
+            "sigma_unit": "",
+        }
     found = {"value": rounded(value, MILLIMETRE), "unit": "mm"}
     return {"name": name, **found, "sigma": rounded(sigma * UM, MICROMETRE), "sigma_unit": "um"}
 

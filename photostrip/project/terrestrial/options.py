@@ -169,9 +169,10 @@ class SightingOptions(NamedTuple):
 
 
 def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tuple[Note, ...]]:
-    """Read the points of a photo with their directions ``point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta]``.
+    """Read the points of a photo with their directions ``point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]``.
 
-    Standard deviations are in the unit of the coordinates and in seconds of arc. One of lambda and beta may be empty.
+    Standard deviations are in the unit of the coordinates and in seconds of arc, distances in metres. One of lambda and
+    beta may be empty.
     """
     findings = Findings()
     read = read_points(file, SIGHTINGS, findings)
@@ -181,6 +182,7 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
     ranges.refuse_outside(read, ("x", "z"), ranges.COORDINATE, findings, scale=scale, unit=options.unit)
     ranges.refuse_outside(read, ("sx", "sz"), ranges.IMAGE_SIGMA, findings, scale=scale, unit=options.unit)
     ranges.refuse_outside(read, ("s_lambda", "s_beta"), ranges.DIRECTION_SIGMA, findings)
+    ranges.refuse_outside(read, ("distance",), ranges.DISTANCE, findings)
     ranges.refuse_outside(read, ("lambda",), ranges.DEGREES, findings, unit=options.angles)
     directions = read.columns("lambda", "beta")
     for row in np.flatnonzero(np.isnan(directions).all(axis=1)):
@@ -200,6 +202,7 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
         directions=directions * ranges.RADIANS[options.angles],
         sigma_xz=np.where(np.isnan(image), options.sigma, image),
         sigma_directions=np.where(np.isnan(angular), usual, angular) / ARCSECONDS,
+        distances=read.columns("distance")[:, 0],
     )
     return sightings, tuple(findings.notes)
 
@@ -211,6 +214,6 @@ def free_elements(text: str | None) -> tuple[str, ...]:
     if unknown:
         message = f"`{shown(unknown[0])}` cannot be determined"
         raise InputError(
-            Fault(message, "word", key="--free", expected=f"{', '.join(FREE)}, or both with a comma between")
+            Fault(message, "word", key="--free", expected=f"{', '.join(FREE)}, or several with commas between")
         )
     return names

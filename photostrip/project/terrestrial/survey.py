@@ -8,26 +8,31 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import InputError
+from photostrip.formats.output.terrestrial_directions import Theodolite
 from photostrip.formats.output.terrestrial_displacements import ReportFrame
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.project.terrestrial.cameras import listed_cameras, own_presets
-from photostrip.project.terrestrial.ranges import RADIANS
+from photostrip.project.terrestrial.options import SightingOptions, read_sightings
+from photostrip.project.terrestrial.ranges import MILLIMETRES, RADIANS
 from photostrip.project.terrestrial.series import Table, Wanted, read_series
-from photostrip.project.terrestrial.survey_file import Camera, Measurements, TerrestrialFile
+from photostrip.project.terrestrial.survey_file import Camera, Measurements, Station, TerrestrialFile
 from photostrip.project.yaml.parsing import read_document
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.validation import valid_section
 from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series
 from photostrip.terrestrial.normal_case import SIDES, StereoPair, normal_pair
+from photostrip.terrestrial.orientation import OrientationSettings, orient
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from photostrip.arrays import Floats
     from photostrip.notes import Note
 
+USUAL_SIGMA = 0.005  # mm: of image coordinates of sightings, where the project states none
 NORMAL_AXES = ("right", "ahead", "up")
 
 
@@ -57,7 +62,7 @@ def load_survey(path: Path, overrides: Sequence[str] = ()) -> Survey:
     return Survey(
         name=str(given.name),
         series=reading.complete(series),
-        pair=_pair(given, cameras),
+        pair=_pair(given, cameras, reading),
         settings=MonitoringSettings(given.processing.significance, str(given.processing.moved_camera)),
         cameras=(cameras[0], cameras[1]),
         frame=ReportFrame(axes, (east, north, up), str(given.time_unit)),
@@ -127,18 +132,41 @@ def _camera(name: str, given: Camera, known: dict[str, Phototheodolite], reading
     )
 
 
-def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite]) -> StereoPair:
+def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite], reading: Reading) -> StereoPair:
     """Return the two stations."""
     focal = (cameras[0].principal_distance, cameras[1].principal_distance)
     if given.axes is None:
         normal = normal_pair(focal[0], given.base or 0.0)
         return StereoPair(focal, normal.centers, normal.rotations)
     order = [given.axes.index(axis) for axis in GROUND_AXES]
-    scale = RADIANS[given.angle_unit]
     both = (given.stations.left, given.stations.right)
     centers = np.array([each.position for each in both], float)[:, order]
-    angles = np.array([[each.alpha or 0.0, each.omega or 0.0, each.kappa or 0.0] for each in both]) * scale
-    return StereoPair(focal, centers, np.array([ground_from_photo(*each) for each in angles]))
+    rotations = np.array([_rotation(given, side, camera, reading) for side, camera in zip(SIDES, cameras, strict=True)])
+    ahead = np.array([each.eccentricity for each in both])
+    # the optical axis is the third axis of the photo turned round
+    return StereoPair(focal, centers - ahead[:, None] * rotations[:, :, 2], rotations)
+
+
+def _rotation(given: TerrestrialFile, side: str, camera: Phototheodolite, reading: Reading) -> Floats:
+    """Photo to ground of a station, from its angles or from the directions measured there."""
+    station: Station = getattr(given.stations, side)
+    unit = MILLIMETRES[str(given.measurements.unit)]
+    sigma = USUAL_SIGMA if given.measurements.sigma is None else given.measurements.sigma * unit
+    wanted = SightingOptions(
+        unit=str(given.measurements.unit),
+        angles=given.angle_unit,
+        sigma=sigma,
+        theodolite=Theodolite(station.sigma_arcsec, station.sigma_arcsec, 1),
+    )
+    sightings = None
+    for path, findings in reading.named(("stations", side, "directions")):
+        sightings, notes = read_sightings(path, wanted)
+        findings.notes.extend(notes)
+    if sightings is not None:
+        settings = OrientationSettings(eccentricity=station.eccentricity)
+        return orient(sightings, camera.principal_distance, camera.principal_point, settings).rotation
+    scale = RADIANS[given.angle_unit]
+    return ground_from_photo(*(scale * (angle or 0.0) for angle in (station.alpha, station.omega, station.kappa)))
 
 
 def _series(given: TerrestrialFile | None, reading: Reading, cameras: Sequence[Phototheodolite]) -> Series | None:

@@ -21,7 +21,17 @@ from photostrip.project.schema.values import (
     wrong,
 )
 from photostrip.project.terrestrial.cameras import Distance, Place, Size
-from photostrip.project.terrestrial.ranges import BASE, DEGREES, IMAGE_SIGMA, MILLIMETRES, POSITION, SIGNIFICANCE, TIME
+from photostrip.project.terrestrial.ranges import (
+    BASE,
+    DEGREES,
+    DIRECTION_SIGMA,
+    ECCENTRICITY,
+    IMAGE_SIGMA,
+    MILLIMETRES,
+    POSITION,
+    SIGNIFICANCE,
+    TIME,
+)
 from photostrip.terrestrial.monitoring import MOVED_CAMERA, MonitoringSettings
 
 SCHEMA_NUMBER = "1"
@@ -67,6 +77,17 @@ class Station(Section):
 
     camera: Id = key("Camera, a key of `cameras`")
     position: Three | None = key("Perspective centre in the order of `axes`", None, unit="m")
+    directions: Words | None = key(
+        "Table `point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta][,distance]` of correction directions that orient the"
+        " photo of the first epoch, instead of the angles",
+        None,
+    )
+    sigma_arcsec: Annotated[Positive, AfterValidator(bounded(DIRECTION_SIGMA))] = key(
+        "Standard error of these directions in rows without one", 2.0, unit="arcsec"
+    )
+    eccentricity: Annotated[Number, AfterValidator(bounded(ECCENTRICITY))] = key(
+        "Perspective centre ahead of `position` on the optical axis, where that is the theodolite's", 0.0, unit="m"
+    )
     alpha: Angle | None = key("Azimuth of the optical axis, clockwise from north", None, unit="angle_unit")
     omega: Angle | None = key("Elevation of the optical axis, upwards; default: 0", None, unit="angle_unit")
     kappa: Angle | None = key(
@@ -75,11 +96,16 @@ class Station(Section):
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
-        if (self.position is None) != (self.alpha is None):
-            missing, other = ("position", "alpha") if self.position is None else ("alpha", "position")
+        turned = [name for name in ("alpha", "omega", "kappa") if getattr(self, name) is not None]
+        if self.directions is not None and turned:
+            message = f"`directions` gives the orientation of the photo, and `{turned[0]}` another one"
+            raise wrong(message, code="two-keys", at=turned[0], fix="remove one of the two")
+        if (self.position is None) != (self.alpha is None and self.directions is None):
+            given = "alpha" if self.directions is None else "directions"
+            missing, other = ("position", given) if self.position is None else ("alpha", "position")
             message = f"`{other}` is given and `{missing}` is not"
             raise wrong(message, code="missing-key", expected="both, or neither in the normal case")
-        if self.position is None and (self.omega is not None or self.kappa is not None):
+        if self.position is None and turned:
             raise wrong("angles are given without a position", code="missing-key", expected="position and alpha too")
         return self
 

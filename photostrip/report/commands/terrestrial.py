@@ -168,7 +168,8 @@ def _misprints(document: Document) -> tuple[Part, ...]:
             f" {short(second['f_mm'])} mm it is {short(second['factor_of_camera'], 3)}."
         ),
         (
-            "With all terms of first order and the cosine, m_beta = m rho / sqrt(f² + x² + z²). m_lambda is right:"
+            "With all terms of first order and the cosine the radicand of eq. 6 is f² + x² + z², where"
+            " f² + z² (1 + x²/f²) is printed: m_beta = m rho / sqrt(f² + x² + z²). m_lambda is right:"
             " m rho / sqrt(2 (f² + x²))."
         ),
         (
@@ -182,8 +183,14 @@ def _misprints(document: Document) -> tuple[Part, ...]:
 def _orientation(document: Document) -> tuple[Section, ...]:
     summary = document["summary"]
     lower, upper = summary["sigma0_range"]
+    given = []
+    if "eccentricity_m" in document:
+        given.append(("front node", f"{short(document['eccentricity_m'])} m ahead of the theodolite's axes"))
+    if "refraction" in document:
+        given.append(("refraction", f"k {short(document['refraction'])} of the photo's rays"))
     facts = [
         *_camera_facts(document),
+        *given,
         ("points", f"{summary['points_used']} of {summary['points']} used, {summary['directions_used']} directions"),
         ("redundancy", str(summary["redundancy"]) if summary["redundancy"] else "0: no check"),
         (
@@ -222,6 +229,8 @@ def _orientation(document: Document) -> tuple[Section, ...]:
 def _element(row: Document) -> tuple[str, ...]:
     if row["unit"] == "mm":
         return row["name"], fixed(row["value"], 4), "mm", fixed(row["sigma"], 1), "µm"
+    if not row["unit"]:
+        return row["name"], fixed(row["value"], 3), "", fixed(row["sigma"], 3), ""
     return row["name"], fixed(row["value"], ANGLE_DECIMALS), row["unit"], fixed(row["sigma"], 1), "″"
 
 

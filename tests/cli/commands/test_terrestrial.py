@@ -23,7 +23,8 @@ from photostrip.terrestrial.epochs import monitor
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 from tests.terrestrial.files import TRUTH, coordinates, project, pseudo_parallaxes, write
-from tests.terrestrial.test_orientation import CENTRE, PLACES, directions
+from tests.terrestrial.simulated import CENTERS, FOCAL, attitude, photo
+from tests.terrestrial.test_orientation import CENTRE, PLACES, directions, from_the_theodolite
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -253,7 +254,76 @@ def test_standard_deviations_of_the_rows_count(tmp_path: Path, capsys: pytest.Ca
         assert two["sigma"] == pytest.approx(2 * one["sigma"], rel=1e-3)
 
 
+def test_eccentricity_and_refraction_of_a_photo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    angles = (0.4, 0.08, -0.02)
+    given = from_the_theodolite(angles, 0.12, refraction=0.3)
+    table = tmp_path / "s.csv"
+    lines = ["point,x,z,lambda,beta,distance"]
+    values = np.column_stack([given.xz, np.degrees(given.directions), given.distances]).tolist()
+    lines += [f"P{number}," + ",".join(f"{value:.10f}" for value in row) for number, row in enumerate(values)]
+    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    held = ("--principal-distance", 100.25, "--principal-point", "0.12,-0.21", "--eccentricity", 0.12)
+    found = answer(capsys, *ORIENT, table, *held, "--free", "refraction")
+    element = {row["name"]: row for row in found["elements"]}
+    assert element["k"]["value"] == pytest.approx(0.3, abs=1e-5)
+    assert element["alpha"]["value"] == pytest.approx(np.degrees(0.4), abs=1e-7)
+    assert found["eccentricity_m"] == 0.12
+    code, text, _ = call(capsys, *ORIENT, table, *held, "--refraction", 0.3)
+    assert code == 0
+    assert "front node 0.12 m ahead of the theodolite's axes" in words(text)
+    assert "refraction k 0.3 of the photo's rays" in words(text)
+    code, _, err = call(capsys, *ORIENT, table, *held, "--refraction", 30)
+    assert (code, "--refraction: 30 is out of range" in err) == (2, True)
+    table.write_text(sightings_csv(), encoding="utf-8")
+    code, _, err = call(capsys, *ORIENT, table, *held)
+    assert (code, "that of P0 and 10 more is not given" in words(err)) == (3, True)
+
+
 # ---------------------------------------------------------------------------------------------------- displacement
+
+
+def station_sightings(side: int, eccentricity: float) -> tuple[str, str]:
+    """Give the table of directions from a theodolite behind the camera of a station, and the position of its axes."""
+    turn, center = attitude(*TRUTH.attitudes[side]), CENTERS[side]
+    axes = center - eccentricity * turn[:, 1]
+    image = photo(TRUTH.points, center, turn, FOCAL[side])
+    seen = TRUTH.points - axes
+    distance = np.linalg.norm(seen, axis=1)
+    horizontal = np.degrees(np.arctan2(seen[:, 0], seen[:, 1]))
+    vertical = np.degrees(np.arcsin(seen[:, 2] / distance))
+    lines = ["point,x,z,lambda,beta,distance"]
+    for number, row in enumerate(np.column_stack([image, horizontal, vertical, distance]).tolist()):
+        lines.append(f"P{number}," + ",".join(f"{value:.10f}" for value in row))
+    return "\n".join(lines) + "\n", str(axes.tolist())
+
+
+def test_correction_directions_from_both_ends_of_the_base_feed_the_displacements(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    survey = write(tmp_path)
+    by_angles = answer(capsys, "displacement", survey, "-q")
+    text = re.sub(r", alpha: .*", "}", project())
+    for side, name in enumerate(("left", "right")):
+        table, axes = station_sightings(side, 0.15)
+        (tmp_path / f"{name}.csv").write_text(table, encoding="utf-8")
+        place = str(CENTERS[side].tolist())
+        assert place in text
+        text = text.replace(f"position: {place}", f"position: {axes}, eccentricity: 0.15, directions: {name}.csv")
+    (tmp_path / "survey.yaml").write_text(text, encoding="utf-8")
+    by_directions = answer(capsys, "displacement", survey, "-q")
+    first, second = (
+        [
+            [epoch["since_first"][name] for name in ("dx", "dy", "dz")]
+            for point in found["points"]
+            for epoch in point["epochs"][1:]
+        ]
+        for found in (by_angles, by_directions)
+    )
+    assert len(first) == 24
+    np.testing.assert_allclose(np.array(second, float), np.array(first, float), atol=2e-6)
+    (tmp_path / "survey.yaml").write_text(text.replace("left.csv", "left.csv, omega: 2"), encoding="utf-8")
+    code, _, err = call(capsys, "displacement", survey)
+    assert (code, "`directions` gives the orientation of the photo, and `omega` another one" in words(err)) == (2, True)
 
 
 def test_displacement_in_every_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -486,7 +556,7 @@ def test_nothing_but_a_picture_loads_matplotlib(tmp_path: Path) -> None:
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --as-printed --omega 3", "--as-printed: the printed formulas hold for a level camera; leave out --omega and --kappa"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --plot p.png", "p.png: --plot: pictures are written as SVG; expected a name that ends in .svg"),
         ("directions theodolite --sigma-arcsec -1 --principal-distance 100", "--sigma-arcsec: -1 is out of range; expected 0.0001 to 36000 ″"),
-        ("directions orient sights.csv --principal-distance 100 --free f", "--free: `f` cannot be determined; expected principal-distance, principal-point, or both with a comma between"),
+        ("directions orient sights.csv --principal-distance 100 --free f", "--free: `f` cannot be determined; expected principal-distance, principal-point, refraction, or several with commas between"),
         ("directions orient sights.csv --principal-distance 100 --significance 1", "--significance: 1 is out of range; expected 1e-06 to 0.5"),
         ("directions orient sights.csv --principal-distance 100", "sights.csv:3:7: lambda: neither direction to point B is given; expected lambda, beta or both"),
         ("directions orient zenith.csv --principal-distance 100", "zenith.csv:2:8: beta: 95 deg is not below the zenith; expected an elevation between -90 and 90 degrees, not a zenith distance"),
