@@ -6,7 +6,8 @@ Source: derived; see docs/precision.md, eq. 7.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
@@ -25,11 +26,12 @@ from photostrip.triangulation.error_propagation.covariances import (
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
+AT_A_TIME = 32  # blocks whose columns are made together: 5 MB of points
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
 
 
@@ -94,25 +96,25 @@ def predict(found: system.System, tables: Sequence[ErrorRows]) -> tuple[list[Pre
     zero = np.zeros((layout.height, layout.height))
     none = InverseRow(zero, zero, zero)
 
-    def visit(number: int, before: InverseRow, middle: InverseRow, after: InverseRow) -> None:
-        around = np.block(
-            [
-                [before.diagonal, before.following, before.after],
-                [before.following.T, middle.diagonal, middle.following],
-                [before.after.T, middle.following.T, after.diagonal],
-            ]
-        )
-        for each, result in zip(columns, predicted, strict=True):
-            each.predict(number, around, result)
+    made = [each.blocks(range(layout.blocks - 1, -1, -1)) for each in columns]
+    around = np.empty((3, layout.height, 3, layout.height))  # the inverse of a block and its neighbours
+
+    def visit(before: InverseRow, middle: InverseRow, after: InverseRow) -> None:
+        around[0, :, 0], around[1, :, 1], around[2, :, 2] = before.diagonal, middle.diagonal, after.diagonal
+        around[0, :, 1], around[1, :, 2], around[0, :, 2] = before.following, middle.following, before.after
+        around[1, :, 0], around[2, :, 1], around[2, :, 0] = before.following.T, middle.following.T, before.after.T
+        flat = around.reshape(3 * layout.height, -1)
+        for each, blocks, result in zip(columns, made, predicted, strict=True):
+            each.predict(next(blocks), flat, result)
 
     middle = after = none
     for number, before in found.factors.inverse():
         position = layout.position[ends[number] : ends[number + 1]]
         cofactors[ends[number] : ends[number + 1]] = before.diagonal[position, position]
         if number + 1 < layout.blocks:
-            visit(number + 1, before, middle, after)
+            visit(before, middle, after)
         middle, after = before, middle
-    visit(0, none, middle, after)
+    visit(none, middle, after)
     for each, result, order in zip(columns, predicted, orders, strict=True):
         formed = local_covariances(found.errors, each.rows, images_with_components(found.errors, each.rows))
         back = np.argsort(order, kind="stable")
@@ -136,47 +138,45 @@ def photo_rows(errors: StripErrors) -> ErrorRows:
     return ErrorRows.without_images(np.append(np.arange(models), models - 1), by_similarity, by_component)
 
 
+class BlockColumns(NamedTuple):
+    """Columns of the rows whose first model lies in one block."""
+
+    number: int  # of the block
+    rows: slice
+    values: Floats  # (3, b, k): in the blocks before, own and after
+
+
 @dataclass(frozen=True, eq=False)
 class _Columns:
     """Columns b of rows that are ordered by their first models, block by block."""
 
     found: system.System
     rows: ErrorRows
-    padded: system.PaddedRows
     by_unknowns: Floats  # (n, d, 7): by the unknowns of the first model
     shared: system.SameImages  # image points in common with conditions, ordered by rows
 
     @classmethod
     def of(cls, found: system.System, rows: ErrorRows) -> Self:
-        rank = system.rank_in_model(rows.first, found.errors.models)
         shared = system.same_images(rows, found.conditions.rows)
         order = np.argsort(shared.first, kind="stable")
         return cls(
             found=found,
             rows=rows,
-            padded=system.PaddedRows.of(found.errors, rows, rank, found.padded.by_component.shape[2]),
             by_unknowns=rows.by_similarity @ found.conditions.local.to_common[rows.first],
             shared=system.SameImages(shared.first[order], shared.second[order], shared.value[order, :, 0]),
         )
 
-    def of_block(self, number: int) -> tuple[slice, Floats]:
-        """Rows whose first model lies in a block, and their columns (3, b, k) in the blocks before, own and after."""
-        layout, size = self.found.layout, self.rows.by_similarity.shape[1]
-        low, high = np.searchsorted(self.rows.first, [number * layout.width, (number + 1) * layout.width]).tolist()
-        columns = np.zeros((3, layout.height, (high - low) * size))
-        if low < high:
-            self._fill(columns, number, low)
-            begin, end = np.searchsorted(self.shared.first, [low, high])
-            row, condition, value = (column[begin:end] for column in self.shared)
-            block, position = layout.block[condition] - number + 1, layout.position[condition]
-            place = (row - low)[:, None] * size + np.arange(size)
-            np.add.at(columns, (block[:, None], position[:, None], place), value)
-        return slice(low, high), columns
+    def blocks(self, numbers: range) -> Iterator[BlockColumns]:
+        """Go through consecutive blocks, up or down; a few are made together."""
+        for start in range(0, len(numbers), AT_A_TIME):
+            some = numbers[start : start + AT_A_TIME]
+            made = self._made(min(some), max(some) + 1)
+            yield from made if some[0] == made[0].number else reversed(made)
 
-    def predict(self, number: int, around: Floats, result: Predicted) -> None:
+    def predict(self, block: BlockColumns, around: Floats, result: Predicted) -> None:
         """Fill in error b^T [lambda; y] and b^T K^-1 b of one block, given the inverse of it and its neighbours."""
         layout, size = self.found.layout, self.rows.by_similarity.shape[1]
-        rows, columns = self.of_block(number)
+        number, rows, columns = block
         count = rows.stop - rows.start
         if not count:
             return
@@ -188,26 +188,55 @@ class _Columns:
         split = flat.reshape(len(flat), count, size).transpose(1, 2, 0)
         result.covariance[rows] = split @ (around @ flat).reshape(len(flat), count, size).transpose(1, 0, 2)
 
-    def _fill(self, columns: Floats, number: int, low: int) -> None:
-        """Fill in the covariances with conditions around, and the coefficients of the unknowns."""
+    def _made(self, low: int, high: int) -> list[BlockColumns]:
+        """Make the columns of blocks: covariances with conditions around, coefficients of unknowns, common images."""
         layout, size = self.found.layout, self.rows.by_similarity.shape[1]
         models = len(layout.start)
-        model = np.arange(number * layout.width, min((number + 1) * layout.width, models))
+        model = np.arange(low * layout.width, min(high * layout.width, models))
         ends = np.searchsorted(self.rows.first, [*model, model[-1] + 1])
+        bounds = ends[np.minimum(np.arange(high - low + 1) * layout.width, len(model))].tolist()
+        columns = [np.zeros((3, layout.height, (stop - start) * size)) for start, stop in pairwise(bounds)]
+        part, slots = self.rows.part(*ends[[0, -1]].tolist()), self.found.padded.by_component.shape[2]
+        padded = system.PaddedRows.of(self.found.errors, part, slots, range(int(model[0]), int(model[-1]) + 1))
+        starts, unknowns, reached = layout.start.tolist(), layout.unknown.tolist(), ends.tolist()
+        # the place of each model's rows: its block, and its columns there
+        places = [
+            (place // layout.width, slice((start - first) * size, (stop - first) * size))
+            for place, (start, stop) in enumerate(pairwise(reached))
+            for first in [bounds[place // layout.width]]
+        ]
         for apart in range(-layout.width, layout.width + 1):
-            inside = (model + apart >= 0) & (model + apart < models)
-            if not inside.any():
+            inside = np.flatnonzero((model + apart >= 0) & (model + apart < models))
+            if not len(inside):
                 continue
-            values = system.products(self.padded, self.found.padded, model[inside], apart)
-            for place, value in zip(np.flatnonzero(inside).tolist(), values, strict=True):
-                other, count = model[place] + apart, (ends[place + 1] - ends[place]) * size
-                block, top, height = other // layout.width - number + 1, layout.start[other], layout.unknown[other]
-                left = (ends[place] - low) * size
-                columns[block, top:height, left : left + count] = value[:count, : height - top].T
-        for place, unknown in enumerate(layout.unknown[model].tolist()):
-            left, right = (ends[place] - low) * size, (ends[place + 1] - low) * size
-            by_unknowns = self.by_unknowns[ends[place] : ends[place + 1]].reshape(-1, SIMILARITY_PARAMETERS)
-            columns[1, unknown : unknown + SIMILARITY_PARAMETERS, left:right] = by_unknowns.T
+            values = system.products(padded, self.found.padded, model[inside], apart)
+            for place, value in zip(inside.tolist(), values, strict=True):
+                block, across = places[place]
+                other = place + int(model[0]) + apart
+                beside = other // layout.width - (low + block) + 1
+                top, height = starts[other], unknowns[other]
+                count = across.stop - across.start
+                columns[block][beside, top:height, across] = value[:count, : height - top].T
+        for number, (block, across) in enumerate(places):
+            unknown = unknowns[number + int(model[0])]
+            by_unknowns = self.by_unknowns[reached[number] : reached[number + 1]].reshape(-1, SIMILARITY_PARAMETERS)
+            columns[block][1, unknown : unknown + SIMILARITY_PARAMETERS, across] = by_unknowns.T
+        made = [
+            BlockColumns(number, slice(start, stop), values)
+            for number, (start, stop), values in zip(range(low, high), pairwise(bounds), columns, strict=True)
+        ]
+        for each in made:
+            self._add_shared(each)
+        return made
+
+    def _add_shared(self, made: BlockColumns) -> None:
+        """Add the products of image points that rows of a block have in common with conditions."""
+        layout, size = self.found.layout, self.rows.by_similarity.shape[1]
+        inside = slice(*np.searchsorted(self.shared.first, [made.rows.start, made.rows.stop]).tolist())
+        row, condition, value = (column[inside] for column in self.shared)
+        block, position = layout.block[condition] - made.number + 1, layout.position[condition]
+        place = (row - made.rows.start)[:, None] * size + np.arange(size)
+        np.add.at(made.values, (block[:, None], position[:, None], place), value)
 
 
 def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
@@ -222,8 +251,7 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
     result = np.zeros((len(order), size, len(chosen)))
     if len(order) * size < len(chosen):
         right = np.zeros((layout.blocks + 2, layout.height, len(order), size))
-        for number in range(layout.blocks):
-            at, values = columns.of_block(number)
+        for number, at, values in columns.blocks(range(layout.blocks)):
             right[number : number + 3, :, order[at]] = values.reshape(*values.shape[:2], -1, size)
         solved = found.factors.solve(right[1:-1].reshape(layout.blocks, layout.height, -1))
         result[:] = solved[block, position].T.reshape(result.shape)
@@ -232,8 +260,7 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
     right[block, position, np.arange(len(chosen))] = 1.0
     solved = np.zeros((layout.blocks + 2, layout.height, len(chosen)))
     solved[1:-1] = found.factors.solve(right)
-    for number in range(layout.blocks):
-        at, values = columns.of_block(number)
+    for number, at, values in columns.blocks(range(layout.blocks)):
         near = solved[number : number + 3].reshape(3 * layout.height, -1)
         result[order[at]] = (values.reshape(len(near), -1).T @ near).reshape(-1, size, len(chosen))
     return result
@@ -249,13 +276,13 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     columns, layout, factors = _Columns.of(found, rows), found.layout, found.factors
     own = rows.without_similarity()  # the similarities of the models are unknowns, not errors
     covariance = joint_covariances.joint_covariance(found.errors, own, along_strip(found.errors))
-    blocks = [columns.of_block(number) for number in range(layout.blocks)]
+    blocks = list(columns.blocks(range(layout.blocks)))
     reduced = np.zeros((layout.height, 0))
     for number in range(layout.blocks):
         near = blocks[max(number - 1, 0) : number + 2]
-        reached, shift = near[-1][0].stop, min(number, 1)  # later columns begin in later blocks
+        reached, shift = near[-1].rows.stop, min(number, 1)  # later columns begin in later blocks
         right = np.zeros((layout.height, reached))
-        for place, (at, values) in enumerate(near):
+        for place, (_, at, values) in enumerate(near):
             right[:, at] = values[1 + shift - place]
         if number:
             right[:, : reduced.shape[1]] -= factors.shares[number - 1].T @ reduced

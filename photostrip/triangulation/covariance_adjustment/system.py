@@ -26,40 +26,45 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PaddedRows:
-    """Rows with d = 1 model by model, r places for each model, empty places 0."""
+    """Rows with d = 1 of p consecutive models, model by model, r places for each model, empty places 0."""
 
+    begin: int  # the first of the models
     by_component: Floats  # (p, r, s, 6)
     images: Floats  # (p, r, s + 4, 6): covariances of their image coordinates with components
     whole: Floats  # (p, r, s + 4, 6): covariances of the whole rows, without similarities, with components
 
     @classmethod
-    def of(cls, errors: StripErrors, rows: ErrorRows, rank: Numbers, slots: int) -> Self:
-        """Put rows into places of their first models; a row of d coordinates takes d places.
+    def of(cls, errors: StripErrors, rows: ErrorRows, slots: int, models: range) -> Self:
+        """Put rows that are ordered by their first models into places of these; one of d coordinates takes d places.
 
-        ``rank`` (n,) is the place of each among the rows of its model, ``slots`` the models over which any row reaches.
+        ``slots`` is the number of models over which any row reaches.
         """
-        models, size, have = errors.models, rows.by_similarity.shape[1], rows.by_component.shape[1]
+        first, size, have = rows.first - models.start, rows.by_similarity.shape[1], rows.by_component.shape[1]
+        rank = rank_in_model(first, len(models))
         places = max(int(rank.max(initial=0)) + 1, 1) * size
-        by_component = np.zeros((models, places, slots, COMPONENTS))
-        images = np.zeros((models, places, slots + 2 * REACH, COMPONENTS))
+        by_component = np.zeros((len(models), places, slots, COMPONENTS))
+        images = np.zeros((len(models), places, slots + 2 * REACH, COMPONENTS))
         at = rank[:, None] * size + np.arange(size)
         with_components = images_with_components(errors, rows)
-        by_component[rows.first[:, None], at, :have] = rows.by_component.transpose(0, 2, 1, 3)
-        images[rows.first[:, None], at, : have + 2 * REACH] = with_components.transpose(0, 2, 1, 3)
-        return cls(by_component, images, images + _with_components(errors.component_covariances, by_component))
+        by_component[first[:, None], at, :have] = rows.by_component.transpose(0, 2, 1, 3)
+        images[first[:, None], at, : have + 2 * REACH] = with_components.transpose(0, 2, 1, 3)
+        whole = images + _with_components(errors.component_covariances, by_component, models)
+        return cls(begin=models.start, by_component=by_component, images=images, whole=whole)
 
 
-def _with_components(covariances: Floats, by_component: Floats) -> Floats:
+def _with_components(covariances: Floats, by_component: Floats, models: range) -> Floats:
     """Covariances of sums of components with the components from two models before to two after."""
-    models, places, slots, _ = by_component.shape
-    result = np.zeros((models, places, slots + 2 * REACH, COMPONENTS))
+    _, places, slots, _ = by_component.shape
+    result = np.zeros((len(models), places, slots + 2 * REACH, COMPONENTS))
     for slot in range(slots):
         for apart in range(-REACH, REACH + 1):
-            model = np.arange(max(0, -apart - slot), max(models - slot - max(apart, 0), 0))
+            low = max(models.start, -apart - slot)
+            model = np.arange(low, max(min(models.stop, len(covariances) - slot - max(apart, 0)), low))
             if len(model):
                 mixed = covariances[model + slot + min(apart, 0), abs(apart)]
                 mixed = mixed if apart >= 0 else mixed.transpose(0, 2, 1)
-                result[model, :, slot + apart + REACH] += by_component[model, :, slot] @ mixed
+                row = slice(low - models.start, low - models.start + len(model))
+                result[row, :, slot + apart + REACH] += by_component[row, :, slot] @ mixed
     return result
 
 
@@ -68,7 +73,8 @@ def products(a: PaddedRows, b: PaddedRows, models: Numbers, apart: int) -> Float
 
     Products of image coordinates that both use directly are left out; ``same_images`` gives them.
     """
-    other, count = models + apart, len(models)
+    other, count = models + apart - b.begin, len(models)
+    models = models - a.begin
     total = np.zeros((count, a.by_component.shape[1], b.by_component.shape[1]))
     for first, second, low in (
         (a.whole[models], b.by_component[other], apart + REACH),
@@ -201,7 +207,7 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     rows = wanted.rows
     slots = max(rows.by_component.shape[1], errors.points.by_component.shape[1], REACH)
     layout = SystemLayout.of(rows.first, errors.models, min(slots, errors.models))
-    padded = PaddedRows.of(errors, rows, layout.rank, slots)
+    padded = PaddedRows.of(errors, rows, slots, range(errors.models))
     shape = (layout.blocks, layout.height, layout.height)
     matrix = BlockMatrix(np.zeros(shape), np.zeros(shape))
     _add_covariances(matrix, layout, padded, rows)
