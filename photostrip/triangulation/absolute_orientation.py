@@ -64,11 +64,12 @@ class Targets:
         cartesian = self.intermediate.cartesian_from_intermediate(xyz)
         result = np.empty_like(cartesian)
         for number, frame in enumerate(self.frames):
-            rows = self.control.frame == number
-            if rows.any():
-                ground = frame.ground_from_cartesian(cartesian[rows])
+            rows = np.flatnonzero(self.control.frame == number)
+            if len(rows):
+                ids = [self.control.ids[row] for row in rows.tolist()]
+                ground = frame.ground_from_cartesian(cartesian[rows], ids=ids)
                 ground = np.where(self.control.use[rows], self.control.enu[rows], ground)
-                result[rows] = frame.cartesian_from_ground(ground)
+                result[rows] = frame.cartesian_from_ground(ground, ids=ids)
         return self.intermediate.intermediate_from_cartesian(result)
 
     def axes(self, xyz: Floats) -> Floats:

@@ -12,7 +12,7 @@ import pytest
 
 from photostrip.camera import Distortion
 from photostrip.cli.main import main
-from photostrip.errors import PhotostripError
+from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
 from photostrip.geometry.rotation import angles
 from photostrip.pipeline import Settings, triangulate
@@ -294,6 +294,28 @@ def test_a_height_above_the_cameras_is_a_slip_all_the_same(step: float) -> None:
     row = int(control_rows(inputs)[1])
     (finding,) = told(with_control(inputs, lambda enu: enu + np.outer(np.arange(len(enu)) == row, [0.0, 0.0, step])))
     assert (finding.code, finding.points) == ("P406", (inputs.control.ids[row],))
+
+
+@pytest.mark.parametrize("frame", ["utm", "local"])
+@pytest.mark.parametrize("written", [1e9, -1e8, 1e17, 1e30])
+@pytest.mark.parametrize("role", ["control", "check"])
+def test_a_height_beyond_the_earth_is_told_without_digits(frame: str, written: float, role: str) -> None:
+    inputs = inputs_of(simulation(frame))
+    row = int(control_rows(inputs)[1] if role == "control" else np.flatnonzero(inputs.control.check)[1])
+    axis = np.outer(np.arange(len(inputs.control)) == row, [False, False, True])
+    (finding,) = told(with_control(inputs, lambda enu: np.where(axis, written, enu)))
+    assert (finding.code, finding.points) == ("P406", (inputs.control.ids[row],))
+    assert f"has {written:.10g} for up" in finding.message
+    assert "no place on the Earth" in finding.message
+    assert "would_fit" not in finding.evidence
+
+
+def test_a_check_point_outside_a_projection_is_refused_by_name() -> None:
+    inputs = inputs_of(simulation("utm"))
+    row = int(np.flatnonzero(inputs.control.check)[1])
+    away = with_control(inputs, lambda enu: enu + np.outer(np.arange(len(enu)) == row, [1e8, 0.0, 0.0]))
+    with pytest.raises(InputError, match=f"point {inputs.control.ids[row]}: outside the domain"):
+        triangulate(away, Settings())
 
 
 def test_two_control_points_exchanged() -> None:

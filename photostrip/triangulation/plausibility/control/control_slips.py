@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
+NOWHERE = 1e7  # metres, a quarter of the Earth's circumference: no map reaches so far
 LEAST_RAYS = 2
 CLEARER_SIGMAS = 6.0  # times as large as otherwise a slip must be where a wrong image coordinate explains it as well
 # standard deviations within which the slip must fit where a wrong image coordinate explains it as well
@@ -194,21 +195,24 @@ def slip_in(
     written, unit = float(given.written[row, axis]), float(given.steps.unit[row, axis])
     if not np.isfinite(written):
         return None
-    near = spread[1] + SCALE_CHANGE * abs(off)
-    fits = slip(written, written - off / unit, spread[0] / unit, near / unit)
-    if fits is None:
-        return None
+    nowhere = abs(off) > NOWHERE
+    near = spread[1] + (0.0 if nowhere or axis == HEIGHT else SCALE_CHANGE * abs(off))
+    exact = np.spacing(abs(written)) * unit < spread[0]  # whether the computer holds digits that could be compared
+    fits = slip(written, written - off / unit, spread[0] / unit, near / unit) if exact else None
     role = "check" if given.check[row] else "control"
-    message = (
-        f"{role} point {given.ids[row]} is off by {off:+.2f} m in {AXES[axis]}: looks like {fits.text}; "
-        f"{fits.meant:.10g} would fit within {abs(fits.meant - written + off / unit) * unit:.2g} m"
-    )
-    evidence: Evidence = {
-        "axis": AXES[axis],
-        "given": written,
-        "off_m": off,
-        "would_fit": fits.meant,
-        "standard_deviation_m": spread[0],
-    }
+    evidence: Evidence = {"axis": AXES[axis], "given": written, "off_m": off, "standard_deviation_m": spread[0]}
+    if fits is not None:
+        message = (
+            f"{role} point {given.ids[row]} is off by {off:+.2f} m in {AXES[axis]}: looks like {fits.text}; "
+            f"{fits.meant:.10g} would fit within {abs(fits.meant - written + off / unit) * unit:.2g} m"
+        )
+        evidence["would_fit"] = fits.meant
+    elif nowhere:
+        message = (
+            f"{role} point {given.ids[row]} has {written:.10g} for {AXES[axis]}, {abs(off) / 1000:.6g} km from where "
+            "the photos show it: no place on the Earth is so far away"
+        )
+    else:
+        return None
     fix = f"look {given.ids[row]} up in the records"
     return found("P406", message, fix, evidence, points=(given.ids[row],), strips=(strip,))

@@ -112,9 +112,11 @@ def _axes_through_frames(
 
 def _metres(frame: GroundFrame, enu: Floats) -> Floats:
     """Metres on the ground in a unit of each coordinate: a map has a scale of its own."""
-    if frame.kind == "local":
-        return np.broadcast_to([frame.plan_factor, frame.plan_factor, frame.height_factor], enu.shape)
-    step = 1e-5 if frame.kind == "geographic" else 1.0
-    start = frame.cartesian_from_ground(enu)
-    stepped = [frame.cartesian_from_ground(enu + step * np.eye(3)[axis]) for axis in range(3)]
-    return np.column_stack([np.linalg.norm(each - start, axis=1) / step for each in stepped])
+    unit = np.broadcast_to([frame.plan_factor, frame.plan_factor, frame.height_factor], enu.shape).astype(float)
+    if frame.kind != "local":
+        step = 1e-5 if frame.kind == "geographic" else 1.0
+        start = frame.cartesian_from_ground(enu)
+        for axis in range(2):
+            stepped = frame.cartesian_from_ground(enu + step * np.eye(3)[axis])
+            unit[:, axis] = np.linalg.norm(stepped - start, axis=1) / step
+    return unit
