@@ -33,6 +33,7 @@ PARTS = "plan", "height"
 TERMS = "twist", "bending"
 AREAS = {"plan": "ellipse", "height": "interval"}
 WRONG_CONTROL = {"control-rejected", "control-doubtful"}  # notes on control points that a finding may have named
+BARE_ENDS = {"P501", "P503"}  # findings on control that leaves an end out
 NAMED = 3  # pairs, photos, findings or notes of one kind that are named
 
 
@@ -344,9 +345,11 @@ def _findings(document: Document, severity: str) -> Iterator[str]:
 
 
 def _notes(document: Document) -> Iterator[str]:
-    """Warnings, the first of each kind; not what a finding says of the same control points."""
+    """Warnings, the first of each kind; not what a finding says of the same control points, or of the same strip."""
     named = {point for each in _open_findings(document) for point in each["points"]}
     told = [each for each in _on_control(document) if named.issuperset(each["points"])]
+    bare = {strip for each in _open_findings(document) if each["code"] in BARE_ENDS for strip in each["strips"]}
+    told += [each for each in document["notes"] if each["code"] == "extrapolation" and each["strip"] in bare]
     warnings = sorted(
         (n for n in document["notes"] if n["severity"] == "warning" and n not in told), key=itemgetter("code")
     )

@@ -1,17 +1,22 @@
-"""What is said of the polynomial of a strip."""
+"""What is said of points beyond the control of a strip."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
 
+from photostrip.formats.output.simulation import inputs_of
+from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.strips.notes import polynomial_notes
+from photostrip.result.document import document_of
+from photostrip.simulate import Control, Flight, Spec, simulate
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Strip
+    from photostrip.pipeline import Inputs, Strip
     from photostrip.triangulation.polynomial.correction import Polynomial
 
 
@@ -31,3 +36,29 @@ def test_points_beyond_the_control_are_told_with_how_far(begin: float, end: floa
     points = "2 points lie" if begin < -500.0 and end > 5000.0 else "1 point lies"
     words = "" if beyond is None else f"{points} up to {beyond} m beyond the control"
     assert words in " ".join(note.message for note in notes)
+
+
+def without_far_control(share: float) -> Inputs:
+    """Give a strip the control of its first part alone."""
+    made = simulate(Spec(flight=Flight(photos=16), control=Control(every=3, check=4)))
+    inputs = inputs_of(made)
+    control = inputs.control
+    along = control.enu[:, 0]  # the flight goes east
+    kept = control.check | (along <= along.min() + share * np.ptp(along))
+    return replace(inputs, control=control.take(kept))
+
+
+@pytest.mark.parametrize(("share", "adjustment"), [(0.7, "auto"), (0.7, "covariance"), (1.0, "covariance")])
+def test_standard_deviations_beyond_the_control_are_told(share: float, adjustment: str) -> None:
+    result = triangulate(without_far_control(share), Settings(adjustment=adjustment))
+    document = document_of(result)
+    (strip,) = result.strips
+    adjusted = strip.of_photos.covariance
+    assert adjusted is not None
+    notes = [each for each in document["notes"] if each["code"] == "extrapolation"]
+    assert len(notes) == (share < 1.0)
+    for note in notes:
+        largest = np.sqrt(adjusted.points[:, 2, 2].max())
+        assert f"and {largest:.2f} m in height, between the control" in note["message"]
+        told = any(each["code"] == "P503" for each in document["findings"])
+        assert (note["message"] in document["verdict"]["look_at"]) != told

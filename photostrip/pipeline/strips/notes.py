@@ -16,7 +16,7 @@ from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.inputs import ModelStrip, Strip
     from photostrip.points import ControlPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from photostrip.triangulation.resection.resection import Resection
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
+# of the length that the control spans: how far points may lie beyond it. Of a polynomial they are extrapolated
+BEYOND_POLYNOMIAL = 0.1
+BEYOND_COVARIANCE = 1 / 3
+WORSE_BEYOND = 2.0  # standard deviations there, over those between the control, that are told
 LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adjustment
 POLYNOMIAL_MODELS = 15  # models from which on, and
 POLYNOMIAL_BANDS = 4  # bands of control below which the adjustment with the covariance is proposed
@@ -137,7 +141,7 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
         low, high = correction.reach
         outside = int(((adjusted[:, 0] < low) | (adjusted[:, 0] > high)).sum())
         reach = max(low - float(adjusted[:, 0].min()), float(adjusted[:, 0].max()) - high)
-        if outside and reach > 0.1 * (high - low):
+        if outside and reach > BEYOND_POLYNOMIAL * (high - low):
             text = (
                 f"strip {strip.id}: {counted(outside, 'point lies', 'points lie')} up to {reach:.0f} m beyond the "
                 f"control along the strip, where the polynomial of degree {correction.degree} is extrapolated"
@@ -146,6 +150,30 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
         if min(axis.redundancy for axis in correction.axes) < 3:
             text = f"strip {strip.id}: the polynomial has a redundancy below 3 in one axis: its residuals say little"
             yield Note("little-redundancy", text, strip=strip.id)
+
+
+def precision_beyond_control(strip: Strip, rows: Numbers, adjusted: CovarianceAdjustment | None) -> Iterator[Note]:
+    """Say what standard deviations grow to where points lie far beyond the control.
+
+    rows: the control in the points of the strip.
+    """
+    if adjusted is None:
+        return
+    along, at = adjusted.xyz[:, 0], adjusted.xyz[rows, 0]
+    beyond = np.maximum(at.min() - along, along - at.max())
+    if beyond.max() <= BEYOND_COVARIANCE * np.ptp(at):
+        return
+    variance = np.diagonal(adjusted.points, axis1=1, axis2=2)
+    sigma = np.sqrt(np.column_stack([variance[:, :2].mean(axis=1), variance[:, 2]]))
+    inside, largest = np.median(sigma[beyond <= 0], axis=0), sigma[beyond > 0].max(axis=0)
+    if (largest > WORSE_BEYOND * inside).any():
+        count = int((beyond > 0).sum())
+        text = (
+            f"strip {strip.id}: {counted(count, 'point lies', 'points lie')} up to {beyond.max():.0f} m beyond the "
+            f"control along the strip; standard deviations there reach {largest[0]:.2f} m in plan and "
+            f"{largest[1]:.2f} m in height, between the control they are {inside[0]:.2f} m and {inside[1]:.2f} m"
+        )
+        yield Note("extrapolation", text, strip=strip.id)
 
 
 def photo_notes(strip: Strip, resection: Resection) -> Iterator[Note]:

@@ -166,6 +166,7 @@ class FormedPhotos:
                 *notes.junction_notes(strip, formed),
                 *notes.control_notes(strip, oriented.absolute),
                 *notes.polynomial_notes(strip, correction, xyz),
+                *notes.precision_beyond_control(strip, oriented.control_rows, covariance),
                 *([] if correction is None or found.choice else notes.covariance_proposal(strip, correction)),
                 *notes.photo_notes(strip, resection),
                 *notes.covariance_notes(strip, oriented.control, covariance),
