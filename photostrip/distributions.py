@@ -132,6 +132,18 @@ def f_isf(tail: float, numerator: float, denominator: float) -> float:
     return exp(_solve(excess, 1.0, -50.0, 700.0))
 
 
+def noncentral_chi2_sf(x: float, dof: float, noncentrality: float) -> float:
+    """Upper tail of the noncentral chi-square distribution: a Poisson mixture of central ones."""
+    half = noncentrality / 2
+    below, weight = 0.0, exp(-half)
+    for n in range(TERMS):
+        below += weight * gamma_cdf(x / 2, dof / 2 + n)
+        weight *= half / (n + 1)
+        if n > half and weight < PRECISION:
+            break
+    return 1.0 - below
+
+
 def chi2_ppf(probability: float, dof: float) -> float:
     """Quantile of chi-square, from the cube-root approximation of Wilson and Hilferty."""
     z = NormalDist().inv_cdf(probability)

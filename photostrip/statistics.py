@@ -6,13 +6,14 @@ from functools import lru_cache
 from math import sqrt
 from statistics import NormalDist
 
-from photostrip.distributions import beta_cdf, chi2_ppf, f_isf, f_sf, t_isf, t_sf
+from photostrip.distributions import beta_cdf, chi2_ppf, f_isf, f_sf, noncentral_chi2_sf, t_isf, t_sf
 
 # A sound result calls for a second look with this probability at the most, for whatever reason: sigma0, pairs, points
 # that the adjustment has not seen, given points that stand out, deformed models, control against a strip's covariance.
 # Each of these six has the same share of it.
 SECOND_LOOK = 0.05
 TEST_LEVEL = SECOND_LOOK / 6
+HALVINGS = 60  # of an interval around a root
 SIGMA_FROM_MEDIAN = 1.4826  # standard deviation over the median of |x|, of a normal distribution
 
 
@@ -53,6 +54,22 @@ def binomial_p_value(count: float, number: float, probability: float) -> float:
 def chi2_quantile(probability: float, dof: float) -> float:
     """Quantile of chi-square."""
     return chi2_ppf(probability, dof)
+
+
+@lru_cache(maxsize=256)
+def noncentrality(significance: float, power: float, dof: float) -> float:
+    """Return the noncentrality that a chi-square test at a significance finds with a power, below 1 - 1e-6.
+
+    Its root is how many standard deviations an error of one coordinate must have: 4.13 at 0.1 % and 80 %.
+    """
+    limit = chi2_quantile(1 - significance, dof)
+    small, large = 0.0, 1.0
+    while noncentral_chi2_sf(limit, dof, large) < power:
+        small, large = large, 2 * large
+    for _ in range(HALVINGS):
+        middle = (small + large) / 2
+        small, large = (middle, large) if noncentral_chi2_sf(limit, dof, middle) < power else (small, middle)
+    return large
 
 
 @lru_cache(maxsize=4096)

@@ -10,11 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
+from scipy.stats import ncx2
 
 from photostrip.statistics import (
     chi2_quantile,
     f_p_value,
     grubbs_limit,
+    noncentrality,
     normal_quantile,
     t_p_value,
     t_quantile,
@@ -217,3 +219,14 @@ def test_false_alarms_of_tau_are_what_alpha_says() -> None:
     tau = (np.abs(residuals) / np.sqrt(redundancy)).max(axis=1) / sigma0
     share = (tau > tau_limit(16, 5, 0.05)).mean()
     assert 0.044 < share < 0.056  # Bonferroni over residuals that are hardly correlated
+
+
+@pytest.mark.parametrize("dof", [1, 2, 3, 7])
+@pytest.mark.parametrize(("significance", "power"), [(0.05, 0.8), (0.001, 0.8), (0.01, 0.999)])
+def test_the_noncentrality_has_the_power_asked_for(significance: float, power: float, dof: int) -> None:
+    found = noncentrality(significance, power, dof)
+    assert ncx2.sf(chi2_quantile(1 - significance, dof), dof, found) == pytest.approx(power, abs=1e-9)
+
+
+def test_the_noncentrality_of_one_error_is_that_of_geodesy() -> None:
+    assert noncentrality(0.001, 0.8, 1) ** 0.5 == pytest.approx(4.13, abs=0.003)

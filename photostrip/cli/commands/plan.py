@@ -30,7 +30,7 @@ plan = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
     context_settings=HELP_NAMES,
-    help="Expected accuracy of a model or of a strip with its control, and which camera is the better one.",
+    help="Expected accuracy of a model, of a strip with its control, of displacements; which camera is the better one.",
 )
 
 
@@ -236,7 +236,7 @@ def model(  # noqa: PLR0913 (an argument for each option)
     with failures_as(delivery.form):
         from photostrip.formats.output.plan_model import model_document, source_example_document
         from photostrip.planning.model_plan import both_forms, given_errors, plan_model
-        from photostrip.project.plans.model import load_model_plan
+        from photostrip.project.plans.model import elements_option, load_model_plan
 
         if as_printed and not closed_form:
             message = "the printed form stands beside the closed form: give --closed-form as well"
@@ -246,7 +246,7 @@ def model(  # noqa: PLR0913 (an argument for each option)
             **flight.keys,
             "control.layout": ("--control", control),
             "control.sigma": ("--control-sigma", _listed(control_sigma)),
-            **_elements(elements),
+            **{key: ("--elements", value) for key, value in elements_option(elements).items()},
         }
         drawn = delivery.require_output()
         if source_table:
@@ -266,19 +266,6 @@ def model(  # noqa: PLR0913 (an argument for each option)
         document = planned(given.spec)
         fine = planned(replace(given.spec, grid=(FINE, FINE))) if drawn else None
         delivery.deliver(document, given.files, fine)
-
-
-ELEMENT_KEYS = ("dby_um", "dbz_um", "dkappa_arcsec", "dalpha_arcsec", "domega_arcsec")
-
-
-def _elements(text: str | None) -> Options:
-    """Split the five errors of ``--elements``."""
-    values = [] if text is None else text.split(",")
-    if values and len(values) != len(ELEMENT_KEYS):
-        message = f"{len(values)} values are given; the elements are five: dby, dbz, dkappa, dalpha, domega"
-        raise typer.BadParameter(message, param_hint="--elements")
-    keys = (f"element_errors.{key}" for key in ELEMENT_KEYS)
-    return {key: ("--elements", value.strip()) for key, value in zip(keys, values, strict=False)}
 
 
 @_command("strip", "--models 15 --control bands=3 --control every=5", "strip.yaml -o strip.svg")
@@ -373,3 +360,38 @@ def camera(
         else:
             given = load_camera_plan(file, delivery.assignments or [])
             delivery.deliver(camera_document(given.name, given.cameras, given.reference, given.survey), given.files)
+
+
+@_command("displacement", "--camera 'UMK 10/1318' --base 30 --distances 50,100,200", "--stations 1 --distances 80")
+def displacement(
+    *,
+    file: PlanFile = None,
+    camera: Annotated[str | None, typer.Option("--camera", metavar="NAME", help="Phototheodolite of the list.")] = None,
+    stations: Annotated[
+        str | None, typer.Option("--stations", metavar="N", help="2, or 1 with known distances of the points.")
+    ] = None,
+    base: Annotated[str | None, typer.Option("--base", metavar="M", help="Length of the base.")] = None,
+    distances: Annotated[
+        str | None, typer.Option("--distances", metavar="M,M", help="Distances of the object from the base.")
+    ] = None,
+    sigma_um: Annotated[
+        str | None, typer.Option("--sigma-um", metavar="UM", help="Standard deviation of an image coordinate.")
+    ] = None,
+    delivery: Delivery,
+) -> None:
+    """Compute how well displacements will be known, and the smallest that will be found."""
+    with failures_as(delivery.form):
+        from photostrip.formats.output.plans import displacement_document
+        from photostrip.project.plans.displacement import load_displacement_plan
+
+        options: Options = {
+            "camera": ("--camera", camera),
+            "stations": ("--stations", stations),
+            "base": ("--base", base),
+            "distances": ("--distances", _listed(distances)),
+            "sigma_um": ("--sigma-um", sigma_um),
+        }
+        delivery.require_output()
+        with delivery.assigned(options) as assignments:
+            given = load_displacement_plan(file, assignments)
+        delivery.deliver(displacement_document(given.name, given.spec), given.files)

@@ -26,7 +26,12 @@ if TYPE_CHECKING:
 T = TypeVar("T", bound=Section)
 
 SCHEMA_NUMBER = "1"
-NUMBER_KEYS = {"photostrip_plan_model", "photostrip_plan_strip", "photostrip_plan_cameras"}
+NUMBER_KEYS = {
+    "photostrip_plan_model",
+    "photostrip_plan_strip",
+    "photostrip_plan_cameras",
+    "photostrip_plan_displacement",
+}
 OVERLAP = Range(1.0, 99.0, "%")
 IMAGE_SIGMA_UM = Range(1e-3, 1e4, "µm")
 

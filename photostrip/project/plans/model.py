@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
 
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
+from photostrip.errors import Fault, InputError
 from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema.values import (
@@ -139,6 +140,18 @@ class ModelPlanFile(Flown):
                 message = f"a point {highest:g} m high is not seen from {flying_height:g} m"
                 raise wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
         return self
+
+
+ELEMENT_KEYS = tuple(f"element_errors.{name}" for name in ElementErrors.model_fields)
+
+
+def elements_option(text: str | None) -> dict[str, str]:
+    """Split the five errors of ``--elements`` into keys and values."""
+    values = [] if text is None else text.split(",")
+    if values and len(values) != len(ELEMENT_KEYS):
+        message = f"{len(values)} values are given; the elements are five: dby, dbz, dkappa, dalpha, domega"
+        raise InputError(Fault(message, "number", key="--elements"))
+    return dict(zip(ELEMENT_KEYS, map(str.strip, values), strict=False))
 
 
 class ModelPlan(NamedTuple):

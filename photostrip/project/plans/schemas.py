@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from photostrip.project.plans.cameras import CameraPlanFile
+from photostrip.project.plans.displacement import DisplacementPlanFile
 from photostrip.project.plans.model import ModelPlanFile
 from photostrip.project.plans.strip import StripPlanFile
 from photostrip.project.schema.for_editors import described
@@ -12,9 +13,14 @@ from photostrip.project.schema.for_editors import described
 if TYPE_CHECKING:
     from photostrip.project.schema.values import Section
 
-KINDS: dict[str, type[Section]] = {"model": ModelPlanFile, "strip": StripPlanFile, "camera": CameraPlanFile}
+KINDS: dict[str, type[Section]] = {
+    "model": ModelPlanFile,
+    "strip": StripPlanFile,
+    "camera": CameraPlanFile,
+    "displacement": DisplacementPlanFile,
+}
 
 
 def plan_schema(kind: str) -> dict[str, Any]:
-    """Return the JSON Schema of the file of ``photostrip plan model``, ``strip`` or ``camera``."""
+    """Return the JSON Schema of the file of ``photostrip plan model``, ``strip``, ``camera`` or ``displacement``."""
     return described(KINDS[kind], f"photostrip plan {kind}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.report.commands.plan_displacement import displacement_sections
 from photostrip.report.commands.plan_model import model_sections, source_example_sections
 from photostrip.report.commands.plan_strip import strip_sections
 from photostrip.report.page.numbers import calibrated, fixed, short
@@ -147,5 +148,6 @@ BUILDERS = {
     "model-source-table": ("Accuracy of a model: the worked example of the source", source_example_sections),
     "strip": ("Expected accuracy of a strip", strip_sections),
     "cameras": ("Efficiency of cameras", _cameras),
+    "displacement": ("Expected accuracy of displacements", displacement_sections),
     "source-table": ("Efficiency of cameras: the table of the source", _source_table),
 }

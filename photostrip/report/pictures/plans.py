@@ -130,10 +130,29 @@ def _example(document: Document) -> Figure:
     return figure
 
 
+def _displacement(document: Document) -> Figure:
+    rows = [row for row in document["points"] if row["place"] == "middle"]
+    camera = document["camera"]["name"]
+    figure = new_figure(8, 4.5, f"{document['name']}: {camera}, {document['change_sigma_um']:g} µm")
+    axes = figure.add_subplot(1, 1, 1)
+    distance = [row["distance_m"] for row in rows]
+    for number, (axis, label) in enumerate((("x", "right"), ("y", "ahead"), ("z", "up"))):
+        for what, line in (("sigma", "-"), ("found", "--")):
+            values = [row[f"{what}_{axis}_m"] for row in rows]
+            if not any(value is None for value in values):
+                name = f"standard deviation, {label}" if what == "sigma" else f"smallest found, {label}"
+                axes.plot(distance, values, line, marker="o", color=SERIES[number], label=name)
+    axes.set_xlabel("distance, m")
+    axes.set_ylabel("displacement of a point in the middle, m")
+    axes.legend(fontsize=SMALL_TEXT)
+    return figure
+
+
 DRAWINGS: dict[str, Callable[[Document], Figure]] = {
     "model": _model,
     "strip": strip_figure,
     "cameras": _cameras,
     "source-table": _cameras,
     "model-source-table": _example,
+    "displacement": _displacement,
 }

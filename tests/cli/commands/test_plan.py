@@ -442,7 +442,7 @@ def test_pictures_of_strips_are_the_same_every_time(capsys: pytest.CaptureFixtur
         assert found[0] == found[1]
 
 
-@pytest.mark.parametrize("kind", ["model", "strip", "camera"])
+@pytest.mark.parametrize("kind", ["model", "strip", "camera", "displacement"])
 def test_schemas_of_plans_know_every_key(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     schema = json.loads(answer(capsys, "schema", "--plan", kind))
     assert schema["title"] == f"photostrip plan {kind}"
@@ -456,3 +456,43 @@ def test_the_picture_of_a_strip_has_one_legend(capsys: pytest.CaptureFixture[str
     )
     figure = strip_figure(document)
     assert [axes.get_legend() is not None for axes in figure.axes[:2]] == [False, True]
+
+
+# -------------------------------------------------------------------------------------------------- displacements
+
+
+def test_displacements_from_options_and_from_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    options = ("--camera", "UMK 10/1318", "--base", "30", "--distances", "50,120", "--sigma-um", "4")
+    from_options = answer(capsys, "plan", "displacement", *options, "--format", "json")
+    file = tmp_path / "d.yaml"
+    file.write_text(
+        "photostrip_plan_displacement: 1\nbase: 30\ndistances: [50, 120]\nsigma_d_um: 5.656854249492381\n"
+        "principal_distance: 100\nformat: [160, 120]\n"
+    )
+    assert answer(capsys, "plan", "displacement", str(file), "--format", "json") == from_options
+    document = json.loads(from_options)
+    assert [row["distance_m"] for row in document["points"]] == [50, 50, 50, 120, 120, 120]
+    assert document["points"][0]["sigma_y_m"] == pytest.approx(50**2 / (30 * 100) * 0.008, abs=1e-6)
+    text = answer(capsys, "plan", "displacement", *options[:2], "--stations", "1")
+    assert "one, distances known" in text
+    target = tmp_path / "d.svg"
+    assert answer(capsys, "plan", "displacement", *options, "-q", "-o", str(target)) == ""
+    assert target.read_bytes().startswith(b"<?xml")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--camera", "UMK"), "`UMK`"),
+        (("--stations", "3"), "--stations: `3` is not known; expected one of 2, 1"),
+        (("--distances", "0"), "--distances: 0 is out of range"),
+        (("--stations", "1", "--set", "convergence_deg=3"), "one camera has no other to be turned towards"),
+        (("--sigma-um", "3", "--set", "sigma_d_um=3"), "are both given; remove one"),
+        (("--set", "power=0.99999"), "0.99999 is out of range"),
+    ],
+)
+def test_a_wrong_survey_is_refused(
+    arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", "displacement", *arguments]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())

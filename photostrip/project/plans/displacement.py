@@ -1,0 +1,98 @@
+"""The plan of a survey of displacements: the YAML file and its keys."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
+from photostrip.project.schema.values import Fraction, Number, Range, Section, Words, bounded, key, one_of, wrong
+from photostrip.project.terrestrial.cameras import Distance, Size
+from photostrip.project.terrestrial.options import chosen_camera, required_format
+from photostrip.project.terrestrial.ranges import BASE, DISTANCE, SIGNIFICANCE
+from photostrip.terrestrial.forecast import DisplacementSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+PRESET = "UMK 10/1318"
+MICROMETRES = 1000.0  # in a millimetre
+CONVERGENCE = Range(-45.0, 45.0, "deg")
+POWER = Range(0.5, 0.9999, "")
+Metres = Annotated[Number, AfterValidator(bounded(DISTANCE))]
+
+
+class DisplacementPlanFile(Section):
+    """Expected accuracy of displacements. Every key but the first has a default."""
+
+    photostrip_plan_displacement: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key(
+        "Number of this schema: 1"
+    )
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    name: Words = key("Name of the plan", "displacements")
+    camera: Words = key("Name of a camera of the list", PRESET)
+    presets: Words | None = key("A list of cameras of your own", None)
+    principal_distance: Distance | None = key("Principal distance, instead of that of the list", None, unit="mm")
+    format: Size | None = key("Width and height of the photo, likewise", None, unit="mm")
+    stations: Annotated[Words, AfterValidator(one_of("2", "1"))] = key(
+        "2, at the ends of a base, or 1, with known distances", "2"
+    )
+    base: Annotated[Number, AfterValidator(bounded(BASE))] = key("Length of the base", 20.0, unit="m")
+    convergence_deg: Annotated[Number, AfterValidator(bounded(CONVERGENCE))] = key(
+        "Turn of each camera towards the other", 0.0, unit="deg"
+    )
+    distances: Annotated[list[Metres], Field(min_length=1, max_length=50)] = key(
+        "Distances of the object from the base", [50.0, 100.0, 200.0], unit="m"
+    )
+    sigma_um: SigmaUm | None = key("Standard deviation of an image coordinate of each epoch", None, unit="um")
+    sigma_d_um: SigmaUm | None = key("That of a pseudo-parallax, instead; default: 5", None, unit="um")
+    significance: Annotated[Fraction, AfterValidator(bounded(SIGNIFICANCE))] = key(
+        "Probability of calling a point moved that did not move", DisplacementSpec.significance
+    )
+    power: Annotated[Fraction, AfterValidator(bounded(POWER))] = key(
+        "Probability with which the displacements stated are found", DisplacementSpec.power
+    )
+
+    @model_validator(mode="after")
+    def _one_precision(self) -> Self:
+        if self.sigma_um is not None and self.sigma_d_um is not None:
+            message = "the standard deviation of a coordinate and that of a pseudo-parallax are both given"
+            raise wrong(message, code="two-keys", at="sigma_d_um", fix="remove one")
+        if self.stations == "1" and self.convergence_deg:
+            raise wrong("one camera has no other to be turned towards", at="convergence_deg", fix="remove it")
+        return self
+
+
+class DisplacementPlan(NamedTuple):
+    """A plan of displacements."""
+
+    name: str
+    spec: DisplacementSpec
+    files: Sequence[str]
+
+
+def load_displacement_plan(path: Path | None, assignments: Sequence[str]) -> DisplacementPlan:
+    """Read the plan of a survey, or raise its faults; without a file the assignments and defaults are the plan."""
+    given, reading = read_plan(DisplacementPlanFile, path, assignments)
+    presets = None if given.presets is None else str(given.presets)
+    camera = chosen_camera(camera=str(given.camera), presets=presets, principal_distance=given.principal_distance)
+    if given.format is not None:
+        camera = replace(camera, format=given.format)
+    required_format(camera)
+    change = given.sigma_d_um or 5.0
+    if given.sigma_um is not None:
+        change = float(np.sqrt(2.0)) * given.sigma_um  # of a coordinate in two epochs
+    spec = DisplacementSpec(
+        camera,
+        distances=tuple(given.distances),
+        sigma=change / MICROMETRES,
+        base=given.base if given.stations == "2" else None,
+        convergence=float(np.radians(given.convergence_deg)),
+        significance=given.significance,
+        power=given.power,
+    )
+    return DisplacementPlan(name=str(given.name), spec=spec, files=reading.files)
