@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photostrip.cli.commands.terrestrial_directions import HELP_NAMES, CameraByPoint, Format, directions
+from photostrip.cli.commands.terrestrial_directions import (
+    HELP_NAMES,
+    CameraByPoint,
+    Format,
+    Looking,
+    Unit,
+    directions,
+)
 from photostrip.cli.documents import Rendering, require_target, say, write_rule
 from photostrip.cli.failures import failures_as
 from photostrip.cli.option_groups import with_groups
@@ -28,6 +35,8 @@ terrestrial.add_typer(directions, name="directions")
 EXAMPLE = "\b\nExamples:\n  photostrip terrestrial displacement survey.yaml --plot survey.svg"
 EXAMPLE += "\n  photostrip terrestrial displacement pseudo.csv --base 50 --sigma 0.005 \\"
 EXAMPLE += "\n      --principal-distance 1000"
+ONE_STATION = "\b\nExample:\n  photostrip terrestrial one-station changes.csv \\"
+ONE_STATION += "\n      --camera 'UMK 10/1318' --stable A,B,C"
 TABLE_ENDS = (".csv", ".csv.gz")
 Base = Annotated[float | None, typer.Option("--base", metavar="M", help="Table only: length of the base.")]
 
@@ -102,6 +111,60 @@ def displacement(  # noqa: PLR0913 (an argument for each option)
         write_rule(depfile, None if output is None else output / "displacements.json", survey.files)
         say((*survey.notes, *result.notes), quiet=quiet or form != "csv")  # the other forms have them inside
         Rendering(displacement_report, displacements_csv).show(document, form)
+
+
+@terrestrial.command("one-station", epilog=ONE_STATION)
+@with_groups
+def one_station(  # noqa: PLR0913 (an argument for each option)
+    *,
+    table: Annotated[
+        str,
+        typer.Argument(
+            metavar="TABLE",
+            help="Table `point,x,z,dx,dz,distance[,distance_later][,sigma][,sigma_d][,sigma_distance]` (CSV).",
+        ),
+    ],
+    camera: CameraByPoint,
+    looking: Looking,
+    unit: Unit = "mm",
+    sigma_um: Annotated[float, typer.Option("--sigma-um", metavar="UM", help="Standard error of x and z.")] = 5.0,
+    sigma_d_um: Annotated[
+        float | None, typer.Option("--sigma-d-um", metavar="UM", help="That of dx and dz; default: as of x and z.")
+    ] = None,
+    sigma_distance: Annotated[
+        float, typer.Option("--sigma-distance", metavar="M", help="Standard error of a distance, metres.")
+    ] = 0.01,
+    stable: Annotated[
+        str | None, typer.Option("--stable", metavar="IDS", help="Points that did not move, as in A,B,C.")
+    ] = None,
+    significance: Annotated[float, typer.Option(help="Probability of calling a still point moved.")] = 0.05,
+    form: Format = "text",
+    quiet: Silent = False,
+) -> None:
+    """Compute displacements from photos of one station, with known distances of the points.
+
+    With the distance of the first epoch alone it is the displacement across the ray; with both it is complete.
+    """
+    with failures_as(form):
+        from photostrip.formats.output.terrestrial_directions import points_csv
+        from photostrip.formats.output.terrestrial_displacements import one_station_document
+        from photostrip.project.terrestrial import options
+        from photostrip.project.terrestrial.ranges import DISTANCE, SIGNIFICANCE, within
+        from photostrip.report.commands.terrestrial_displacements import one_station_report
+        from photostrip.terrestrial import one_station as computed
+
+        chosen, attitude = camera.chosen(), looking.attitude()
+        level = within("--significance", significance, SIGNIFICANCE)
+        sigma = options.image_sigma(sigma_um)
+        change = sigma if sigma_d_um is None else options.image_sigma(sigma_d_um)
+        if sigma_distance != 0:
+            within("--sigma-distance", sigma_distance, DISTANCE._replace(least=1e-6))
+        names = [part.strip() for part in (stable or "").split(",") if part.strip()]
+        measured, notes = options.read_one_station(table, unit, (sigma, change, sigma_distance), names, chosen)
+        say(notes, quiet=quiet)
+        found = computed.one_station(measured, chosen.principal_distance, attitude.rotation, level)
+        document = one_station_document(measured, found, chosen, attitude, level)
+        Rendering(one_station_report, points_csv).show(document, form)
 
 
 def _from_table(

@@ -38,6 +38,13 @@ SIGHTINGS = (
     *(Column(each.name, number=True, filled=False, aliases=each.aliases) for each in DIRECTIONS),
     *_optional("sx", "sz", "s_lambda", "s_beta", "distance", positive=True),
 )
+ONE_STATION = (
+    POINT,
+    *IMAGE,
+    *(Column(name, number=True) for name in ("dx", "dz")),
+    Column("distance", number=True, positive=True),
+    *_optional("distance_later", "sigma", "sigma_d", "sigma_distance", positive=True),
+)
 COORDINATES = (EPOCH, Column("photo", words=SIDES), POINT, *IMAGE, *_optional("sx", "sz", positive=True))
 PSEUDO_PARALLAXES = (
     POINT,

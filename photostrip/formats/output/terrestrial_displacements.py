@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.formats.output.csv_text import to_csv
-from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, UM, head
+from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, UM, Attitude, head
 from photostrip.result.numbers import Document, natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.displacement import ellipses
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.notes import Note
+    from photostrip.terrestrial.one_station import OneStation, OneStationResult
 
 METRE = 6  # decimals: a micrometre on the ground
 COVARIANCES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -74,6 +75,44 @@ def displacement_document(
     document["notes"] = [
         {"code": note.code, "severity": note.severity, "message": note.message} for note in (*notes, *result.notes)
     ]
+    return document
+
+
+def one_station_document(
+    measured: OneStation, result: OneStationResult, camera: Phototheodolite, attitude: Attitude, significance: float
+) -> Document:
+    """Return displacements from one station; axes are east, north, up, or right, ahead, up where alpha is 0."""
+    document = head("one-station", camera)
+    document["orientation"] = {
+        "unit": attitude.unit,
+        **dict(zip(("alpha", "omega", "kappa"), attitude.angles, strict=True)),
+    }
+    document["settings"] = {"significance": significance}
+    document["turn"] = None
+    if result.turn is not None:
+        names = ("right", "up", "counter_clockwise")
+        values, sigmas = (rounded(each * ARCSECONDS, ARCSEC) for each in (result.turn.values, result.turn.sigma))
+        document["turn"] = {
+            **{f"{name}_arcsec": value for name, value in zip(names, values, strict=True)},
+            **{f"sigma_{name}_arcsec": value for name, value in zip(names, sigmas, strict=True)},
+            "statistic": rounded(result.turn.statistic, RATIO),
+        }
+    document["points"] = []
+    for row, name in enumerate(measured.points):
+        d, s = rounded(result.values[row], METRE), rounded(result.sigma[row], METRE)
+        document["points"].append(
+            {
+                "id": name,
+                "stable": bool(measured.stable[row]),
+                "components": result.components[row],
+                **{f"d{axis}": value for axis, value in zip("xyz", d, strict=True)},
+                **{f"sigma_{axis}": value for axis, value in zip("xyz", s, strict=True)},
+                "length": rounded(np.linalg.norm(result.values[row]), METRE),
+                "statistic": rounded(result.statistic[row], RATIO),
+                "limit": rounded(result.limit[row], RATIO),
+                "significant": bool(result.statistic[row] > result.limit[row]),
+            }
+        )
     return document
 
 

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, SIGHTINGS, read_points
+from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, ONE_STATION, SIGHTINGS, read_points
 from photostrip.formats.output.terrestrial_directions import Attitude, Theodolite
-from photostrip.formats.text.findings import Findings
+from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber, number, shown
 from photostrip.project.terrestrial import ranges
 from photostrip.project.terrestrial.cameras import preset, read_presets
 from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite, ground_from_photo, photo_from_directions
+from photostrip.terrestrial.one_station import OneStation
 from photostrip.terrestrial.orientation import FREE, Sightings
 
 if TYPE_CHECKING:
@@ -205,6 +206,41 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
         distances=read.columns("distance")[:, 0],
     )
     return sightings, tuple(findings.notes)
+
+
+def read_one_station(
+    file: str, unit: str, sigmas: tuple[float, float, float], stable: Sequence[str], camera: Phototheodolite
+) -> tuple[OneStation, tuple[Note, ...]]:
+    """Read ``point,x,z,dx,dz,distance[,distance_later][,sigma][,sigma_d][,sigma_distance]``.
+
+    sigmas: standard deviations of coordinates and of pseudo-parallaxes, mm, and of distances, metres, of rows without.
+    """
+    findings = Findings()
+    read = read_points(file, ONE_STATION, findings)
+    if read is None:
+        raise InputError(findings.faults)
+    scale, ids = ranges.MILLIMETRES[unit], tuple(read.cells("point"))
+    ranges.refuse_outside(read, ("x", "z", "dx", "dz"), ranges.COORDINATE, findings, scale=scale, unit=unit)
+    ranges.refuse_outside(read, ("sigma", "sigma_d"), ranges.IMAGE_SIGMA, findings, scale=scale, unit=unit)
+    ranges.refuse_outside(read, ("distance", "distance_later"), ranges.DISTANCE, findings)
+    unknown = [name for name in stable if name not in ids]
+    if unknown:
+        message = f"{file} has no point {shown(unknown[0])}"
+        findings.add(Fault(message, "unknown-point", key="--stable", fix=suggestion(unknown[0], ids)))
+    findings.stop()
+    own = read.columns("sigma", "sigma_d", "sigma_distance") * [scale, scale, 1.0]
+    own = np.where(np.isnan(own), sigmas, own)
+    measured = OneStation(
+        points=ids,
+        first=read.columns("x", "z") * scale - camera.principal_point,
+        change=read.columns("dx", "dz") * scale,
+        sigma=own[:, 0],
+        sigma_change=own[:, 1],
+        distances=read.columns("distance", "distance_later"),
+        sigma_distance=own[:, 2],
+        stable=np.isin(ids, list(stable)),
+    )
+    return measured, tuple(findings.notes)
 
 
 def free_elements(text: str | None) -> tuple[str, ...]:

@@ -29,6 +29,42 @@ def displacement_report(document: Document) -> tuple[str, tuple[Section, ...]]:
     return f"Displacements: {document['name']}", tuple(sections)
 
 
+def one_station_report(document: Document) -> tuple[str, tuple[Section, ...]]:
+    """Return the report of displacements from one station."""
+    angles, camera, turn = document["orientation"], document["camera"], document["turn"]
+    looking = ", ".join(f"{name} {fixed(angles[name], 4)}" for name in ("alpha", "omega", "kappa"))
+    facts = [
+        ("camera", f"{camera['name']}, f {short(camera['principal_distance_mm'], 9)} mm"),
+        ("orientation", f"{looking} {angles['unit']}"),
+    ]
+    if turn is not None:
+        names = (("right", "right"), ("up", "up"), ("ccw", "counter_clockwise"))
+        text = ", ".join(
+            f"{fixed(turn[f'{name}_arcsec'], 1)} ± {fixed(turn[f'sigma_{name}_arcsec'], 1)}″ {way}"
+            for way, name in names
+        )
+        facts.append(("camera turned", f"{text}; taken out"))
+    table = tabulated(
+        document["points"],
+        (
+            words("point", "id"),
+            number("d east", "dx", signed, "m"),
+            number("d north", "dy", signed, "m"),
+            number("d up", "dz", signed, "m"),
+            number("±", "sigma_x", 3, "m"),
+            number("±", "sigma_y", 3, "m"),
+            number("±", "sigma_z", 3, "m"),
+            number("length", "length", 3, "m"),
+            number("test", "statistic", 1),
+            number("limit", "limit", 1, rank=1),
+            words("", lambda point: "stable" if point["stable"] else VERDICTS[point["significant"]]),
+            words("seen", lambda point: "in space" if point["components"] == 3 else "across the ray"),
+        ),
+        note="test: chi-square of what is seen; axes are right, ahead, up of the camera where alpha is 0",
+    )
+    return "Displacements from one station", (Section("", (Facts(tuple(facts)),)), Section("Displacements", (table,)))
+
+
 def _overview(document: Document) -> Section:
     summary, settings = document["summary"], document["settings"]
     left, right = (station["camera"] for station in document["stations"])

@@ -669,3 +669,62 @@ def test_a_table_over_the_photo_has_a_largest_size(
     words = "directions accuracy --principal-distance 100 --photo-format 100,80 --step 20"
     assert main(["terrestrial", *words.split()]) == code
     assert ("gives more than 19 points" in capsys.readouterr().err) is (code == 2)
+
+
+# ------------------------------------------------------------------------------------------------------ one station
+
+
+CHANGES = """\
+point,x,z,dx,dz,distance,distance_later
+A,-60,30,0.0241,0.0105,80,
+B,55,35,0.0230,-0.0121,120,
+C,-50,-40,0.0190,0.0112,60,
+D,62,-30,0.0188,-0.0130,150,
+1,5,10,0.0900,0.0310,95.0,94.92
+2,20,-5,0.0602,-0.0400,110,
+"""
+
+
+def test_displacements_from_one_station(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "changes.csv"
+    table.write_text(CHANGES, encoding="utf-8")
+    arguments = ("one-station", table, *UMK, "--stable", "A,B,C,D", "--sigma-um", 3)
+    found = answer(capsys, *arguments)
+    point = {each["id"]: each for each in found["points"]}
+    assert [each["components"] for each in found["points"]] == [2, 2, 2, 2, 3, 2]
+    assert point["1"]["significant"]
+    # 0.042 mm more than the turned camera moves it, at 110 m and f = 100 mm
+    assert point["2"]["dx"] == pytest.approx(0.046, abs=0.002)
+    code, text, _ = call(capsys, *arguments)
+    assert (code, "taken out" in text, "across the ray" in text) == (0, True, True)
+    assert rows(call(capsys, *arguments, "--format", "csv")[1])[4]["point"] == "1"
+    micro = tmp_path / "micro.csv"
+    lines = [line.split(",") for line in CHANGES.splitlines()]
+    scaled = [[row[0], *(f"{float(cell) * 1000:.6f}" for cell in row[1:5]), *row[5:]] for row in lines[1:]]
+    micro.write_text("\n".join(",".join(row) for row in (lines[0], *scaled)) + "\n", encoding="utf-8")
+    again = answer(capsys, "one-station", micro, *arguments[2:], "--unit", "um")
+    assert again["points"] == found["points"]
+
+
+@pytest.mark.parametrize(
+    ("change", "arguments", "code", "message"),
+    [
+        (("", ""), ("--stable", "A,E"), 2, "has no point E"),
+        (("", ""), ("--stable", "A"), 3, "three are needed"),
+        (("80,", "-80,"), (), 2, "distance"),
+        (("distance,", "depth,"), (), 2, "distance"),
+        (("", ""), ("--sigma-distance", "-1"), 2, "--sigma-distance: -1 is out of range"),
+    ],
+)
+def test_what_one_station_cannot_tell_is_refused(
+    change: tuple[str, str],
+    arguments: tuple[str, ...],
+    code: int,
+    message: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    table = tmp_path / "changes.csv"
+    table.write_text(CHANGES.replace(*change, 1) if change[0] else CHANGES, encoding="utf-8")
+    found, _, err = call(capsys, "one-station", table, *UMK, *arguments)
+    assert (found, message in words(err)) == (code, True)
