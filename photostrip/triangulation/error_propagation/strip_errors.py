@@ -34,12 +34,15 @@ from photostrip.triangulation.error_propagation.derivatives import (
     PlacedStrip,
 )
 from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
+from photostrip.triangulation.resection.resection import runs
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.error_propagation.pair_errors import PairErrors
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
+
+IMAGES = 4096  # image points whose products are summed together: what fits into the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,10 +178,15 @@ def _component_covariances(images: ImagePoints, models: int) -> Floats:
     photos = models + 1
     counts = np.bincount(images.photo, minlength=photos)
     rank = np.arange(len(images.photo)) - np.concatenate([[0], np.cumsum(counts)])[images.photo]
-    padded = np.zeros((photos, int(counts.max()), 2, SPAN * COMPONENTS))
-    padded[images.photo, rank] = images.components.transpose(0, 3, 1, 2).reshape(len(rank), 2, -1)
-    flat = padded.reshape(photos, -1, SPAN * COMPONENTS)
-    gram = (flat.transpose(0, 2, 1) @ flat).reshape(photos, SPAN, COMPONENTS, SPAN, COMPONENTS)
+    gram = np.zeros((photos, SPAN * COMPONENTS, SPAN * COMPONENTS))
+    for start, stop in runs(np.concatenate([[0], np.cumsum(counts)]), IMAGES):
+        padded = np.zeros((stop - start, int(counts.max()), 2, SPAN * COMPONENTS))
+        rows = slice(*np.searchsorted(images.photo, [start, stop]).tolist())
+        components = images.components[rows].transpose(0, 3, 1, 2)
+        padded[images.photo[rows] - start, rank[rows]] = components.reshape(len(components), 2, -1)
+        flat = padded.reshape(stop - start, -1, SPAN * COMPONENTS)
+        gram[start:stop] = flat.transpose(0, 2, 1) @ flat
+    gram = gram.reshape(photos, SPAN, COMPONENTS, SPAN, COMPONENTS)
     result = np.zeros((models, SPAN, COMPONENTS, COMPONENTS))
     for apart in range(SPAN):
         for slot in range(SPAN - apart):  # the earlier model is photo - 2 + slot

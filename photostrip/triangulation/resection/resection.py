@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ ITERATIONS = 20
 CONVERGED = 1e-10  # rad, and of the distance to the points; the next step would be its square
 UNKNOWNS = 6
 UPPER = np.triu_indices(UNKNOWNS)
+AT_A_TIME = 4096  # image points worked on together: what fits into the processor's cache
 SINGULAR = 1e-12  # reciprocal condition of a scaled normal matrix
 
 
@@ -30,6 +32,12 @@ class Resection:
     rms: Floats  # (n,): root mean square of a photo's residuals in mm
     # (n,): false where a photo kept its start orientation: too few points, or an iteration that does not converge
     solved: Flags
+
+
+def runs(ends: Numbers, most: int) -> list[tuple[int, int]]:
+    """Cut photos, whose rows end where ``ends`` says after a 0, into runs of about `most` rows: first, last + 1."""
+    first = np.searchsorted(ends, np.append(np.arange(0, ends[-1], most), ends[-1]))
+    return list(pairwise(np.unique(first).tolist()))
 
 
 def with_residuals(xy: Floats, points: Floats, photo: Numbers, photos: KnownPhotos) -> Resection:
@@ -89,13 +97,19 @@ def _steps(
     """
     centers, rotations, focal = photos
     present, starts = segments
-    by_x, by_y, (x, y) = partials(points - centers[photo], rotations[photo], focal[photo], distance[photo])
-    misfit_x, misfit_y = xy[:, 0] - x, xy[:, 1] - y
-    products = np.concatenate(
-        [by_x[UPPER[0]] * by_x[UPPER[1]] + by_y[UPPER[0]] * by_y[UPPER[1]], by_x * misfit_x + by_y * misfit_y]
-    )
-    sums = np.zeros((len(centers), len(products)))
-    sums[present] = np.add.reduceat(products, starts, axis=1).T
+    ends = np.append(starts, len(photo))
+    sums = np.zeros((len(centers), len(UPPER[0]) + UNKNOWNS))
+    for low, high in runs(ends, AT_A_TIME):
+        rows = slice(ends[low], ends[high])
+        number = photo[rows]
+        by_x, by_y, computed = partials(
+            points[rows] - centers[number], rotations[number], focal[number], distance[number]
+        )
+        misfit_x, misfit_y = xy[rows].T - computed
+        products = np.concatenate(
+            [by_x[UPPER[0]] * by_x[UPPER[1]] + by_y[UPPER[0]] * by_y[UPPER[1]], by_x * misfit_x + by_y * misfit_y]
+        )
+        sums[present[low:high]] = np.add.reduceat(products, starts[low:high] - ends[low], axis=1).T
     normal = np.zeros((len(centers), UNKNOWNS, UNKNOWNS))
     normal[:, UPPER[0], UPPER[1]] = sums[:, : len(UPPER[0])]
     normal[:, UPPER[1], UPPER[0]] = sums[:, : len(UPPER[0])]
