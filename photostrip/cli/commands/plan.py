@@ -218,7 +218,7 @@ def model(  # noqa: PLR0913 (an argument for each option)
         typer.Option(
             "--elements",
             metavar="DBY,DBZ,DK,DA,DO",
-            help="Given errors of the elements dby, dbz (µm), dkappa, dalpha, domega (seconds of arc).",
+            help="Given errors of the elements dby, dbz (um), dkappa, dalpha, domega (seconds of arc).",
         ),
     ] = None,
     closed_form: Annotated[
