@@ -87,7 +87,8 @@ def predict(result: Result) -> Predicted:
         if len(rows) and precision is not None:
             at = result.control_rows[rows]
             axes = frame.axes_at(result.points.cartesian[at])
-            sigma[rows] = np.sqrt(np.einsum("nai,nij,naj->na", axes, precision.points[at], axes))
+            with np.errstate(invalid="ignore"):  # a variance lost to rounding is not known
+                sigma[rows] = np.sqrt(np.einsum("nai,nij,naj->na", axes, precision.points[at], axes))
     sigma = np.hypot(sigma, np.where(control.sigma > 0, control.sigma, 0.0))
     return Predicted(off=off, sigma=sigma, sound=used & _screened(result))
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 
 ALPHA = 0.01  # of rejecting anything in a strip without wrong control
+SAME_POINT = 0.05  # of rejecting the rest of points of which a part is wrong: one identification makes both wrong
 LARGEST_SHARE = 0.5  # of the coordinates of plan or of height: nothing is said against a majority
 BENDS = ("XY", "X^2", "X^3")  # what a similarity leaves of the polynomials
 HEIGHT = 2
@@ -168,14 +169,11 @@ class JointAdjustment:
         return self.grown((*out, *best.columns))
 
     def completed(self, out: Columns) -> Columns:
-        """Add what else is wrong of a point: an error of its identity is one of plan and height.
-
-        Beside what is proven, these few tests share the level of all.
-        """
+        """Add what else is wrong of a point: an error of its identity is one of plan and height."""
         gone = set(out)
         left = [tuple(column for column in point if column not in gone) for point in self.points if gone & set(point)]
         tests = self.without(out).deletions(rest := [each for each in left if each])
-        more = [column for each in tests if each.probability < self.alpha / len(rest) for column in each.columns]
+        more = [column for each in tests if each.probability < SAME_POINT / len(rest) for column in each.columns]
         return (*out, *more) if self.allows((*out, *more)) else out
 
     def shrunk(self, out: Columns) -> Columns:

@@ -32,11 +32,9 @@ LEAST_PAIR_DISTANCE = 0.25  # of the largest distance: two points that give a si
 GOOD_SHARE = 0.55  # of the points, at least
 NO_GOOD_DRAW = 1e-3  # probability that no draw of as many points as unknowns, for a start, is of good points alone
 LEAST_DETERMINANT = 1e-9  # of such a draw, columns of size one
-PLAN_REFITS = 3
 REWEIGHTINGS = 12  # of a robust fit
 KEPT_SIGMAS = 5.0  # robust standard deviations within which a point goes with the others
 ODD_PROBABILITY = 1e-6  # that a good point is called odd
-TOGETHER_SIGMAS = 2.5  # smallest standard deviations that make sense: points that lie within all go together
 TINY = 1e-9
 
 
@@ -127,13 +125,11 @@ def _each_two(n: int) -> tuple[Numbers, Numbers]:
 
 def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirrored: bool) -> PlanSimilarity:
     """Fit the better half of the points by least squares."""
-    for _ in range(PLAN_REFITS):
-        size = np.abs(turn * z + shift - plan)
-        good = size <= max(2.5 * SIGMA_FROM_MEDIAN * float(_median(size, PLAN_UNKNOWNS)), TINY)
-        d, t = z[good] - z[good].mean(), plan[good] - plan[good].mean()
-        squares = float((np.abs(d) ** 2).sum())
-        if squares < TINY:
-            break
+    size = np.abs(turn * z + shift - plan)
+    good = size <= max(2.5 * SIGMA_FROM_MEDIAN * float(_median(size, PLAN_UNKNOWNS)), TINY)
+    d, t = z[good] - z[good].mean(), plan[good] - plan[good].mean()
+    squares = float((np.abs(d) ** 2).sum())
+    if squares >= TINY:
         turn = complex((np.conj(d) * t).sum() / squares)
         shift = complex(plan[good].mean() - turn * z[good].mean())
     size = np.abs(turn * z + shift - plan)
@@ -197,19 +193,15 @@ class RobustFit:
 def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, floor: float) -> RobustFit:
     """Fit columns to values, with less and less weight for what does not go with the others.
 
-    Where all points go together, that is the fit of all. Else it starts from the fit through as many points as unknowns
-    whose median residual is smallest, takes weights that fall with what that leaves, and ends with the points that go
-    with each other, all of one weight.
+    It starts from the fit through as many points as unknowns whose median residual is smallest, takes weights that fall
+    with what that leaves, and ends with the points that go with each other, all of one weight.
 
     columns, values: (n, c), (n,), metres; in_fit: (n,), points that may take part.
     floor: smallest standard deviation that makes sense, metres.
     """
     size = np.maximum(np.abs(columns[in_fit]).max(axis=0, initial=TINY), TINY)
     scaled = columns / size
-    used = np.array(in_fit, bool)
-    coefficient, residual = _weighted(scaled, values, used.astype(float))
-    if len(residual[used]) <= columns.shape[1] or np.abs(residual[used]).max() > TOGETHER_SIGMAS * floor:
-        coefficient, residual, used = _reweighted(scaled, values, used, floor)
+    coefficient, residual, used = _reweighted(scaled, values, np.array(in_fit, bool), floor)
     parts = 2 if np.iscomplexobj(values) else 1
     freedom = parts * (int(used.sum()) - columns.shape[1])
     squares = float((np.abs(residual[used]) ** 2).sum())
