@@ -1,11 +1,14 @@
-"""``photostrip info``: what is installed, what it can read and write, and what is missing."""
+"""``photostrip info``: what is installed and what is missing; ``photostrip sources``: what it goes back to."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from photostrip.cli import documents
+from photostrip.cli.failures import failures_as
 from photostrip.cli.stdout import Format
 
 
@@ -27,3 +30,36 @@ def info(
         typer.echo(json.dumps(found, indent=1))
         return
     typer.echo(as_text(found), nl=False)
+
+
+def sources(
+    form: Annotated[documents.Form, typer.Option("--format", help="How the answer is printed.")] = "text",
+    write: Annotated[
+        Path | None,
+        typer.Option("--write", metavar="FILE", help="Make the tables of docs/sources.md anew, instead of printing."),
+    ] = None,
+) -> None:
+    """Compute every worked number of the sources again, beside what is printed.
+
+    Lists every misprint, and the command and the function for every equation.
+    """
+    with failures_as(form):
+        from photostrip.cli.jobs.sources import sources_document, with_tables
+        from photostrip.formats.output.csv_text import to_csv
+        from photostrip.report.commands.sources import sources_report
+
+        if write is not None:
+            from photostrip.errors import Fault, InputError
+            from photostrip.formats.text.writing import write_text
+
+            try:
+                page = write.read_text(encoding="utf-8")
+            except OSError as error:
+                raise InputError(Fault(f"cannot be read: {error.strerror}", "file", file=str(write))) from None
+            write_text(write, with_tables(page, str(write)))
+            return
+        rendering = documents.Rendering(
+            sources_report,
+            lambda found: to_csv(list(found["worked"][0]), (row.values() for row in found["worked"])),
+        )
+        rendering.show(sources_document(), form)

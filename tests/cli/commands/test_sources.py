@@ -1,0 +1,85 @@
+"""``photostrip sources``: worked numbers against formulas written out, and the page that is made from its tables."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from typing import TYPE_CHECKING
+
+import pytest
+
+from photostrip.cli.jobs.sources import with_tables
+from photostrip.cli.main import main
+from tests.loops import nonempty
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PAGE = ROOT / "docs/sources.md"
+
+
+def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert main(["sources", *arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_worked_numbers_are_those_of_the_formulas(capsys: pytest.CaptureFixture[str]) -> None:
+    document = json.loads(answer(capsys, "--format", "json"))
+    found = {(row["source"], row["what"]): row for row in document["worked"]}
+    seconds = math.degrees(1) * 3600
+    # [002]: m rho / sqrt(2 (f² + x²)) and m rho / sqrt(f² + x² + z²), m = 5 µm, x = 80, z = 60 mm
+    for name, f in (("Photheo 19/1318", 190), ("UMK 10/1318", 100)):
+        level, printed = found["[002]", f"m_lambda, {name}"], found["[002]", f"m_beta, {name}"]
+        assert level["correct"] == pytest.approx(0.005 * seconds / math.sqrt(2 * (f**2 + 6400)), abs=6e-4)
+        assert printed["correct"] == pytest.approx(0.005 * seconds / math.sqrt(f**2 + 6400 + 3600), abs=6e-4)
+        eq6 = 0.005 * seconds / math.sqrt(f**2 + 3600 * (1 + 6400 / f**2))
+        assert printed["formula"] == pytest.approx(eq6, abs=6e-4)
+    # [003]: heights at the side, var(c) = 1/2 + 3/4 + 2/3 + 1 with six points
+    assert found["[003]", "height, side points"]["correct"] == pytest.approx(10 * math.sqrt(35 / 12), abs=1e-3)
+    assert found["[003]", "plan, central points"]["remark"] == "its own constant gives 21"
+    # [004a]: 8 of 500 points
+    assert found["[004a]", "good points rejected"]["correct"] == 1.6
+    # [004b]: m_h = H m_p / b with b = 60 mm; an area goes with the square of the scale
+    for f, m_p in ((70, 0.017), (100, 0.015), (140, 0.0125), (200, 0.011)):
+        assert found["[004b]", f"H/m_h, f {f} mm"]["correct"] == pytest.approx(60 / m_p, abs=6e-4)
+        lengths = 200 * 0.011 / (f * m_p)
+        assert found["[004b]", f"eta_S, f {f} mm"]["formula"] == pytest.approx(lengths, abs=6e-4)
+        assert found["[004b]", f"eta_S, f {f} mm"]["correct"] == pytest.approx(lengths**2, abs=6e-4)
+    assert sum(bool(row["remark"]) and row["remark"] != "rounded to 0.5" for row in document["worked"]) == 12
+    assert len(found) == len(document["worked"]) == 26
+
+
+def test_the_page_is_made_from_the_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert with_tables(page, "page") == page
+    copy = tmp_path / "sources.md"
+    # a table that someone has changed by hand comes back
+    copy.write_text(page.replace("| (b² + Z²)[x] |", "| (b + Z²)[x] |"), encoding="utf-8")
+    assert answer(capsys, "--write", str(copy)) == ""
+    assert copy.read_text(encoding="utf-8") == page
+
+
+def test_every_form_has_every_table(capsys: pytest.CaptureFixture[str]) -> None:
+    document = json.loads(answer(capsys, "--format", "json"))
+    markdown = answer(capsys, "--format", "md").replace("\\", "")
+    for row in nonempty(document["equations"]):
+        assert row["function"] in markdown
+        assert row["command"] in markdown
+    text = " ".join(answer(capsys).split())
+    for row in nonempty(document["misprints"]):
+        assert " ".join(f"{row['place']}: {row['printed']}".split()) in text
+    rows = list(csv.DictReader(io.StringIO(answer(capsys, "--format", "csv"))))
+    assert [row["what"] for row in rows] == [row["what"] for row in document["worked"]]
+
+
+def test_another_page_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    other = tmp_path / "notes.md"
+    assert main(["sources", "--write", str(other)]) == 2
+    assert "cannot be read" in capsys.readouterr().err
+    other.write_text("# notes\n", encoding="utf-8")
+    assert main(["sources", "--write", str(other)]) == 2
+    assert "has no table below the heading ## From an equation to a command" in capsys.readouterr().err
+    assert other.read_text(encoding="utf-8") == "# notes\n"
