@@ -2,10 +2,11 @@
 
 A test that only looks at what commands print, write and return gets its ``photostrip`` from ``Forks.command``, and its
 ``python`` from ``Forks.python``: scripts that hand their arguments, folder, environment and open files to a server,
-which forks. Loading takes half a second of the processor for each process, a copy takes a hundredth. What a copy starts
-with ``sys.executable`` is a copy, too, if it was started as ``python``. A script ends as its copy does, by the same
-code or signal, and a copy whose script is gone is killed. What tests of the start itself need (imports, encodings,
-threads, limits, signals that can be caught) is ``sys.executable`` as it is.
+which forks. Loading takes half a second of the processor for each process, a copy takes a hundredth. The server has
+adjusted a project, too: that halves what the next one takes. What a copy starts with ``sys.executable`` is a copy, too,
+if it was started as ``python``. A script ends as its copy does, by the same code or signal, and a copy whose script is
+gone is killed. What tests of the start itself need (imports, encodings, threads, limits, signals that can be caught) is
+``sys.executable`` as it is.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
+from io import StringIO
 from pathlib import Path
 from pkgutil import walk_packages
 from types import ModuleType
@@ -128,7 +130,7 @@ class Forks:
 
 
 def load(libraries: Sequence[str]) -> None:
-    """Import all that a command may import, except what only batches on many machines need."""
+    """Import all that a command may import, except what only batches on many machines need, and use it."""
     import gc
     from importlib import import_module
 
@@ -141,8 +143,20 @@ def load(libraries: Sequence[str]) -> None:
             import_module(found.name)
     for name in libraries:
         import_module(name)
+    warm_up()
     gc.collect()
     gc.freeze()  # no copy looks through what it has from here
+
+
+def warm_up() -> None:
+    """Adjust a small project: what the libraries do at the first one takes as long as the project."""
+    from photostrip.cli.main import main
+    from tests.results import spec, write_project
+
+    with tempfile.TemporaryDirectory() as folder, redirect_stdout(StringIO()):
+        project = write_project(Path(folder), spec())
+        code = main(["run", str(project), "-o", str(project.parent / "out"), "--html", "--quiet"])
+    assert code == 0
 
 
 def serve(address: str) -> None:
