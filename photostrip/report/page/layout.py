@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -171,9 +172,10 @@ def cells(text: str) -> int:
     """Count the character cells that a text takes: two for wide letters, none for accents that combine."""
     if text.isascii():
         return len(text)
-    return sum(_cells_of(letter) for letter in text)
+    return sum(map(_cells_of, text))
 
 
+@cache
 def _cells_of(letter: str) -> int:
     if unicodedata.combining(letter) or unicodedata.category(letter) == "Cf":
         return 0
