@@ -156,7 +156,7 @@ def test_all_executors_write_the_same_bytes(tmp_path: Path, cluster: str) -> Non
 @pytest.mark.slow
 @pytest.mark.usefixtures("_quick_start")
 def test_one_of_two_machines_dies_in_the_middle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    number = 16
+    number = 10
     write_projects(tmp_path / "strips", number)
     monkeypatch.chdir(tmp_path)
     count = Count()
@@ -165,7 +165,7 @@ def test_one_of_two_machines_dies_in_the_middle(tmp_path: Path, monkeypatch: pyt
         class Killing(Count):
             def finished(self, outcome: dict[str, Any], answer: object) -> None:
                 count.finished(outcome, answer)
-                if len(count.times) == 5:
+                if len(count.times) == 3:
                     workers[0].send_signal(signal.SIGKILL)
 
         with opened(Path("out")) as folder, clusters.cluster(address, 1, Limits()) as executor:
@@ -202,7 +202,7 @@ def test_a_project_that_crashes_or_hangs_leaves_the_machine_alone(
 def test_a_scheduler_that_goes_away_ends_the_batch_in_good_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write_projects(tmp_path / "strips", 20)
+    write_projects(tmp_path / "strips", 12)
     monkeypatch.chdir(tmp_path)
     with (
         two_workers(tmp_path / "machines") as (address, _),
@@ -222,7 +222,7 @@ def test_a_scheduler_that_goes_away_ends_the_batch_in_good_order(
     assert process.returncode == 2
     assert "the connection to the cluster is lost" in err
     assert "Traceback" not in err
-    found = re.search(r"20 projects: (\d+) not run, (\d+) good", out)
+    found = re.search(r"12 projects: (\d+) not run, (\d+) good", out)
     assert found is not None
     done = [path for path in (tmp_path / "out").iterdir() if (path / "batch.json").exists()]
     assert len(done) == int(found[2])
