@@ -378,7 +378,7 @@ def test_photos_that_see_no_control_are_carried_by_the_strip() -> None:
 def test_points_beyond_the_control_are_warned_of() -> None:
     """Control in the first three fifths only: a cubic runs away where it is not held, and the report says so."""
     squares: dict[str, list[float]] = {"similarity": [], "3": [], "inside": []}
-    for seed in range(1, 21):
+    for seed in range(1, 9):
         done = simulate(Spec(seed=seed, flight=Flight(photos=21), control=Control(bands=6)))
         inputs = inputs_of(done)
         east = inputs.control.enu[:, 0]

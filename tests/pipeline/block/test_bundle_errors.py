@@ -207,12 +207,12 @@ def test_variance_components_find_what_was_misstated() -> None:
         spec = replace(
             BLOCK,
             seed=seed,
-            flight=Flight(photos=12, strips=3),
+            flight=Flight(photos=8, strips=3),
             image=Image(sigma_um=10.0),
-            control=Control(bands=6, noise=(0.15, 0.15, 0.08)),
+            control=Control(bands=5, noise=(0.15, 0.15, 0.08)),
         )
         simulation = simulate(spec)
-        noise = np.random.default_rng(seed).normal(size=(36, 3)) * 0.2
+        noise = np.random.default_rng(seed).normal(size=(24, 3)) * 0.2
         inputs = replace(inputs_of(simulation), positions=positions(simulation, noise=noise))
         stated = np.full_like(inputs.observations.sigma, 0.005)
         inputs = replace(inputs, observations=replace(inputs.observations, sigma=stated))
