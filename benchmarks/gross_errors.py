@@ -219,8 +219,13 @@ class Run:
 
     def sound(self, wrong: Iterable[str]) -> Floats:
         """Errors of the points without a wrong measurement of their own."""
-        spoiled = {name.partition("/")[2] for name in wrong}
+        spoiled = spoiled_points(wrong)
         return self.errors[[name not in spoiled for name in self.point]]
+
+
+def spoiled_points(wrong: Iterable[str]) -> set[str]:
+    """Points with a wrong measurement."""
+    return {name.partition("/")[2] for name in wrong}
 
 
 def adjusted(project: Project, settings: Settings) -> Run:
@@ -325,7 +330,9 @@ class Tally:
             found, wrong = runs[AUTO], project.wrong_control & runs[AUTO].control
             placing = found.placing & project.wrong
             self.counts.update(placing=len(placing), hidden=len(placing & project.along_base), control=len(wrong))
-            self.counts.update(named=len(wrong & found.rejected), false=len(found.rejected - project.wrong_control))
+            false = found.rejected - project.wrong_control
+            self.counts.update(named=len(wrong & found.rejected), false=len(false))
+            self.counts.update(misplaced=len(false & spoiled_points(project.wrong)))
             self.counts.update(lost=len(runs[KNOWN].used - found.used) if KNOWN in runs else 0)
             self.ratios += [rms[AUTO] / rms[CLEAN]] if CLEAN in runs else []
 
@@ -366,8 +373,9 @@ def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range, wanted: Sequence
     for kind, tally in tallies.items():
         print(tally.row(kind))
     print("\nproject    of those placing a point, along the base of points on two photos")
+    print("           of control named falsely, points with a wrong measurement of their own")
     for kind, tally in tallies.items():
-        print(f"{kind:11s}{tally.counts['hidden']:32d}")
+        print(f"{kind:11s}{tally.counts['hidden']:32d}{tally.counts['misplaced']:12d}")
     print("\nproject    ratio of a project's rms: median, 95 % below, largest")
     for kind, tally in tallies.items():
         middle, most, largest = np.quantile(tally.ratios, (0.5, 0.95, 1.0)) if tally.ratios else 3 * (float("nan"),)
