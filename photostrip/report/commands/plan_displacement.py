@@ -27,8 +27,8 @@ def displacement_sections(document: Document) -> tuple[Section, ...]:
             (
                 "test",
                 (
-                    f"finds a displacement in {100 * document['power']:g} % of cases, and one that is none in"
-                    f" {100 * document['significance']:g} %"
+                    f"finds a displacement in {100 * document['power']:g} % of cases, and calls"
+                    f" {100 * document['significance']:g} % of the points at rest moved"
                 ),
             ),
         )

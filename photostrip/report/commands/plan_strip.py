@@ -221,4 +221,4 @@ def _placed(document: Document) -> tuple[Part, ...]:
         (name, metres(placed[key]["plan_m"]), metres(placed[key]["z_m"]), ", ".join(map(_at, spots)))
         for name, key, spots in kinds
     )
-    return Words(text), Table(columns, rows, note=f"{placed['layouts_tried']} layouts looked at")
+    return Words(text), Table(columns, rows, note=f"{placed['layouts_tried']} layouts tried")

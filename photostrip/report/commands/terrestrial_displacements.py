@@ -132,7 +132,7 @@ def _camera_section(document: Document) -> Section:
 def _camera_verdict(row: Document) -> str:
     if not row["determined"]:
         return "not determined"
-    return f"{'turned' if row['turned'] else 'stood still'}, {'removed' if row['removed'] else 'left in'}"
+    return f"{'turned' if row['turned'] else 'not significant'}, {'taken out' if row['removed'] else 'left in'}"
 
 
 def _epoch_sections(document: Document, epoch: int) -> Iterator[Section]:
