@@ -295,17 +295,17 @@ HEAD = " ".join(f"{name:>8} {'actual':>8} {'ratio':>7}" for name in ("plan", "he
 def models(options: argparse.Namespace) -> None:
     """Print the table of one model."""
     mixed = (
-        ((0.0, 80.0), "xyz"),
-        ((92.0, -80.0), "xyz"),
-        ((90.0, 70.0), "z"),
-        ((5.0, -75.0), "xy"),
-        ((40.0, 0.0), "z"),
+        ControlPoint((0.0, 80.0), use="xyz"),
+        ControlPoint((92.0, -80.0), use="xyz"),
+        ControlPoint((90.0, 70.0), use="z"),
+        ControlPoint((5.0, -75.0), use="xy"),
+        ControlPoint((40.0, 0.0), use="z"),
     )
     count = max(MODEL_REPETITIONS, FEWEST) if options.repeat >= 1000 else options.repeat
     print(f"one model, b = a = 92 mm, 1:10000, 5 um, six standard points; {count} repetitions; metres")
     print(f"{'control':<16} {'points':<11} {HEAD}")
     for name in (*MODEL_LAYOUTS, "mixed"):
-        points = tuple(ControlPoint(at, use) for at, use in mixed) if name == "mixed" else control_layout(name, 92, 92)
+        points = control_layout(name, 92, 92) if name in MODEL_LAYOUTS else mixed
         spec = ModelSpec(FOCAL, 92.0, 92.0, control=points, control_sigma=SIGMA)
         forecast = plan_model(spec)
         scatter = measured_models(spec, forecast.places, count)
