@@ -230,6 +230,8 @@ class Stopwatch:
 pipeline = import_module("photostrip.pipeline.run")  # the module; the package gives the function
 # functions imported by name are timed where they are called
 of_strips = import_module("photostrip.pipeline.strips.photos")
+adjusting = import_module("photostrip.pipeline.strips.adjusting")
+by_covariance = import_module("photostrip.triangulation.covariance_adjustment.adjust")
 common = import_module("photostrip.pipeline.common_points")
 screened_formation = import_module("photostrip.pipeline.strips.screened_formation")
 strip_network = import_module("photostrip.triangulation.gross_errors.rays.strip_network")
@@ -244,6 +246,8 @@ STAGES = (
     ("screening of control", control_screening, "screen_control"),
     ("absolute orientation", absolute_orientation, "orient"),
     ("polynomial", correction, "fit"),
+    ("adjustment by the covariance", by_covariance, "adjust"),
+    ("choice of the method", adjusting, "choose"),
     ("resection", of_strips, "resect"),
     ("points of all strips", common, "_joined"),
     ("differences at given points", pipeline, "compare_with_given"),
