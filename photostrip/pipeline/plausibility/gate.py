@@ -91,7 +91,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         from photostrip.pipeline.plausibility import shared_errors  # a strip needs nothing of a bundle
 
         findings += shared_errors.of_bundle(result.bundle, inputs)
-    findings += shared_control.find_shared_errors(stages, findings)
+    findings += shared_control.find_shared_errors(stages, findings, joined=result.bundle is not None)
     return accepted(findings, settings.accept)
 
 

@@ -24,11 +24,15 @@ if TYPE_CHECKING:
 SHOWN_SIGMAS = 4.0  # standard deviations from which a shift in plan is one
 
 
-def find_shared_errors(strips: Sequence[StripResult], findings: Sequence[Finding]) -> Iterator[Finding]:
+def find_shared_errors(
+    strips: Sequence[StripResult], findings: Sequence[Finding], *, joined: bool = False
+) -> Iterator[Finding]:
     """Name what the control of strips shares (P105, P107, P404, P407).
 
     findings: what was found before: a strip whose distance is named already, or whose control is misread, is not named.
+    joined: whether a bundle has adjusted the strips, and tested control point by point after all.
     """
+    then = "" if joined else "; no control was tested by itself"
     if any(each.severity == ERROR and each.key.startswith("control[") for each in findings):
         return  # a list that is misread
     misread = {name for each in findings if each.severity == ERROR for name in each.strips}
@@ -38,12 +42,12 @@ def find_shared_errors(strips: Sequence[StripResult], findings: Sequence[Finding
         if shared is None or strip is None or strip.id in misread:
             continue
         if isinstance(shared, ShiftedList):
-            yield _shifted(strip, shared, each)
+            yield _shifted(strip, shared, each, then)
         elif strip.id not in named:
-            yield _stretched(strip, shared)
+            yield _stretched(strip, shared, then)
 
 
-def _shifted(strip: Strip, shared: ShiftedList, result: StripResult) -> Finding:
+def _shifted(strip: Strip, shared: ShiftedList, result: StripResult, then: str) -> Finding:
     plan = bool((np.abs(shared.shift) > SHOWN_SIGMAS * shared.sigma)[:2].any())
     steps = [
         f"{step:+.2f} m {axis} (standard deviation {sigma:.2g} m)"
@@ -53,10 +57,7 @@ def _shifted(strip: Strip, shared: ShiftedList, result: StripResult) -> Finding:
     control = result.control
     points = tuple(name for name, number in zip(control.ids, control.frame, strict=True) if number == shared.number)
     key = f"control[{shared.number}]"
-    message = (
-        f"{key} lies beside the other control of strip {strip.id}, all of it by {', '.join(steps)}; no control was "
-        "tested by itself"
-    )
+    message = f"{key} lies beside the other control of strip {strip.id}, all of it by {', '.join(steps)}{then}"
     fix = (
         "is its crs the right one: zone, datum, false easting?"
         if plan
@@ -71,13 +72,13 @@ def _shifted(strip: Strip, shared: ShiftedList, result: StripResult) -> Finding:
     return found(code, message, fix, evidence, points=points, strips=(strip.id,), key=key)
 
 
-def _stretched(strip: Strip, stretch: StretchedHeights) -> Finding:
+def _stretched(strip: Strip, stretch: StretchedHeights, then: str) -> Finding:
     given, factor = strip.camera.principal_distance, 1.0 / (1.0 + stretch.share)
     sigma = given * stretch.sigma * factor**2
     message = (
         f"the heights of strip {strip.id} are stretched by {100 * stretch.share:+.2f} % against its control, as by a "
         f"wrong principal distance: {given * factor:.2f} mm would fit (standard deviation {sigma:.2g} mm), "
-        f"{given:g} mm is given; no control was tested by itself"
+        f"{given:g} mm is given{then}"
     )
     numbers: Evidence = {"heights_stretched": stretch.share, "standard_deviation_mm": sigma}
     return other_distance(strip.camera, given * factor, message, FIX, numbers, (strip.id,))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import Result
 
 
-def two_lists(shift: Sequence[float], *errors: GrossError) -> Result:
+def two_lists(shift: Sequence[float], *errors: GrossError, adjustment: str = "auto") -> Result:
     """Adjust a strip of which every third control point stands in a second list, shifted as a whole."""
     spec = Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4), gross_errors=errors)
     simulation = simulate(spec)
@@ -28,7 +28,8 @@ def two_lists(shift: Sequence[float], *errors: GrossError) -> Result:
     second = np.arange(len(control)) % 3 == 0
     control = replace(control, frame=second.astype(np.intp), enu=control.enu + np.outer(second, shift))
     frames = (inputs.frames[0], replace(inputs.frames[0]))
-    return triangulate(replace(inputs, control=control, frames=frames), settings_of(simulation))
+    settings = replace(settings_of(simulation), adjustment=adjustment)
+    return triangulate(replace(inputs, control=control, frames=frames), settings)
 
 
 @pytest.mark.parametrize(("shift", "code"), [((2.0, 1.0, 0.0), "P407"), ((0.0, 0.0, 2.0), "P404")])
@@ -40,6 +41,16 @@ def test_a_list_that_lies_beside_the_others_is_named(shift: tuple[float, float, 
     assert finding.key == "control[1]"
     assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.3)
     assert result.strips[0].wrong_control == ()
+
+
+def test_a_bundle_names_the_list_and_rejects_its_points() -> None:
+    """The strips know it as they are formed; the bundle tests point by point, and does not say that it did not."""
+    result = two_lists((2.0, 1.0, 0.0), adjustment="bundle")
+    (finding,) = result.findings
+    assert (finding.code, finding.key) == ("P407", "control[1]")
+    assert "tested by itself" not in finding.message
+    assert result.bundle is not None
+    assert {each.kind for each in result.bundle.screened.rejections if not each.readmitted} == {"control"}
 
 
 def test_lists_that_go_together_share_nothing() -> None:
