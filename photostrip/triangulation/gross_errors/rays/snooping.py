@@ -141,6 +141,7 @@ class _Search:
         self.latest: dict[int, Rejection] = {}  # what was last said of rays outside
         self.back: set[int] = set()  # points that came back; what must go again stays out
         self.decided = Selection.everything(problem)  # what took part when rays outside were decided on
+        self.beyond = np.full(problem.points, np.inf)  # test values of points with a ray outside, when decided on
         self.rounds = 0
         self.common: list[CommonError] = []
         self.next_trial = 0  # given coordinates that are out when a common error, tried in vain, is tried again
@@ -335,12 +336,14 @@ class _Search:
         changed = np.full(self.problem.photos, done.selection.given != self.decided.given)
         changed[self.problem.images.photo[images != self.decided.images]] = True
         self.decided = done.selection
-        for number in np.unique(point[~images & changed[self.problem.images.photo]]).tolist():
+        within = self.beyond <= limit.of(np.diff(self.first))  # the limit rises where less is established
+        for number in np.unique(point[~images & (changed[self.problem.images.photo] | within[point])]).tolist():
             rows = self.rays_of(number)
             placed = images[rows].sum() > 1
             place = done.solution.points[number] if placed else self._meeting(done.solution, rows)
             decision = self._decided(done, rows, limit, place)
             self.latest |= {each.row: each for each in self._rejected(rows, decision, limit)}
+            self.beyond[number] = decision.value / limit.unit
             if number not in self.back and (~decision.out & ~images[rows]).any():
                 self.back.add(number)
                 xyz[number] = place

@@ -85,6 +85,21 @@ def test_control_that_began_outside_with_its_rays_tells_which_is_wrong(problem: 
     assert [each.cause for each in done.rejections if each.row == wrong and each.kind == "image"] == [WRONG_RAY]
 
 
+@pytest.mark.parametrize(("part", "back"), [(0.99, True), (1.01, False)])
+def test_a_point_comes_back_once_the_limit_has_risen_above_it(
+    problem: BundleProblem, part: float, *, back: bool
+) -> None:
+    """Also where no ray nearby has changed since it was decided on, at the limit of then."""
+    point = int(np.bincount(problem.images.point).argmax())
+    every = Selection.everything(problem)
+    search = snooping._Search(problem, every, BundleSettings(), None, rough=False)
+    done = search.adjust(replace(every, images=problem.images.point != point))
+    search.decided = done.selection
+    search.beyond[point] = part * done.limit.value
+    more = search.fitting(done)
+    assert (more is not None and more.images.all()) == back
+
+
 def test_redundancy_numbers_beyond_their_range_are_no_adjustment(problem: BundleProblem) -> None:
     """A strip that hangs free at a photo was factored all the same: |r| of 254, and 141 points were taken for wrong."""
     done = snooping.ScreenedBundle.of(problem, Selection.everything(problem), BundleSettings())
