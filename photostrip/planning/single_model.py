@@ -106,7 +106,7 @@ def _require_plan(control: ModelControl) -> None:
         raise GeometryError(message, code="plan-control")
     size = float(((xy - xy.mean(axis=0)) ** 2).sum())  # B
     if size <= CLOSEST * float((xy**2).sum()):
-        raise GeometryError("all control points in plan lie at one place", code="plan-control")
+        raise GeometryError("all control points with a plan position lie at one place", code="plan-control")
 
 
 def _require_heights(control: ModelControl) -> None:
@@ -118,7 +118,7 @@ def _require_heights(control: ModelControl) -> None:
     moments = control_xy.T @ control_xy
     area = moments[0, 0] * moments[1, 1] - moments[0, 1] ** 2
     if area <= FLATTEST * moments[0, 0] * moments[1, 1] or min(moments[0, 0], moments[1, 1]) == 0:
-        message = "all control points in height lie on one line: the tilt about it is not determined"
+        message = "all control points with a height lie on one line: the tilt about it is not determined"
         raise GeometryError(message, code="plan-control")
 
 

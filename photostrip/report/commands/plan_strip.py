@@ -53,8 +53,8 @@ def _facts(document: Document) -> tuple[tuple[str, str], ...]:
         (
             "measuring",
             (
-                f"{micrometres(document['image_sigma_um'])} µm; {counted(geometry['points'], 'point')}, at each nadir"
-                f" {counted(geometry['rows'], 'row')}"
+                f"{micrometres(document['image_sigma_um'])} µm; {counted(geometry['points'], 'point')},"
+                f" {counted(geometry['rows'], 'row')} at each nadir"
             ),
         ),
     ]
