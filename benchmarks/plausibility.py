@@ -354,7 +354,8 @@ def seen_in_heights(case: Case, change: float, sigmas: float | None = None) -> b
     d = enu[:, :2] - enu[:, :2].mean(axis=0)
     u, _, _ = np.linalg.svd(d, full_matrices=False)
     along = d @ np.linalg.svd(d)[2][0]
-    columns = np.column_stack([np.ones(len(d)), u, (along / np.abs(along).max()) ** 2, u[:, 0] * u[:, 1]])
+    along /= np.abs(along).max()
+    columns = np.column_stack([np.ones(len(d)), u, along**2, u.prod(axis=1)])
     left = enu[:, 2] - columns @ np.linalg.lstsq(columns, enu[:, 2], rcond=None)[0]
     freedom = len(left) - columns.shape[1] - 1
     if freedom < 3:

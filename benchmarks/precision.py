@@ -181,8 +181,7 @@ def drawn(inputs: Inputs, rng: np.random.Generator) -> Inputs:
 def displaced(found: tuple[Floats, Floats, Floats], true: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats]:
     """Displacements of points, (n, 3), and of centres with small rotations, (m, 6)."""
     turn = found[2] @ true[2].transpose(0, 2, 1)
-    vector = np.column_stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0],
-                              turn[:, 1, 0] - turn[:, 0, 1]]) / 2  # fmt: skip
+    vector = (turn - turn.transpose(0, 2, 1))[:, [2, 0, 1], [1, 2, 0]] / 2
     return found[0] - true[0], np.column_stack([found[1] - true[1], vector])
 
 

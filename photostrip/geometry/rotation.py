@@ -167,9 +167,8 @@ def cross_matrix(vector: ArrayLike) -> Floats:
 def to_vector(matrix: ArrayLike) -> Floats:
     """Vector (..., 3) of a rotation by less than 180 degrees; the inverse of ``from_vector``."""
     a = np.asarray(matrix, float)
-    sine = 0.5 * np.stack(
-        [a[..., 2, 1] - a[..., 1, 2], a[..., 0, 2] - a[..., 2, 0], a[..., 1, 0] - a[..., 0, 1]], axis=-1
-    )
+    twice = a - a.swapaxes(-1, -2)
+    sine = 0.5 * np.stack([twice[..., 2, 1], twice[..., 0, 2], twice[..., 1, 0]], axis=-1)
     length = np.linalg.norm(sine, axis=-1)
     angle = np.arctan2(length, 0.5 * (np.trace(a, axis1=-2, axis2=-1) - 1.0))
     small = length < 1e-9  # noqa: PLR2004  there the vector and its sines are the same

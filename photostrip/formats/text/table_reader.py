@@ -349,8 +349,8 @@ class _Reader:
 
     def _note_blanks(self, column: Column, written: list[str], codes: Numbers, lines: Numbers) -> None:
         padded = np.array([name != name.strip() for name in written])
-        rows = np.flatnonzero(padded[codes])
-        example = shown(written[codes[rows[0]]])
+        rows: list[int] = np.flatnonzero(padded[codes]).tolist()
+        example = shown(written[int(codes[rows[0]])])
         message = f"blanks around the id of a {column.name} removed in {counted(len(rows), 'row')}, here `{example}`"
         name = self.source.header.get(column.name, column.name)
         note = Note("stray-blanks", message, "note", file=self.source.file, line=int(lines[rows[0]]), key=name)

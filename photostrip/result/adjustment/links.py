@@ -82,7 +82,7 @@ def _links(result: Result, strip: StripResult) -> list[Document]:
         worst = used[np.argmax(links.value[used])]
         size = np.array([rms(column) for column in gap[used].T])
         redundancy = int(solved.redundancy[number])
-        link = {
+        link: Document = {
             "strip": strip.strip.id,
             "photo": strip.strip.photos[number + 1],
             "before": names[number],

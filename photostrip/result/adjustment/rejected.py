@@ -129,10 +129,9 @@ def _from_junctions(strip: StripResult, observations: PhotoPoints) -> list[Docum
     """Pass points that did not belong in a scale transfer; the error as that of an x parallax in one of the models."""
     stages, ids = strip.of_photos, observations.point_ids
     joined, oriented = stages.formed.junctions, stages.orientation
-    out = np.flatnonzero(~joined.used).tolist()
-    rows = np.array(
-        sorted(out, key=lambda row: (int(joined.junction[row]), natural(ids[int(joined.point[row])]))), np.intp
-    )
+    out: list[int] = np.flatnonzero(~joined.used).tolist()
+    out.sort(key=lambda row: (int(joined.junction[row]), natural(ids[int(joined.point[row])])))
+    rows = np.array(out, np.intp)
     base, _ = oriented.relative
     deviation = joined.ratio[rows] / joined.factor[joined.junction[rows]] - 1
     depth = depths(stages.formed.vectors[joined.after[rows]], base[joined.junction[rows] + 1])

@@ -53,7 +53,7 @@ def base_rays(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
     """
     al1, ka1, al2, om2, ka2 = elements.T
     rotations = (from_alpha_omega_kappa(al1, 0.0, ka1), from_alpha_omega_kappa(al2, om2, ka2))
-    turned = []
+    turned: list[Floats] = []
     for rotation, xy in zip(rotations, (pairs.left, pairs.right), strict=True):
         a = rotation.transpose(1, 2, 0)[:, :, pairs.pair]  # 3 x 3 x m
         turned.append(a[:, 0] * xy[:, 0] + a[:, 1] * xy[:, 1] - a[:, 2] * pairs.focal)  # eq. 137

@@ -47,12 +47,13 @@ def bridge(
     found, numbers = np.flatnonzero(sound), np.asarray(point[count > 1], np.intp)
     every = np.concatenate([formed.point, numbers[found]])
     order = np.argsort(every, kind="stable")
+    home = np.concatenate([np.full(len(formed.point), -1), at[found, 0]])
     return replace(
         formed,
         point=every[order],
         xyz=np.concatenate([formed.xyz, xyz[found]])[order],
         model_count=np.concatenate([formed.model_count, np.zeros(len(found), np.intp)])[order],
-        home=np.concatenate([np.full(len(formed.point), -1), at[found, 0]])[order],
+        home=home[order],
         bridging=np.sort(rows[np.isin(observations.point[rows], numbers[found])]),
     )
 
