@@ -161,7 +161,8 @@ def precision_beyond_control(strip: Strip, rows: Numbers, adjusted: CovarianceAd
         return
     along, at = adjusted.xyz[:, 0], adjusted.xyz[rows, 0]
     beyond = np.maximum(at.min() - along, along - at.max())
-    if beyond.max() <= BEYOND_COVARIANCE * np.ptp(at):
+    base = np.linalg.norm(np.diff(adjusted.centers, axis=0), axis=1).mean()
+    if beyond.max() <= max(BEYOND_COVARIANCE * np.ptp(at), base):
         return
     variance = np.diagonal(adjusted.points, axis1=1, axis2=2)
     sigma = np.sqrt(np.column_stack([variance[:, :2].mean(axis=1), variance[:, 2]]))
