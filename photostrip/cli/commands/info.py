@@ -49,13 +49,10 @@ def sources(
         from photostrip.report.commands.sources import sources_report
 
         if write is not None:
-            from photostrip.errors import Fault, InputError
+            from photostrip.formats.text.files import MEGABYTE, decode, read_bytes
             from photostrip.formats.text.writing import write_text
 
-            try:
-                page = write.read_text(encoding="utf-8")
-            except OSError as error:
-                raise InputError(Fault(f"cannot be read: {error.strerror}", "file", file=str(write))) from None
+            page, _ = decode(str(write), read_bytes(str(write), 10 * MEGABYTE))
             write_text(write, with_tables(page, str(write)))
             return
         rendering = documents.Rendering(

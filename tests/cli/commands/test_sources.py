@@ -78,7 +78,7 @@ def test_every_form_has_every_table(capsys: pytest.CaptureFixture[str]) -> None:
 def test_another_page_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     other = tmp_path / "notes.md"
     assert main(["sources", "--write", str(other)]) == 2
-    assert "cannot be read" in capsys.readouterr().err
+    assert "does not exist" in capsys.readouterr().err
     other.write_text("# notes\n", encoding="utf-8")
     assert main(["sources", "--write", str(other)]) == 2
     assert "has no table below the heading ## From an equation to a command" in capsys.readouterr().err
