@@ -131,6 +131,7 @@ def test_mutations_prints_changes_and_who_notices_them(monkeypatch: pytest.Monke
     assert re.search(r"^\| geometry \| 1 \| 1 \|\n\| all \| 1 \| 1 \|$", out, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_gross_errors_prints_two_tables_for_one_project() -> None:
     out = printed("gross_errors.py", "1", "--kind", "models", "--workers", "1", "--first-seed", "2")
     assert len(re.findall(r"^models +(?:without errors|errors, \w+)(?: +\d+\.\d{3}){5} +[01]$", out, re.MULTILINE)) == 4
@@ -165,6 +166,7 @@ def test_screening_prints_how_the_time_grows() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_ablation_changes_constants_where_they_are_imported_and_everything_it_switches_off_exists() -> None:
     program = """
 import sys

@@ -62,6 +62,7 @@ def _written(values: ast.expr) -> bool:
     return found
 
 
+@pytest.mark.slow
 def test_no_test_loops_over_nothing() -> None:
     files = nonempty((ROOT / "tests").rglob("test_*.py"))
     found = {str(file.relative_to(ROOT)): unguarded(file.read_text(encoding="utf-8")) for file in files}

@@ -95,6 +95,7 @@ def test_the_probe_of_loaded_packages_can_see_one() -> None:
     assert loaded_after("import photostrip, yaml", HEAVY) == {"yaml"}
 
 
+@pytest.mark.slow
 def test_a_plain_run_loads_no_room_that_it_does_not_enter() -> None:
     names = python(
         "import sys\nfrom photostrip.cli.main import main\n"
@@ -111,6 +112,7 @@ def test_a_plain_run_loads_no_room_that_it_does_not_enter() -> None:
     assert not {"photostrip.report.html", "photostrip.cli.jobs.method_comparison"} & set(names)
 
 
+@pytest.mark.slow
 def test_a_strip_without_gross_errors_is_run_without_the_bundle_and_scipy() -> None:
     names = python(
         "import sys\nfrom photostrip.cli.main import main\n"
@@ -124,6 +126,7 @@ def test_a_strip_without_gross_errors_is_run_without_the_bundle_and_scipy() -> N
 DROP = "--set=processing.relative.drop=[1007/1007-1, 1015/1015-7]"  # the gross errors of the sample
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "most"),
     [(("run", DROP, "--quiet"), 270), (("check",), 225), (("run", "--help"), 40)],
@@ -140,6 +143,7 @@ def test_modules_are_a_budget(arguments: tuple[str, ...], most: int) -> None:
     assert not {"rich", "scipy", "jinja2", "matplotlib"} & {name.partition(".")[0] for name in loaded}
 
 
+@pytest.mark.slow
 def test_reading_a_project_does_not_load_the_walk() -> None:
     code = "import sys, photostrip.project.loading\nprint('photostrip.pipeline.run' in sys.modules)"
     assert python(code) == "False"

@@ -265,6 +265,7 @@ def test_a_cluster_without_workers_is_waited_for_aloud(tmp_path: Path) -> None:
 # ----------------------------------------------------------------------------------------------- no cluster
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("address", "message"),
     [

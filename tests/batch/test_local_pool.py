@@ -75,6 +75,7 @@ def test_a_worker_that_has_grown_is_replaced(tmp_path: Path) -> None:
     assert answers[1].megabytes > 200.0
 
 
+@pytest.mark.slow
 def test_workers_are_gone_when_the_pool_is(tmp_path: Path) -> None:
     (task,) = tasks_of(tmp_path, ["hang"])
     stop: list[bool] = []

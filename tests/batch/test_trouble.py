@@ -81,6 +81,7 @@ def test_a_disk_that_is_full_for_a_while_costs_those_projects_only(
     assert tree(here / "out") == tree(here / "whole")
 
 
+@pytest.mark.slow
 def test_a_disk_that_stays_full_ends_the_batch(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -117,6 +118,7 @@ def test_files_that_the_system_cuts_off(here: Path) -> None:
     assert left <= {".batch.lock", "summary.txt", "summary.csv", "summary.json", "junit.xml"}
 
 
+@pytest.mark.slow
 def test_an_output_that_must_not_be_written_to_is_refused_at_once(here: Path) -> None:
     (here / "out").mkdir(mode=0o555)
     done = batch(here, "strips", "-o", "out")

@@ -53,6 +53,7 @@ def test_text_and_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> N
     assert "wrote the result of bundle" in err
 
 
+@pytest.mark.slow
 def test_a_method_that_is_refused_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Two control points are too few for any method; one adjustment alone fails with its own exit code."""
     folder = ROOT / "sample_data" / "simulated-20"

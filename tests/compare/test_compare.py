@@ -193,6 +193,7 @@ def test_feet_are_told_in_metres() -> None:
     assert (plan[0], height[0]) == pytest.approx((1.524, 0.3048))
 
 
+@pytest.mark.slow
 @given(
     angle=st.floats(1e-7, 170.0),
     axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.1),

@@ -27,6 +27,7 @@ def moved(spec: FrameSpec, output: FrameSpec) -> np.ndarray:
     return np.asarray((there - PLACE)[0] * METRES_IN_DEGREE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dated", ["list", "output"])
 def test_europe_moves_north_east_by_the_epoch(dated: str) -> None:
     """About 2.5 cm a year against ITRF, on whichever side the epoch stands."""
@@ -63,6 +64,7 @@ def test_a_change_of_datum_is_told_with_its_accuracy_and_area() -> None:
     assert "epoch-missing" not in told
 
 
+@pytest.mark.slow
 def test_an_epoch_is_asked_for_where_it_matters() -> None:
     """Ten years are 0.3 m, the control is good to 0.05 m."""
     told = notes("EPSG:25832", ITRF2020)

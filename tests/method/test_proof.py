@@ -135,6 +135,7 @@ def assert_exact(found: Recovery) -> None:
 # ------------------------------------------------------------------------------------------------ free of errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("photos", [3, 10, 50, 200])
 def test_a_strip_of_any_length_comes_back(photos: int) -> None:
     assert_exact(recovered(exact(Spec(flight=Flight(photos=photos)))))
@@ -334,6 +335,7 @@ def test_whatever_is_flown_comes_back(
     assert_exact(recovered(exact(spec)))
 
 
+@pytest.mark.slow
 def test_points_common_to_strips_agree() -> None:
     found = recovered(exact(Spec(flight=Flight(photos=8, strips=3, side_lap_percent=35.0))))
     ties = found.result.ties
@@ -441,6 +443,7 @@ def test_errors_are_proportional_to_the_noise(sigma_um: float) -> None:
     np.testing.assert_allclose(10 * small, large, rtol=0, atol=0.1 * np.abs(large).max())
 
 
+@pytest.mark.slow
 def test_relative_orientation_finds_the_noise() -> None:
     """Mean over many pairs of the estimated variance, with its own standard error."""
     spec = replace(strip_of(200, 20), seed=3)

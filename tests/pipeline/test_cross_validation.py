@@ -30,6 +30,7 @@ def without_checks(bands: int = 3) -> Inputs:
     return inputs_of(simulate(replace(wanted, seed=11, control=replace(wanted.control, check=0))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adjustment", ADJUSTMENTS)
 def test_a_fold_is_the_run_without_its_point(adjustment: str) -> None:
     inputs, settings = without_checks(), Settings(adjustment=adjustment)
@@ -48,6 +49,7 @@ def test_a_fold_is_the_run_without_its_point(adjustment: str) -> None:
         assert [rows[name][f"sigma_{axis}"] for axis in "xyz"] == [point[f"sigma_{axis}"] for axis in "xyz"]
 
 
+@pytest.mark.slow
 def test_it_verifies_what_has_no_check_points() -> None:
     plain = solved(without_checks()).document
     assert plain["status"] == UNVERIFIED
@@ -63,6 +65,7 @@ def test_it_verifies_what_has_no_check_points() -> None:
     }
 
 
+@pytest.mark.slow
 def test_the_strips_are_formed_once_and_the_adjustments_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     formed = []
 
@@ -84,6 +87,7 @@ def test_the_strips_are_formed_once_and_the_adjustments_are_bounded(monkeypatch:
     assert min(abs(place[first] - place[second]) for first, second in nonempty(pairs)) > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("metres", "status"), [(0.0, GOOD), (3.0, LOOK)])
 def test_a_wrong_height_among_five_points_is_not_good(metres: float, status: str) -> None:
     """Corners and middle: what control cannot check itself is seen where it is left out."""
@@ -95,6 +99,7 @@ def test_a_wrong_height_among_five_points_is_not_good(metres: float, status: str
     assert document["status"] == status, document["verdict"]
 
 
+@pytest.mark.slow
 def test_control_that_contradicts_what_is_predicted_is_not_good() -> None:
     inputs = without_checks()
     # stated ten times better than it is: 0.5 m for 0.05 m
@@ -120,6 +125,7 @@ def test_control_that_cannot_be_spared_verifies_nothing() -> None:
     assert "the control left out in turn cannot (" in document["verdict"]["verification"]
 
 
+@pytest.mark.slow
 def test_independent_models_too() -> None:
     wanted = spec("projected")
     inputs = inputs_of(simulate(replace(wanted, models=Models(), control=replace(wanted.control, check=0))))
@@ -128,6 +134,7 @@ def test_independent_models_too() -> None:
     assert 0.4 < document["cross_validation"]["height"]["ratio"] < 2.0
 
 
+@pytest.mark.slow
 def test_without_standard_deviations_nothing_is_predicted_but_differences_are_there() -> None:
     document = solved(without_checks(), replace(TURNED, precision=False)).document
     block = document["cross_validation"]

@@ -44,6 +44,7 @@ def test_a_table_of_cameras_that_no_strip_has_is_refused_by_name(table: str, adj
         triangulate(inputs, replace(settings_of(done), adjustment=adjustment))
 
 
+@pytest.mark.slow
 def test_a_strip_that_falls_apart_when_it_is_formed_again_keeps_its_last_form() -> None:
     """A mirrored photo: image coordinates that the adjustment corrects by centimetres put points behind the cameras."""
     flight = Flight(photos=5, end_lap_percent=75.0)

@@ -40,6 +40,7 @@ def levelled(directory: Path) -> Inputs:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
 def test_a_geoid_grid_beside_the_project_is_found_with_refraction(adjustment: str, tmp_path: Path) -> None:
     inputs, settings = levelled(tmp_path), Settings(adjustment=adjustment, refinement=REFRACTED)

@@ -32,6 +32,7 @@ def test_three_bands_of_three_check_each_other(method: str) -> None:
     assert remarks(Control(bands=3), method) == []
 
 
+@pytest.mark.slow
 def test_a_block_is_looked_at_as_a_whole() -> None:
     """Its strips hold each other."""
     assert remarks(Control(bands=3), "bundle", photos=6, strips=3) == []

@@ -132,6 +132,7 @@ def measured_model(errors: Floats) -> Floats:
     return error
 
 
+@pytest.mark.slow
 def test_the_rigorous_formulas_are_the_scatter_of_exact_models() -> None:
     rng = np.random.default_rng(6)
     errors = np.array([measured_model(drawn) for drawn in orthogonal_normal(rng, 352, 24 + 4 * len(WHERE))])
@@ -258,6 +259,7 @@ def test_which_points_determine_the_surface(xy: Floats, *, enough: bool) -> None
             fit_paraboloid(xy, np.zeros(len(xy)), 1.0)
 
 
+@pytest.mark.slow
 def test_t_values_are_student_distributed_without_deformation_and_see_a_real_one() -> None:
     rng = np.random.default_rng(5)
     xy = np.vstack([SIX, FIVE[4:], [[20.0, 30.0], [55.0, -40.0]]])

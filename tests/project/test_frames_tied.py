@@ -32,6 +32,7 @@ def test_a_run_ties_its_frames_once(overrides: tuple[str, ...], monkeypatch: pyt
     assert len(calls) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "overrides", [ED50, ("output.crs=EPSG:32634",), ("control[0].crs=local", "processing.earth_curvature=model")]
 )
@@ -45,6 +46,7 @@ def test_what_is_overridden_counts(overrides: tuple[str, ...]) -> None:
     assert np.abs(found.points.ground - plain.points.ground).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_each_project_has_its_own_datum_shift(tmp_path: Path) -> None:
     """PROJ goes from ED50 to WGS 84 by one operation in Germany and by another in Spain."""
     south = tmp_path / "south"

@@ -450,6 +450,7 @@ def test_schemas_of_plans_know_every_key(kind: str, capsys: pytest.CaptureFixtur
     assert all("description" in each for each in nonempty(schema["properties"].values()))
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_strip_has_one_legend(capsys: pytest.CaptureFixture[str]) -> None:
     document = json.loads(
         answer(capsys, "plan", "strip", "--models", "3", "--methods", "similarity", "--format", "json")

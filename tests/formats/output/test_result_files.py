@@ -66,6 +66,7 @@ def with_odd_ids() -> Document:
     return solved(replace(inputs, observations=renamed, control=control, strips=strips)).document
 
 
+@pytest.mark.slow
 def test_json_gives_back_the_document() -> None:
     for document in (case("projected", 2).document, with_odd_ids()):
         assert json.loads(to_json(document)) == document

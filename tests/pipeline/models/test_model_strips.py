@@ -340,6 +340,7 @@ def test_check_points_lie_within_what_is_stated() -> None:
     assert 0.85 < squares / coordinates < 1.15  # of 650 coordinates
 
 
+@pytest.mark.slow
 def test_precision_of_points_of_two_strips() -> None:
     spec = Spec(flight=Flight(photos=6, strips=2), models=Models())
     given = inputs_of(simulate(spec))

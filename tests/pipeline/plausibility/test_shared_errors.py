@@ -70,6 +70,7 @@ def lost(result: Result) -> list[str]:
     return [each.kind for each in result.bundle.screened.rejections if each.kind != "image" and not each.readmitted]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [(10.0, 0.0, 0.0), (7.0, -7.0, 0.0), (0.0, 0.0, 10.0)])
 @pytest.mark.parametrize("strips", [1, 2])
 def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shift: tuple[float, float, float]) -> None:
@@ -112,6 +113,7 @@ def test_a_principal_distance_off_by_a_percent_is_named() -> None:
     assert rms(simulation, result) < 0.4
 
 
+@pytest.mark.slow
 def test_single_wrong_positions_stay_single() -> None:
     """Two positions that are off take no offset of all with them."""
     shift = np.zeros((20, 3))
@@ -160,6 +162,7 @@ def test_wrong_control_points_are_no_principal_distance() -> None:
     assert len(result.strips[0].wrong_control) == 2
 
 
+@pytest.mark.slow
 def test_control_that_contradicts_the_positions_is_told_with_them() -> None:
     """Control off by 50 m everywhere: a drift of the positions is taken up, and the control rejected all the same."""
     _, result = adjusted(control=Control(bands=3, noise=(50.0, 50.0, 50.0)))

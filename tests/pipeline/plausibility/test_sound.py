@@ -35,6 +35,7 @@ def told(inputs: Inputs, settings: Settings) -> list[str]:
     return sorted({each.code for each in findings})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("photos", "camera_height"), [(40, 1500.0), (110, 4000.0)])
 def test_the_bend_of_a_long_strip_is_no_stretch_of_its_heights(photos: int, camera_height: float) -> None:
     """Level ground says nothing of the principal distance, however the strip bends."""
@@ -49,12 +50,14 @@ def test_the_bend_of_a_long_strip_is_no_stretch_of_its_heights(photos: int, came
     assert told(inputs_of(made), settings_of(made)) == []
 
 
+@pytest.mark.slow
 def test_a_strip_that_the_earth_bends_more_than_it_is_broad_is_sound() -> None:
     """550 km: the bend of 6 km is no breadth, and the breadth of 2 km no height."""
     made = simulate(Spec(seed=13, flight=Flight(photos=600), control=Control(every=15, per_band=3)))
     assert told(inputs_of(made), replace(settings_of(made), adjustment="covariance")) == []
 
 
+@pytest.mark.slow
 def test_strips_of_a_bundle_hold_each_other() -> None:
     """One line of control is weak for a strip by itself, and for a block that nothing else holds."""
     made = simulate(BLOCK)
@@ -66,6 +69,7 @@ def test_strips_of_a_bundle_hold_each_other() -> None:
     assert told(replace(one_strip, positions=positions(made)), BUNDLE) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", ["K", "G"])
 def test_a_bundle_says_whose_given_points_need_a_closer_look(role: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Strips are laid on their control only where the bundle does not agree with it."""
@@ -102,6 +106,7 @@ def test_one_control_list_outside_its_area_is_told_alone() -> None:
     assert told(inputs_of(made), settings_of(made)) == ["P402"]
 
 
+@pytest.mark.slow
 def test_a_start_may_be_far_off() -> None:
     """Orientations without influence are no observations: what they say of themselves matters where a run fails."""
     made = simulate(BLOCK)

@@ -52,6 +52,7 @@ def with_shared_ids(simulation: Simulation, inputs: Inputs, count: int, distance
     return replace(inputs, observations=changed), names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["polynomial", "bundle"])
 def test_ids_that_two_strips_share_by_mistake_are_named(method: str) -> None:
     """Three ids for points 50 m apart: the run was called good, and ties lay 50 m from each other."""

@@ -42,6 +42,7 @@ def tables(found: Document) -> list[Table]:
     return [part for each in sections_of(found, everything=True) for part in each.parts if isinstance(part, Table)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adjustment", ADJUSTMENTS)
 @pytest.mark.parametrize("unit", PER_DEGREE)
 def test_every_angle_of_every_table_has_the_unit(unit: str, adjustment: str) -> None:

@@ -104,6 +104,7 @@ def with_a_lens(seed: int, micrometres: float) -> dict[str, Any]:
     return document_of(triangulate(inputs, settings))
 
 
+@pytest.mark.slow
 def test_what_all_models_have_in_common_is_in_the_verdict() -> None:
     document = with_a_lens(1, 200.0)
     bending = document["common_deformation"]["bending"]
