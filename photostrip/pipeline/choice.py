@@ -28,7 +28,9 @@ class Witness:
     def ratio(self) -> float:
         """Covariance over polynomial, the geometric mean of plan and height."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.exp(np.nanmean(np.log(np.divide(self.covariance, self.polynomial)))))
+            logs = np.log(np.divide(self.covariance, self.polynomial))
+        known = logs[~np.isnan(logs)]
+        return float(np.exp(known.mean())) if len(known) else float("nan")
 
 
 @dataclass(frozen=True)

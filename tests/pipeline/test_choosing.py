@@ -10,6 +10,8 @@ import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import AUTO, METHODS, Result, triangulate
+from photostrip.pipeline.choice import POLYNOMIAL, Witness, method_of
+from photostrip.pipeline.strips import choosing
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.document import sections_of
 from photostrip.result.document import document_of
@@ -130,3 +132,15 @@ def test_the_result_says_what_was_taken_and_why() -> None:
     assert f"standard deviations of new points {first} with the polynomial, {second} with the covariance" in text
     assert "weighed and not taken: the strip was adjusted with its covariance" in text
     assert document_of(adjusted.__wrapped__("usual")) == document
+
+
+def test_witnesses_that_tell_nothing_leave_the_polynomial() -> None:
+    nothing = (float("nan"), float("nan"))
+    assert np.isnan(Witness(nothing, nothing, 0).ratio)
+    assert method_of(Witness(nothing, nothing, 0).ratio) == POLYNOMIAL
+    assert Witness((2.0, float("nan")), (1.0, 3.0), 1).ratio == pytest.approx(0.5)
+
+
+def test_a_variance_below_0_says_nothing() -> None:
+    assert np.isnan(choosing._root(-1e-12))
+    assert choosing._root(4.0) == 2.0

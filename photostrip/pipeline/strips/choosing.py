@@ -61,8 +61,13 @@ def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: Covarianc
         np.diagonal(each, axis1=1, axis2=2).mean(axis=0)
         for each in (after * covariance.factor, covariance.points[points])
     ]
-    first, second = ((float(np.sqrt(v[:2].mean())), float(np.sqrt(v[2]))) for v in both)
+    first, second = ((_root(v[:2].mean()), _root(v[2])) for v in both)
     return Witness(first, second, len(points))
+
+
+def _root(variance: float) -> float:
+    """Give the standard deviation; NaN of a variance below 0, as a strip leaves it that hangs together by rounding."""
+    return float(np.sqrt(variance)) if variance >= 0 else float("nan")
 
 
 def _spread(rows: Numbers, most: int) -> Numbers:
