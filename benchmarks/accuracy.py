@@ -33,8 +33,8 @@ from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa:
 from photostrip.geodesy.tying import tie_frames  # noqa: E402
 from photostrip.geometry.rotation import from_vector  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
-from photostrip.simulate.simulation import simulate  # noqa: E402
-from photostrip.simulate.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
 from photostrip.triangulation.polynomial import correction, terms  # noqa: E402
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

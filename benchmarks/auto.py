@@ -33,8 +33,8 @@ from photostrip.pipeline.image_coordinates import correct, orient_interior  # no
 from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust  # noqa: E402
 from photostrip.pipeline.strips.forming import form_strips  # noqa: E402
-from photostrip.simulate.simulation import simulate  # noqa: E402
-from photostrip.simulate.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Inputs
     from photostrip.pipeline.results import StripResult
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
     Floats = NDArray[np.float64]
 

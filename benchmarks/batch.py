@@ -61,8 +61,8 @@ def write_strip(arguments: tuple[Path, int, int]) -> None:
     """Write one simulated strip."""
     from photostrip.formats.output.simulation import project_files
     from photostrip.formats.text.writing import write_files
-    from photostrip.simulate.simulation import simulate
-    from photostrip.simulate.spec import Control, Flight, Points, Spec
+    from photostrip.simulation.simulation import simulate
+    from photostrip.simulation.spec import Control, Flight, Points, Spec
 
     folder, seed, photos = arguments
     spec = Spec(

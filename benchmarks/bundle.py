@@ -26,7 +26,7 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 import numpy as np  # noqa: E402
 
 from benchmarks import peers  # noqa: E402
-from photostrip.simulate import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
+from photostrip.simulation import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of  # noqa: E402
 from photostrip.triangulation.bundle.solve import solve  # noqa: E402
 from tests.simulated_bundle import problem_of  # noqa: E402

@@ -25,15 +25,28 @@ from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geometry.rotation import angles, from_angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.points import locate
-from photostrip.simulate import DIGITAL, FILM, Control, Film, Flight, Gnss, Ground, Image, Models, Points, Spec, Terrain
-from photostrip.simulate.simulation import simulate
+from photostrip.simulation import (
+    DIGITAL,
+    FILM,
+    Control,
+    Film,
+    Flight,
+    Gnss,
+    Ground,
+    Image,
+    Models,
+    Points,
+    Spec,
+    Terrain,
+)
+from photostrip.simulation.simulation import simulate
 from photostrip.triangulation.bundle.settings import BundleSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from photostrip.pipeline import Inputs, Settings
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
     Rng = np.random.Generator
 

@@ -40,8 +40,8 @@ from photostrip.errors import PhotostripError  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.pipeline.inputs import CameraPositions  # noqa: E402
-from photostrip.simulate.simulation import simulate  # noqa: E402
-from photostrip.simulate.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Inputs, Result, Settings
     from photostrip.points import ControlPoints
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]

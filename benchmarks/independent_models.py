@@ -28,7 +28,7 @@ from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, tr
 from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.models import form_models, link_strip  # noqa: E402
 from photostrip.points import ModelPoints, PhotoPoints  # noqa: E402
-from photostrip.simulate import Control, Flight, Image, Models, Points, Simulation, Spec, simulate  # noqa: E402
+from photostrip.simulation import Control, Flight, Image, Models, Points, Simulation, Spec, simulate  # noqa: E402
 from photostrip.triangulation.independent_models.settings import LinkSettings  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import orient_unchecked  # noqa: E402

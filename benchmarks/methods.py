@@ -26,7 +26,7 @@ import numpy as np  # noqa: E402
 
 from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
-from photostrip.simulate import Control, Flight, Points, Spec, simulate  # noqa: E402
+from photostrip.simulation import Control, Flight, Points, Spec, simulate  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result
-    from photostrip.simulate import Simulation
+    from photostrip.simulation import Simulation
 
     Floats = NDArray[np.float64]
 

@@ -57,9 +57,9 @@ from photostrip.planning.strip_methods import (  # noqa: E402
     control_of,
 )
 from photostrip.points import ControlPoints  # noqa: E402
-from photostrip.simulate import Control as SimulatedControl  # noqa: E402
-from photostrip.simulate import Flight, Ground, Image, Spec, simulate  # noqa: E402
-from photostrip.simulate.spec import FILM  # noqa: E402
+from photostrip.simulation import Control as SimulatedControl  # noqa: E402
+from photostrip.simulation import Flight, Ground, Image, Spec, simulate  # noqa: E402
+from photostrip.simulation.spec import FILM  # noqa: E402
 from photostrip.triangulation.bundle.solve import solve  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402

@@ -27,8 +27,8 @@ from photostrip.geometry.rotation import angles, from_angles
 from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.pipeline.plausibility import gate
-from photostrip.simulate import DIGITAL, FILM, Control, Film, Flight, GrossError, Ground, Image, Points, Spec, Terrain
-from photostrip.simulate.simulation import simulate
+from photostrip.simulation import DIGITAL, FILM, Control, Film, Flight, GrossError, Ground, Image, Points, Spec, Terrain
+from photostrip.simulation.simulation import simulate
 from photostrip.triangulation.plausibility import KINDS
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Inputs, Settings
     from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
     Floats = NDArray[np.float64]
 

@@ -37,8 +37,8 @@ from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.pipeline import Settings, triangulate  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
-from photostrip.simulate.simulation import simulate  # noqa: E402
-from photostrip.simulate.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings  # noqa: E402

@@ -16,10 +16,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
-from photostrip import simulate
+from photostrip import simulation
 from photostrip.cli.main import main as photostrip
 from photostrip.formats.output.simulation import project_files
-from photostrip.simulate.simulation import simulate as simulated
+from photostrip.simulation.simulation import simulate as simulated
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 SEEDS = 8
@@ -73,16 +73,16 @@ def outcome(preset: str, seed: int, *options: str) -> Outcome:
     """Simulate a strip, run it with a preset and compare what was rejected with what is wrong."""
     kind = KINDS[preset]
     film = kind.camera == "film"
-    spec = simulate.Spec(
+    spec = simulation.Spec(
         name=preset,
         seed=seed,
-        camera=simulate.PRESETS[kind.camera],
-        flight=simulate.Flight(photos=8),
-        points=simulate.Points(extra_per_model=kind.points),
-        control=simulate.Control(bands=4, per_band=3, check=8, sigma=(0.01, 0.01, 0.02)),
-        image=simulate.Image(kind.sigma_um, unit="mm" if film else "px", y_axis="up" if film else "down"),
-        film=simulate.Film() if film else None,
-        gross_errors=(simulate.GrossError("image", count=3, size_um=GROSS * kind.sigma_um, axis="y"),),
+        camera=simulation.PRESETS[kind.camera],
+        flight=simulation.Flight(photos=8),
+        points=simulation.Points(extra_per_model=kind.points),
+        control=simulation.Control(bands=4, per_band=3, check=8, sigma=(0.01, 0.01, 0.02)),
+        image=simulation.Image(kind.sigma_um, unit="mm" if film else "px", y_axis="up" if film else "down"),
+        film=simulation.Film() if film else None,
+        gross_errors=(simulation.GrossError("image", count=3, size_um=GROSS * kind.sigma_um, axis="y"),),
         refraction=kind.refraction,
     )
     files = project_files(simulated(spec))

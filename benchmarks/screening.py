@@ -24,8 +24,8 @@ import numpy as np  # noqa: E402
 
 from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.pipeline.strips.screened_formation import form_screened  # noqa: E402
-from photostrip.simulate.simulation import simulate  # noqa: E402
-from photostrip.simulate.spec import Flight, GrossError, Points, Spec  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import Flight, GrossError, Points, Spec  # noqa: E402
 from photostrip.statistics import chi2_quantile  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays  # noqa: E402

@@ -46,8 +46,8 @@ from photostrip.project.loading import load_project  # noqa: E402
 from photostrip.report import chosen_sections, title_of  # noqa: E402
 from photostrip.report.page import console  # noqa: E402
 from photostrip.result.document import document_of  # noqa: E402
-from photostrip.simulate.simulation import simulate  # noqa: E402
-from photostrip.simulate.spec import Control, Flight, Gnss, Points, Spec  # noqa: E402
+from photostrip.simulation.simulation import simulate  # noqa: E402
+from photostrip.simulation.spec import Control, Flight, Gnss, Points, Spec  # noqa: E402
 from photostrip.triangulation import absolute_orientation  # noqa: E402
 from photostrip.triangulation.gross_errors.control import control_screening  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import screening  # noqa: E402

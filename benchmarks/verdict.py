@@ -24,8 +24,8 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.result.document import document_of
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Control, Flight, Points, Spec, Terrain
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Control, Flight, Points, Spec, Terrain
 from photostrip.threads import limit_threads
 
 ADJUSTMENTS = ("polynomial", "covariance", "bundle")

@@ -12,8 +12,8 @@ from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.precision.photo_precision import propagation
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Control, Flight, Image, Points, Spec
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 
 if TYPE_CHECKING:

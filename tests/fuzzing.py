@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from photostrip.cli.main import main
-from photostrip.simulate.spec import Gnss
+from photostrip.simulation.spec import Gnss
 from tests.project.samples import FILES, MARKED_FILES
 from tests.results import spec, write_project
 

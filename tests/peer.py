@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.simulate import Control, Flight, Points, Spec, simulate
+from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from tests.simulated_bundle import problem_of
 from tests.source_tree import ROOT
 

@@ -9,7 +9,7 @@ import argparse
 import os
 from pathlib import Path
 
-from photostrip.compare import baseline_of
+from photostrip.comparison import baseline_of
 from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.simulation import project_files
 from photostrip.pipeline import triangulate

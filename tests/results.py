@@ -10,8 +10,8 @@ from photostrip.formats.output.simulation import inputs_of, project_files
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.pipeline import Settings, triangulate
 from photostrip.result.document import document_of
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Control, Flight, GrossError, Ground, Image, Points, Spec
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Control, Flight, GrossError, Ground, Image, Points, Spec
 
 if TYPE_CHECKING:
     from pathlib import Path

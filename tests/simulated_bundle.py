@@ -19,7 +19,7 @@ from photostrip.triangulation.bundle.observations.problem import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
     Floats = NDArray[np.float64]
 

@@ -18,11 +18,11 @@ LAYERS = (
     {"arrays", "errors", "notes", "threads", "distributions", "visible"},
     {"points", "camera", "statistics", "geometry", "geodesy", "rejection"},
     {"triangulation", "terrestrial"},
-    {"simulate"},
+    {"simulation"},
     {"planning"},
     {"pipeline"},
     {"result"},
-    {"compare"},
+    {"comparison"},
     {"formats"},
     {"project"},
     {"report"},
@@ -36,8 +36,8 @@ LEAVES = {"report"}
 APART = {
     ("terrestrial", "triangulation"),
     ("triangulation", "terrestrial"),
-    ("compare", "triangulation"),
-    ("compare", "terrestrial"),
+    ("comparison", "triangulation"),
+    ("comparison", "terrestrial"),
 }
 
 

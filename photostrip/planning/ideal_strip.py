@@ -13,7 +13,7 @@ import numpy as np
 from photostrip.errors import Fault, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.notes import counted
-from photostrip.simulate import Control, Flight, Ground, Image, Points, Simulation, Spec, Terrain, simulate
+from photostrip.simulation import Control, Flight, Ground, Image, Points, Simulation, Spec, Terrain, simulate
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors, differentiate_strip
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_pairs
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs

@@ -1,6 +1,6 @@
 """Specifications of simulations: the YAML file, its keys, and the places of what is wrong with it.
 
-The keys are the fields of the classes of ``simulate``, whose defaults hold here too. Types are checked
+The keys are the fields of the classes of ``simulation``, whose defaults hold here too. Types are checked
 here, values there.
 """
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator
 
-from photostrip import camera, simulate
+from photostrip import camera, simulation
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.project.conversion import distortion_of, semi_axes
@@ -42,15 +42,15 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 SCHEMA_NUMBER = 1
-USUAL = simulate.Spec()
-USUAL_MODELS = simulate.Models()
-USUAL_FILM, USUAL_GNSS, USUAL_ERROR = simulate.Film(), simulate.Gnss(), simulate.GrossError("image")
+USUAL = simulation.Spec()
+USUAL_MODELS = simulation.Models()
+USUAL_FILM, USUAL_GNSS, USUAL_ERROR = simulation.Film(), simulation.Gnss(), simulation.GrossError("image")
 
 
 def _preset(value: str) -> str:
-    if value not in simulate.PRESETS:
-        expected = f"one of {', '.join(simulate.PRESETS)}"
-        fix = suggestion(value, simulate.PRESETS)
+    if value not in simulation.PRESETS:
+        expected = f"one of {', '.join(simulation.PRESETS)}"
+        fix = suggestion(value, simulation.PRESETS)
         raise wrong(f"`{shown(value)}` is no preset", code="word", expected=expected, fix=fix)
     return value
 
@@ -226,13 +226,13 @@ class SimulationFile(Section):
 class Specification:
     """A specification and where its values stand."""
 
-    spec: simulate.Spec
+    spec: simulation.Spec
     reading: Reading
 
-    def simulate(self) -> simulate.Simulation:
+    def simulate(self) -> simulation.Simulation:
         """Simulate what is specified, or raise all that cannot be simulated, each fault at its place in the file."""
         with self.reading.places():
-            return simulate.simulate(self.spec)
+            return simulation.simulate(self.spec)
 
 
 def load_specification(path: Path, overrides: Sequence[str] = ()) -> Specification:
@@ -246,23 +246,23 @@ def simulation_schema() -> dict[str, Any]:
     return described(SimulationFile, "photostrip simulation")
 
 
-def _spec(given: SimulationFile) -> simulate.Spec:
+def _spec(given: SimulationFile) -> simulation.Spec:
     """Turn the file into the plain specification."""
-    return simulate.Spec(
+    return simulation.Spec(
         name=str(given.name),
         seed=given.seed,
         camera=camera_of(given.camera),
-        ground=simulate.Ground(**_fields(given.ground) | {"ellipsoid": semi_axes(given.ground.ellipsoid)}),
-        flight=simulate.Flight(**_fields(given.flight)),
-        terrain=simulate.Terrain(**_fields(given.terrain)),
-        points=simulate.Points(**_fields(given.points)),
-        control=simulate.Control(**_fields(given.control)),
-        image=simulate.Image(**_fields(given.image)),
-        film=None if given.film is None else simulate.Film(**_fields(given.film)),
+        ground=simulation.Ground(**_fields(given.ground) | {"ellipsoid": semi_axes(given.ground.ellipsoid)}),
+        flight=simulation.Flight(**_fields(given.flight)),
+        terrain=simulation.Terrain(**_fields(given.terrain)),
+        points=simulation.Points(**_fields(given.points)),
+        control=simulation.Control(**_fields(given.control)),
+        image=simulation.Image(**_fields(given.image)),
+        film=None if given.film is None else simulation.Film(**_fields(given.film)),
         refraction=given.refraction,
-        gross_errors=tuple(simulate.GrossError(**_fields(each)) for each in given.gross_errors),
-        gnss=None if given.gnss is None else simulate.Gnss(**_fields(given.gnss)),
-        models=None if given.models is None else simulate.Models(**_fields(given.models)),
+        gross_errors=tuple(simulation.GrossError(**_fields(each)) for each in given.gross_errors),
+        gnss=None if given.gnss is None else simulation.Gnss(**_fields(given.gnss)),
+        models=None if given.models is None else simulation.Models(**_fields(given.models)),
     )
 
 
@@ -277,4 +277,4 @@ def camera_of(given: SimulatedCamera) -> camera.Camera:
     changed = {name: value for name, value in _fields(given).items() if value is not None and name != "preset"}
     if given.distortion is not None:
         changed["distortion"] = distortion_of(given.distortion)
-    return replace(simulate.PRESETS[given.preset], **changed)
+    return replace(simulation.PRESETS[given.preset], **changed)

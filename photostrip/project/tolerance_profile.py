@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import PlainValidator, WithJsonSchema
 
-from photostrip.compare import SetTolerance, Tolerance, Tolerances
+from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.text.numbers import NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.project.schema.for_editors import described

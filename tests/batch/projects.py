@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from photostrip.batch.evaluation import evaluate
 from photostrip.formats.output.simulation import project_files
 from photostrip.formats.text.writing import write_files
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Flight, Points, Spec
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Flight, Points, Spec
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from photostrip.cli.main import main
-from photostrip.simulate.spec import Points
+from photostrip.simulation.spec import Points
 from tests.loops import nonempty
 from tests.project.test_ids import ODD
 from tests.results import spec, write_project

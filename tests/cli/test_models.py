@@ -10,7 +10,7 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.formats.output.simulation import project_files
 from photostrip.formats.text.writing import write_files
-from photostrip.simulate import Flight, Models, Spec, simulate
+from photostrip.simulation import Flight, Models, Spec, simulate
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

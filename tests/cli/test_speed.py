@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.simulate.spec import Control, Flight, Points, Spec
+from photostrip.simulation.spec import Control, Flight, Points, Spec
 from tests.results import write_project
 from tests.source_tree import ROOT
 

@@ -12,8 +12,8 @@ from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import triangulate
-from photostrip.simulate import Flight, Ground, Spec
-from photostrip.simulate.simulation import simulate
+from photostrip.simulation import Flight, Ground, Spec
+from photostrip.simulation.simulation import simulate
 
 ETRS89, ITRF2020 = FrameSpec("EPSG:4937", GROUND_AXES), FrameSpec("EPSG:9989", GROUND_AXES)
 PLACE = np.array([[11.5, 48.2, 500.0]])  # Munich

@@ -1,7 +1,7 @@
 """The whole method against known truth: free of errors it comes back exactly, with errors as theory says, and what must
 not influence the result does not.
 
-The photos are made by the collinearity equations in geocentric space (``simulate``, which has its own
+The photos are made by the collinearity equations in geocentric space (``simulation``, which has its own
 proof against formulas written apart); nothing of the method is used in making them.
 """
 
@@ -23,7 +23,7 @@ from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.result.document import document_of
-from photostrip.simulate import (
+from photostrip.simulation import (
     DIGITAL,
     FILM,
     Control,

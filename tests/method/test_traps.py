@@ -14,7 +14,7 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.simulate import Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
+from photostrip.simulation import Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.polynomial import correction
 from tests.loops import nonempty

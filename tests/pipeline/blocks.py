@@ -12,7 +12,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import angles
 from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
-from photostrip.simulate import Control, Gnss, Image, Spec, simulate
+from photostrip.simulation import Control, Gnss, Image, Spec, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Inputs, Result
-    from photostrip.simulate import Simulation
+    from photostrip.simulation import Simulation
 
     Floats = NDArray[np.float64]
 

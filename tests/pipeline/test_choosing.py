@@ -15,7 +15,7 @@ from photostrip.pipeline.strips import choosing
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.document import sections_of
 from photostrip.result.document import document_of
-from photostrip.simulate import Control, Flight, Points, Spec, simulate
+from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
 from tests.loops import nonempty
 

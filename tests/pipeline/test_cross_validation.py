@@ -15,8 +15,8 @@ from photostrip.pipeline.strips import forming
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.report import sections_of
 from photostrip.result.verdict import GOOD, LOOK, UNVERIFIED
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Models
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Models
 from tests.loops import nonempty
 from tests.results import solved, spec
 

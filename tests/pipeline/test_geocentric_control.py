@@ -13,7 +13,7 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, Result, triangulate
 from photostrip.result.document import document_of
-from photostrip.simulate import Control, Flight, Ground, Spec, simulate
+from photostrip.simulation import Control, Flight, Ground, Spec, simulate
 
 MILLIMETRE = 1e-3  # m
 SIGMA = (0.05, 0.05, 0.05)  # alike in all directions: turning the axes changes nothing

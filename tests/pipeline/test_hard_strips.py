@@ -9,7 +9,7 @@ import pytest
 from photostrip.errors import InputError
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
-from photostrip.simulate import Control, Flight, Points, Spec, simulate
+from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from tests.pipeline import blocks
 
 

@@ -13,7 +13,7 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.strips.notes import polynomial_notes
 from photostrip.result.document import document_of
-from photostrip.simulate import Control, Flight, Spec, simulate
+from photostrip.simulation import Control, Flight, Spec, simulate
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Inputs, Strip

@@ -18,8 +18,8 @@ from photostrip.formats.output.result_files import rejected_csv
 from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
 from photostrip.pipeline import triangulate
 from photostrip.result.document import document_of
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Control, Flight, GrossError, Points, Spec
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Control, Flight, GrossError, Points, Spec
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from photostrip.pipeline import Inputs
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
 STAGES = {"relative", "rays", "control"}
 

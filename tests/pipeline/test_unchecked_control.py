@@ -8,8 +8,8 @@ import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
-from photostrip.simulate import Control, Flight, Spec
-from photostrip.simulate.simulation import simulate
+from photostrip.simulation import Control, Flight, Spec
+from photostrip.simulation.simulation import simulate
 
 
 def remarks(control: Control, method: str, photos: int = 8, strips: int = 1) -> list[str]:

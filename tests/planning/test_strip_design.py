@@ -16,7 +16,7 @@ from photostrip.planning.ideal_strip import StripGeometry, ideal_strip
 from photostrip.planning.placement import Placement, Required, best_places, equal_ways, worst
 from photostrip.planning.strip_design import Design, along_the_strip, bands_needed, outcome, plan_strip
 from photostrip.planning.strip_methods import BUNDLE, COVARIANCE, METHODS, SIMILARITY, accuracy
-from photostrip.simulate import FILM, Points
+from photostrip.simulation import FILM, Points
 from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
 from tests.loops import nonempty
 

@@ -11,8 +11,8 @@ from photostrip.formats.output.simulation import project_files
 from photostrip.formats.text.writing import write_files
 from photostrip.pipeline import triangulate
 from photostrip.project.loading import load_project
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Flight, Spec
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Flight, Spec
 from tests.loops import nonempty
 from tests.project.samples import FILES, Sample
 

@@ -11,8 +11,8 @@ import pytest
 from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.formats.text.findings import Findings
-from photostrip.simulate import Flight, Spec
-from photostrip.simulate.simulation import simulate
+from photostrip.simulation import Flight, Spec
+from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from photostrip import simulate
+from photostrip import simulation
 from photostrip.camera import Distortion
 from photostrip.errors import InputError
 from photostrip.project.simulation import Specification, load_specification
-from photostrip.simulate import (
+from photostrip.simulation import (
     DIGITAL,
     Control,
     Film,
@@ -228,7 +228,7 @@ def keys(part: type, above: str = "") -> list[str]:
     """Every key of a specification."""
     found = []
     for each in fields(part):
-        inner = getattr(simulate, {"gross_errors": "GrossError"}.get(each.name, each.name.capitalize()), None)
+        inner = getattr(simulation, {"gross_errors": "GrossError"}.get(each.name, each.name.capitalize()), None)
         found.append(above + each.name)
         if not above and is_dataclass(inner) and isinstance(inner, type):
             found += keys(inner, f"{each.name}.")

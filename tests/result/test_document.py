@@ -19,8 +19,8 @@ from photostrip.pipeline import Settings
 from photostrip.result.document import document_of
 from photostrip.result.numbers import natural, rounded, significant
 from photostrip.result.summary import TOLERANCES
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Flight, GrossError
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Flight, GrossError
 from tests.loops import nonempty
 from tests.results import FRAMES, NORTH_FIRST, Case, case, solved, spec, written_to
 

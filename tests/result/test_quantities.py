@@ -15,7 +15,7 @@ from photostrip.result.columns import photos_csv, points_csv, rejected_csv, reli
 from photostrip.result.description import Quantity, described, quantity_at
 from photostrip.result.quantities import rounded_as
 from photostrip.result.reading import faults_of
-from photostrip.simulate import Models, simulate
+from photostrip.simulation import Models, simulate
 from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline
 from tests.results import case, solved, spec

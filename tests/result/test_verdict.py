@@ -13,8 +13,8 @@ from photostrip.report import chosen_sections
 from photostrip.report.page.text import to_text
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, verdict_of
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Control, Flight, Terrain
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Control, Flight, Terrain
 from photostrip.statistics import binomial_p_value
 from tests.results import Document, case, solved, spec
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 from photostrip.terrestrial.epochs import monitor
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series
 from photostrip.terrestrial.normal_case import StereoPair

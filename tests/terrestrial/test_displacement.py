@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 from photostrip.terrestrial.displacement import displacements, ellipses, limit, statistic
 from photostrip.terrestrial.normal_case import intersect
 from tests.vectors import cases

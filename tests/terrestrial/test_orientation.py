@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 from photostrip.terrestrial.frame import ground_from_photo
 from photostrip.terrestrial.orientation import OrientationSettings, Sightings, orient
 from tests.terrestrial.simulated import ARCSECOND, attitude

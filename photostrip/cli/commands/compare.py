@@ -36,7 +36,7 @@ def compare(
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.jobs import baseline as baseline_job
-    from photostrip.compare import Tolerances, compare_results
+    from photostrip.comparison import Tolerances, compare_results
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, faults_instead
     from photostrip.formats.output.result_json import read_result
     from photostrip.project.tolerance_profile import load_tolerances

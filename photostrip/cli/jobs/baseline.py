@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from photostrip.compare import Tolerances, baseline_of, compare_results
+from photostrip.comparison import Tolerances, baseline_of, compare_results
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.formats.text.writing import write_text

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.simulate import Simulation
+    from photostrip.simulation import Simulation
 
 
 def inputs_of(simulation: Simulation) -> Inputs:

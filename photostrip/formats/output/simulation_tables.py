@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from photostrip.camera import Camera
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.points import ModelPoints, PhotoPoints
-    from photostrip.simulate import Simulation
+    from photostrip.simulation import Simulation
 
 IMAGE_STEP, IMAGE_STEP_FREE = 1e-4, 1e-9  # mm to which image coordinates are rounded, with noise and without
 GROUND_STEP, GROUND_STEP_FREE = 1e-4, 1e-7  # metres, likewise

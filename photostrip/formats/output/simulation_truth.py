@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.simulate import InjectedError, Simulation
+    from photostrip.simulation import InjectedError, Simulation
 
     Document = dict[str, Any]
 

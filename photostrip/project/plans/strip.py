@@ -28,7 +28,7 @@ from photostrip.project.schema.values import (
     wrong,
 )
 from photostrip.project.simulation import camera_of
-from photostrip.simulate import Points
+from photostrip.simulation import Points
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

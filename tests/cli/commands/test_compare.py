@@ -11,8 +11,8 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.compare import Tolerances, baseline_of
-from photostrip.compare.tolerances import SETS, UNITS
+from photostrip.comparison import Tolerances, baseline_of
+from photostrip.comparison.tolerances import SETS, UNITS
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.result_lines import line_finder

@@ -18,7 +18,7 @@ from photostrip.formats.output.simulation import inputs_of, project_files, setti
 from photostrip.formats.text.writing import write_files
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.project.loading import load_project
-from photostrip.simulate import (
+from photostrip.simulation import (
     DIGITAL,
     FILM,
     Control,
@@ -281,7 +281,7 @@ def test_the_same_specification_gives_the_same_bytes() -> None:
         "import hashlib\n"
         "from tests.formats.output.test_simulation import TINY, VARIANTS\n"
         "from photostrip.formats.output.simulation import project_files\n"
-        "from photostrip.simulate import simulate\n"
+        "from photostrip.simulation import simulate\n"
         "for spec in (TINY, *VARIANTS.values()):\n"
         "    for name, text in project_files(simulate(spec)).items():\n"
         "        print(name, hashlib.sha256(text.encode()).hexdigest())\n"

@@ -13,7 +13,7 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Strip
 from photostrip.points import PhotoPoints
 from photostrip.result.document import document_of
-from photostrip.simulate import Control, Flight, Ground, Image, Spec, Terrain
+from photostrip.simulation import Control, Flight, Ground, Image, Spec, Terrain
 from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Inputs
     from photostrip.pipeline.inputs import CameraPositions
-    from photostrip.simulate import Simulation
+    from photostrip.simulation import Simulation
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 

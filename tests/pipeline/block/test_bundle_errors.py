@@ -11,7 +11,7 @@ import pytest
 from photostrip.errors import GeometryError
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.result.document import document_of
-from photostrip.simulate import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
+from photostrip.simulation import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.solve import solve
 from tests.loops import nonempty
@@ -19,7 +19,7 @@ from tests.pipeline.blocks import adjusted, corners, errors, positions, simulate
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result
-    from photostrip.simulate import Simulation
+    from photostrip.simulation import Simulation
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from photostrip.compare import compare_results
+from photostrip.comparison import compare_results
 from photostrip.errors import GeometryError
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.simulation import inputs_of, settings_of
@@ -16,7 +16,7 @@ from photostrip.report import sections_of
 from photostrip.report.html import to_html
 from photostrip.result.document import document_of
 from photostrip.result.trace.trace import trace_of
-from photostrip.simulate import Control, Flight, Ground, Simulation, Spec
+from photostrip.simulation import Control, Flight, Ground, Simulation, Spec
 from tests.pipeline.blocks import adjusted, errors, exact, orientations, simulate, with_control
 
 MICROMETRE = 1e-6  # metres

@@ -16,7 +16,7 @@ from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.models import form_models, link_strip
 from photostrip.report.sections.document import sections_of
 from photostrip.result.document import document_of
-from photostrip.simulate import Control, Flight, Ground, Models, Points, Spec, simulate
+from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
 from photostrip.triangulation.gross_errors.control import strip_at_control
 from photostrip.triangulation.independent_models import model_errors, perspective_centers
 from photostrip.triangulation.independent_models.settings import LinkSettings

@@ -19,7 +19,19 @@ from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.inputs import GivenOrientations
 from photostrip.pipeline.plausibility import evidence, gate, image_evidence
 from photostrip.points import PhotoPoints
-from photostrip.simulate import DIGITAL, FILM, Control, Film, Flight, GrossError, Ground, Image, Spec, Terrain, simulate
+from photostrip.simulation import (
+    DIGITAL,
+    FILM,
+    Control,
+    Film,
+    Flight,
+    GrossError,
+    Ground,
+    Image,
+    Spec,
+    Terrain,
+    simulate,
+)
 from photostrip.triangulation.image_coordinates.corrections import undistort
 from photostrip.triangulation.plausibility.photos import flight_order
 from tests.pipeline.blocks import positions
@@ -32,7 +44,7 @@ if TYPE_CHECKING:
 
     from photostrip.notes import Finding
     from photostrip.pipeline import Inputs
-    from photostrip.simulate import Simulation
+    from photostrip.simulation import Simulation
 
     Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
-from photostrip.simulate import Control, Flight, GrossError, Spec
-from photostrip.simulate.simulation import simulate
+from photostrip.simulation import Control, Flight, GrossError, Spec
+from photostrip.simulation.simulation import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

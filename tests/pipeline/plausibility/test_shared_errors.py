@@ -11,16 +11,16 @@ import pytest
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions
-from photostrip.simulate import Control, Flight, GrossError, Spec, Terrain
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Gnss
+from photostrip.simulation import Control, Flight, GrossError, Spec, Terrain
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Gnss
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.pipeline.results import Result
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
 
 def adjusted(

@@ -12,12 +12,12 @@ from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.plausibility.given_control import GivenControl
-from photostrip.simulate import FILM, Control, Flight, Gnss, Ground, Image, Points, Spec, Terrain, simulate
+from photostrip.simulation import FILM, Control, Flight, Gnss, Ground, Image, Points, Spec, Terrain, simulate
 from tests.pipeline.blocks import orientations, positions, with_control
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
-    from photostrip.simulate import Simulation
+    from photostrip.simulation import Simulation
     from photostrip.triangulation.plausibility.control.control_reading import Reading
     from photostrip.triangulation.plausibility.control.control_strip import StripPoints
 

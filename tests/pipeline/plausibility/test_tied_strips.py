@@ -10,13 +10,13 @@ import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
-from photostrip.simulate import Control, Flight, GrossError, Points, Spec
-from photostrip.simulate.simulation import simulate
+from photostrip.simulation import Control, Flight, GrossError, Points, Spec
+from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Inputs
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
 SPEC = Spec(
     seed=3,

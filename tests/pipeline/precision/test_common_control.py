@@ -12,7 +12,7 @@ import pytest
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.precision import photo_precision
-from photostrip.simulate import Control, Flight, Image, Points, Spec, simulate
+from photostrip.simulation import Control, Flight, Image, Points, Spec, simulate
 from photostrip.triangulation.polynomial import correction
 from tests.derivatives import UNSCREENED, oriented_of
 

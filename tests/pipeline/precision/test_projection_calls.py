@@ -10,8 +10,8 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.geodesy import proj_operation
 from photostrip.pipeline import Settings, triangulate
 from photostrip.result.document import document_of
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Control, Flight, Points, Spec
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Control, Flight, Points, Spec
 
 ADJUSTMENTS = ("polynomial", "covariance", "bundle")
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from photostrip.result.adjustment.bundle import bundle_of
-from photostrip.simulate.spec import Control, Flight, Gnss, Spec
+from photostrip.simulation.spec import Control, Flight, Gnss, Spec
 from tests.pipeline.blocks import adjusted, simulate
 
 

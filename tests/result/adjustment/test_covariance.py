@@ -12,8 +12,8 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.report import sections_of, title_of
 from photostrip.report.page.text import to_text
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import GrossError
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import GrossError
 from tests.loops import nonempty
 from tests.results import Case, case, solved, spec
 

@@ -14,7 +14,7 @@ from photostrip.pipeline import triangulate
 from photostrip.report.sections.document import sections_of
 from photostrip.result.adjustment.deformation import model_deformations
 from photostrip.result.document import document_of
-from photostrip.simulate import Control, Flight, Points, Spec, Terrain, simulate
+from photostrip.simulation import Control, Flight, Points, Spec, Terrain, simulate
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

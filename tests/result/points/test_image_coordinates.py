@@ -14,8 +14,8 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.report import SectionName, chosen_sections
 from photostrip.report.page.parts import Table
-from photostrip.simulate import Models, simulate
-from photostrip.simulate.spec import Film
+from photostrip.simulation import Models, simulate
+from photostrip.simulation.spec import Film
 from tests.loops import nonempty
 from tests.result.test_quantities import faults
 from tests.results import Case, case, solved, spec

@@ -16,7 +16,7 @@ from photostrip.pipeline import Settings
 from photostrip.report.commands.trace import _left_over, trace_sections, trace_title
 from photostrip.report.page.text import to_text
 from photostrip.result.trace.trace import SYMBOLS, trace_of
-from photostrip.simulate.spec import GrossError
+from photostrip.simulation.spec import GrossError
 from photostrip.triangulation.polynomial.correction import PolynomialSettings
 from tests.loops import nonempty
 from tests.results import case, spec, write_project

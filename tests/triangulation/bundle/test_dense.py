@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from photostrip.geometry.rotation import from_vector
-from photostrip.simulate import Control as SimulatedControl
-from photostrip.simulate import Flight, Points, Spec, simulate
+from photostrip.simulation import Control as SimulatedControl
+from photostrip.simulation import Flight, Points, Spec, simulate
 from photostrip.triangulation.bundle.observations.problem import (
     AttitudeObservations,
     BundleProblem,

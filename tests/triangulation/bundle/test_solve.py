@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.rotation import from_vector
-from photostrip.simulate import Control as SimulatedControl
-from photostrip.simulate import Flight, Image, Points, Spec, simulate
+from photostrip.simulation import Control as SimulatedControl
+from photostrip.simulation import Flight, Image, Points, Spec, simulate
 from photostrip.triangulation.bundle.observations.problem import (
     BundleCameras,
     BundleProblem,

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Flight, Spec, Terrain
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Flight, Spec, Terrain
 from photostrip.triangulation.plausibility.control import layout
 from photostrip.triangulation.plausibility.control.control_fit import fit_robustly, fit_similarity, upright
 from photostrip.triangulation.plausibility.control.control_strip import Rays

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from photostrip.simulate import Flight, Points, Spec, simulate
+from photostrip.simulation import Flight, Points, Spec, simulate
 from photostrip.triangulation.bundle.normal_equations import reduced
 from photostrip.triangulation.bundle.normal_equations.band import Band
 from photostrip.triangulation.bundle.normal_equations.sparse import Sparse

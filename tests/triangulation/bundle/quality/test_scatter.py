@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from photostrip.simulate import Control, Flight, Image, Points, Spec, simulate
+from photostrip.simulation import Control, Flight, Image, Points, Spec, simulate
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
 from photostrip.triangulation.bundle.solve import solve
 from tests.draws import orthogonal_normal

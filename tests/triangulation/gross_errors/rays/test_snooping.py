@@ -10,7 +10,7 @@ import pytest
 
 from photostrip.errors import GeometryError
 from photostrip.rejection import Rejection
-from photostrip.simulate import Flight, Points, Spec
+from photostrip.simulation import Flight, Points, Spec
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle.quality.reliability import CONTROL, require_regular
 from photostrip.triangulation.bundle.selection import Selection

@@ -13,14 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from photostrip.points import PhotoPoints
-from photostrip.simulate import Flight, Spec, simulate
+from photostrip.simulation import Flight, Spec, simulate
 from photostrip.triangulation.plausibility.photos import flight_order, mosaic, units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.notes import Finding
-    from photostrip.simulate import Simulation
+    from photostrip.simulation import Simulation
 
 PHOTOS = 7
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import rotation_z
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
-    from photostrip.simulate.spec import Spec
+    from photostrip.simulation.spec import Spec
 
 LENGTHS = (1.0, 0.7, 0.5)  # wavelengths of the irregular deformation, parts of the larger side of the photo
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.compare.quantities import name_of
+from photostrip.comparison.quantities import name_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

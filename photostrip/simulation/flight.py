@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
-    from photostrip.simulate.ground import World
-    from photostrip.simulate.spec import Spec
+    from photostrip.simulation.ground import World
+    from photostrip.simulation.spec import Spec
 
 CUT_SIGMAS = 3.0  # standard deviations beyond which no photo is displaced or tilted: a pilot would fly again
 BASE_SCATTER = (0.02, 0.02, 0.01)  # of the base: along, across, height

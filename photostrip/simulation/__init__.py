@@ -5,15 +5,15 @@ the same on every machine; ``ground`` the world and its terrain, ``flight`` the 
 points, ``imaging`` and ``film`` the photos that show them and image coordinates, ``plotter`` independent models,
 ``control`` given points, ``gross`` gross errors, ``validation`` what cannot be simulated.
 
->>> from photostrip.simulate import Flight, Spec, simulate
+>>> from photostrip.simulation import Flight, Spec, simulate
 >>> simulation = simulate(Spec(flight=Flight(photos=5)))
 >>> simulation.strips[0]
 ('A', ('1001', '1002', '1003', '1004', '1005'))
 """
 
-from photostrip.simulate.gross import InjectedError
-from photostrip.simulate.simulation import Simulation, Truth, simulate
-from photostrip.simulate.spec import (
+from photostrip.simulation.gross import InjectedError
+from photostrip.simulation.simulation import Simulation, Truth, simulate
+from photostrip.simulation.spec import (
     DIGITAL,
     FILM,
     PRESETS,

@@ -13,23 +13,23 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, PointTable
-from photostrip.simulate.control import Roles, given_coordinates, roles
-from photostrip.simulate.draws import Draws, Purpose
-from photostrip.simulate.film import Sheets, sheets
-from photostrip.simulate.flight import Photos, fly
-from photostrip.simulate.gross import InjectedError, spoil_control, spoil_images
-from photostrip.simulate.ground import World, surface, world
-from photostrip.simulate.imaging import bent, project
-from photostrip.simulate.placement import Placed, place, shown
-from photostrip.simulate.plotter import TruePlaces, plotted
-from photostrip.simulate.validation import LARGEST_ARC, faults_of
+from photostrip.simulation.control import Roles, given_coordinates, roles
+from photostrip.simulation.draws import Draws, Purpose
+from photostrip.simulation.film import Sheets, sheets
+from photostrip.simulation.flight import Photos, fly
+from photostrip.simulation.gross import InjectedError, spoil_control, spoil_images
+from photostrip.simulation.ground import World, surface, world
+from photostrip.simulation.imaging import bent, project
+from photostrip.simulation.placement import Placed, place, shown
+from photostrip.simulation.plotter import TruePlaces, plotted
+from photostrip.simulation.validation import LARGEST_ARC, faults_of
 from photostrip.triangulation.image_coordinates.corrections import distort
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.simulate.spec import Spec
+    from photostrip.simulation.spec import Spec
 
 STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors
 MOST_ROUND_TRIP = 1e-4  # metres

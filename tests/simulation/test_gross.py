@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.simulate import (
+from photostrip.simulation import (
     Control,
     Film,
     Flight,

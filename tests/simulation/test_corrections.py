@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from photostrip.camera import Distortion
-from photostrip.simulate.film import sheets
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import FILM as CAMERA
-from photostrip.simulate.spec import Film, Flight, Image, Spec, Terrain
+from photostrip.simulation.film import sheets
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import FILM as CAMERA
+from photostrip.simulation.spec import Film, Flight, Image, Spec, Terrain
 from photostrip.triangulation.image_coordinates import corrections, interior
 from photostrip.triangulation.image_coordinates.refraction import refraction_constant
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.camera import Camera
-    from photostrip.simulate.simulation import Simulation
+    from photostrip.simulation.simulation import Simulation
 
     Floats = NDArray[np.float64]
 

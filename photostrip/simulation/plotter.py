@@ -14,11 +14,11 @@ import numpy as np
 
 from photostrip.geometry.rotation import from_vector
 from photostrip.points import ModelPoints, PhotoPoints
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
-    from photostrip.simulate.spec import Models, Spec
+    from photostrip.simulation.spec import Models, Spec
 
 TILT_SIGMA = np.radians(2.0)  # scatter of the axes of a level model
 LOG_SCALE_SIGMA = 0.2  # scatter of the logarithm of the model scales

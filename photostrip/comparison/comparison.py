@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.compare.ground import difference_in_plan_and_height, plan_and_height
-from photostrip.compare.members import members_of, missing_and_new
-from photostrip.compare.quantities import Quantity, quantities_of
-from photostrip.compare.tolerances import SETS, UNITS, SetTolerance, Tolerances
+from photostrip.comparison.ground import difference_in_plan_and_height, plan_and_height
+from photostrip.comparison.members import members_of, missing_and_new
+from photostrip.comparison.quantities import Quantity, quantities_of
+from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError, incomplete
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from photostrip.triangulation.image_coordinates.refraction import refraction_con
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.simulate.flight import Photos
-    from photostrip.simulate.spec import Spec
+    from photostrip.simulation.flight import Photos
+    from photostrip.simulation.spec import Spec
 
 USABLE = 0.97  # part of the width and height of the photo that is measured in
 BENDING_STEPS = 6  # each gains four digits

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 
 COUNT = 200_000
 FIRST_UNIFORM = [0.8540335896190759, 0.4272927861607856, 0.8629217443697507]

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import PhotoPoints
-    from photostrip.simulate.spec import GrossError, Spec
+    from photostrip.simulation.spec import GrossError, Spec
 
 AXES = "xyz"
 HALF = 0.5

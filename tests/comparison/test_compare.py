@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.compare import SetTolerance, Tolerance, Tolerances, baseline_of, compare_results
-from photostrip.compare.ground import plan_and_height
-from photostrip.compare.tolerances import UNITS
+from photostrip.comparison import SetTolerance, Tolerance, Tolerances, baseline_of, compare_results
+from photostrip.comparison.ground import plan_and_height
+from photostrip.comparison.tolerances import UNITS
 from photostrip.errors import InputError
 from tests.loops import nonempty
 from tests.results import case

@@ -10,8 +10,8 @@ from pyproj import CRS, Transformer
 from scipy import stats
 
 from photostrip.errors import InputError
-from photostrip.simulate import Control, Flight, Ground, Points, Simulation, Spec, simulate
-from photostrip.simulate.control import band_photos
+from photostrip.simulation import Control, Flight, Ground, Points, Simulation, Spec, simulate
+from photostrip.simulation.control import band_photos
 from tests.loops import nonempty
 
 NONE = (0.0, 0.0, 0.0)

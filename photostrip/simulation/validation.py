@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault
 from photostrip.notes import counted
-from photostrip.simulate.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES, Spec
+from photostrip.simulation.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES, Spec
 from photostrip.triangulation.image_coordinates import lens_distortion
 
 if TYPE_CHECKING:

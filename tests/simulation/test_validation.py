@@ -8,7 +8,7 @@ import pytest
 
 from photostrip.camera import Distortion
 from photostrip.errors import InputError
-from photostrip.simulate import (
+from photostrip.simulation import (
     DIGITAL,
     FILM,
     Control,

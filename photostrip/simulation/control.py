@@ -10,13 +10,13 @@ import numpy as np
 from photostrip.errors import Fault, InputError
 from photostrip.notes import counted
 from photostrip.points import ControlPoints, PointTable
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.simulate.placement import Placed
-    from photostrip.simulate.spec import Spec
+    from photostrip.simulation.placement import Placed
+    from photostrip.simulation.spec import Spec
 
 CHECK_POINTS = 10  # when the specification does not say how many
 

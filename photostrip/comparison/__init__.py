@@ -5,7 +5,7 @@ the numbers, each with its kind, id and unit; ``ground`` says how far two points
 ``members`` compares ids, choices, rejections and findings as sets.
 """
 
-from photostrip.compare.comparison import baseline_of, compare_results
-from photostrip.compare.tolerances import SetTolerance, Tolerance, Tolerances
+from photostrip.comparison.comparison import baseline_of, compare_results
+from photostrip.comparison.tolerances import SetTolerance, Tolerance, Tolerances
 
 __all__ = ["SetTolerance", "Tolerance", "Tolerances", "baseline_of", "compare_results"]

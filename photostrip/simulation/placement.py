@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.simulate.draws import Draws, Purpose
-from photostrip.simulate.flight import CUT_SIGMAS, Photos, position_sigma
-from photostrip.simulate.imaging import sees
+from photostrip.simulation.draws import Draws, Purpose
+from photostrip.simulation.flight import CUT_SIGMAS, Photos, position_sigma
+from photostrip.simulation.imaging import sees
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.simulate.ground import Surface, World
-    from photostrip.simulate.spec import Spec
+    from photostrip.simulation.ground import Surface, World
+    from photostrip.simulation.spec import Spec
 
 # Where a point is tried when its photos do not all show it at first: shift along, in half widths of the zone on three
 # photos, and part of the distance from the flight line.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from photostrip.simulate import Film, Flight, Gnss, Ground, Image, Points, Spec, simulate
+from photostrip.simulation import Film, Flight, Gnss, Ground, Image, Points, Spec, simulate
 
 LARGE = Spec(flight=Flight(photos=200), points=Points(extra_per_model=9))
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from photostrip.simulate import DIGITAL, FILM, Control, Flight, Ground, Points, Simulation, Spec, Terrain, simulate
+from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Points, Simulation, Spec, Terrain, simulate
 
 
 def photos_of(done: Simulation) -> list[set[int]]:

@@ -16,11 +16,11 @@ import numpy as np
 
 from photostrip.geodesy.curvature import meridian_radius, prime_vertical_radius
 from photostrip.geodesy.local_frame import geocentric_from_geodetic
-from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulation.draws import Draws, Purpose
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
-    from photostrip.simulate.spec import Spec
+    from photostrip.simulation.spec import Spec
 
 WAVES = 5  # sine waves that make up the relief
 
