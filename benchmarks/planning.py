@@ -34,20 +34,20 @@ from photostrip.geodesy.tying import tie_frames  # noqa: E402
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
-from photostrip.planning.control_layout import ControlLayout, Spot, numbers_of, spots_of  # noqa: E402
-from photostrip.planning.ideal_strip import StripGeometry, ideal_strip  # noqa: E402
-from photostrip.planning.model_plan import (  # noqa: E402
+from photostrip.planning.model.plan import (  # noqa: E402
     LAYOUTS as MODEL_LAYOUTS,
 )
-from photostrip.planning.model_plan import (  # noqa: E402
+from photostrip.planning.model.plan import (  # noqa: E402
     ControlPoint,
     ModelSpec,
     control_layout,
     plan_model,
     standard_zones,
 )
-from photostrip.planning.single_model import ModelControl, orientation_operator  # noqa: E402
-from photostrip.planning.strip_methods import (  # noqa: E402
+from photostrip.planning.model.single_model import ModelControl, orientation_operator  # noqa: E402
+from photostrip.planning.strip.control_layout import ControlLayout, Spot, numbers_of, spots_of  # noqa: E402
+from photostrip.planning.strip.ideal_strip import StripGeometry, ideal_strip  # noqa: E402
+from photostrip.planning.strip.methods import (  # noqa: E402
     BUNDLE,
     COVARIANCE,
     DEGREES,
@@ -71,8 +71,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.planning.control_layout import Spot as ControlSpot
-    from photostrip.planning.ideal_strip import IdealStrip
+    from photostrip.planning.strip.control_layout import Spot as ControlSpot
+    from photostrip.planning.strip.ideal_strip import IdealStrip
 
     Floats = NDArray[np.float64]
 

@@ -59,7 +59,12 @@ _TEXTS = (
     ("man", "Print a manual page, or write all of them.", "photostrip man -o ~/.local/share/man/man1"),
     ("info", "Print versions and formats, and how to get what is missing.", "photostrip info --format json"),
 )
-_MODULES = {"completion": "shell", "man": "shell", "sources": "info"}  # where it is not that of the command's name
+_MODULES = {
+    "completion": "shell",
+    "man": "shell",
+    "plan": "plan.plan",
+    "sources": "info",
+}  # where it is not that of the command's name
 COMMANDS = {
     name: Entry(f"photostrip.cli.commands.{_MODULES.get(name, name)}", text, example) for name, text, example in _TEXTS
 }

@@ -11,7 +11,7 @@ from photostrip.geometry.rotation import from_alpha_omega_kappa
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.planning.single_model import ModelControl
+    from photostrip.planning.model.single_model import ModelControl
 
     Array = NDArray[np.float64]
 

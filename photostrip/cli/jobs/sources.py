@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from photostrip.errors import Fault, InputError
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, compare, source_cameras
-from photostrip.planning.model_plan import source_example
+from photostrip.planning.model.plan import source_example
 from photostrip.result.numbers import rounded
 from photostrip.terrestrial.accuracy import EXAMPLES, worked
 

@@ -4,6 +4,6 @@ In come documents of results and outcomes of batches, plans and reports of ``pla
 texts by file name, and documents that reports print: angles in the user's unit, ground in metres, errors in µm and ″.
 
 - ``result_json``, ``result_files``, ``result_lines``: result.json, its tables, and where its records stand;
-- ``plans``, ``plan_strip``, ``terrestrial_directions``, ``terrestrial_displacements``: documents, and tables of them;
+- ``plans``, ``terrestrial_directions``, ``terrestrial_displacements``: documents, and tables of them;
 - ``simulation``, ``simulation_tables``, ``simulation_truth``: a project with its truth; ``batch``: summaries, records.
 """

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Self, TypeVar
 from pydantic import AfterValidator, model_validator
 
 from photostrip.formats.text.findings import Findings
-from photostrip.planning.ideal_strip import StripGeometry
+from photostrip.planning.strip.ideal_strip import StripGeometry
 from photostrip.project.schema.values import Positive, Range, Section, Triple, Words, bounded, key, wrong
 from photostrip.project.simulation import SimulatedCamera
 from photostrip.project.yaml.document import COMMAND_LINE, Node, Place

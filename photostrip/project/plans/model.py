@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from photostrip.errors import Fault, InputError
-from photostrip.planning.model_plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
+from photostrip.planning.model.plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema.values import (
     Id,

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Self
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from photostrip.formats.text.findings import suggestion
-from photostrip.planning.control_layout import LAYOUTS, USES, ControlLayout, Spot
-from photostrip.planning.ideal_strip import LEAST_PHOTOS, StripGeometry
-from photostrip.planning.placement import Placement, Required
-from photostrip.planning.strip_design import Design, DesignReport, plan_strip
-from photostrip.planning.strip_methods import BUNDLE, METHODS
+from photostrip.planning.strip.control_layout import LAYOUTS, USES, ControlLayout, Spot
+from photostrip.planning.strip.design import Design, DesignReport, plan_strip
+from photostrip.planning.strip.ideal_strip import LEAST_PHOTOS, StripGeometry
+from photostrip.planning.strip.methods import BUNDLE, METHODS
+from photostrip.planning.strip.placement import Placement, Required
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema.values import (
     Flag,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.planning.deformation import Paraboloid, determines_paraboloid, fit_paraboloid
+from photostrip.planning.model.deformation import Paraboloid, determines_paraboloid, fit_paraboloid
 from photostrip.result.quantities import record
 from photostrip.statistics import t_p_value
 from photostrip.triangulation.absolute_orientation import Targets

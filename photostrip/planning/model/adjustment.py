@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.planning.element_errors import free_influence
-from photostrip.planning.single_model import PARAMETERS, ModelControl, parameter_rows
+from photostrip.planning.model.element_errors import free_influence
+from photostrip.planning.model.single_model import PARAMETERS, ModelControl, parameter_rows
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.planning.element_errors import influence, measured_covariance
+from photostrip.planning.model.element_errors import influence, measured_covariance
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
 from photostrip.triangulation.relative_orientation import six_points
 

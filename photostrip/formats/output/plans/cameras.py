@@ -1,4 +1,4 @@
-"""Plans as plain documents and as tables: what is printed, drawn and written."""
+"""A comparison of cameras as a plain document."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.output.csv_text import to_csv
-from photostrip.formats.output.plan_strip import along_rows
 from photostrip.planning.camera_efficiency import (
     PRINTED_TABLE,
     ComparedCamera,
@@ -18,9 +16,6 @@ from photostrip.planning.camera_efficiency import (
     suitability,
 )
 from photostrip.result.numbers import Document, micrometres, rounded, significant
-from photostrip.terrestrial.forecast import PLACES, DisplacementSpec, plan_displacements
-
-SMALL = 6  # decimals of metres: displacements are small
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -102,47 +97,3 @@ def source_document() -> Document:
         row["printed_height_ratio"] = printed.height_ratio
         row["printed_eta"] = printed.area
     return document | {"kind": "source-table"}
-
-
-def displacement_document(name: str, spec: DisplacementSpec) -> Document:
-    """Return the plan of a survey of displacements, a row for each distance and place."""
-    rows = []
-    distances = np.repeat(spec.distances, len(PLACES)).tolist()
-    for distance, each in zip(distances, plan_displacements(spec), strict=True):
-        row: Document = {"distance_m": distance, "place": each.place}
-        for what, values in (("", each.at), ("sigma_", each.sigma), ("found_", each.found)):
-            for axis, value in zip(("x", "y", "z"), rounded(values, SMALL), strict=True):
-                row[f"{what}{axis}_m"] = value
-        rows.append({**row, "worst_found_m": rounded(each.worst, SMALL)})
-    return {
-        "kind": "displacement",
-        "name": name,
-        "camera": {
-            "name": spec.camera.name,
-            "principal_distance_mm": significant(spec.camera.principal_distance, 9),
-            "format_mm": list(spec.camera.format or ()),
-        },
-        "stations": 1 if spec.base is None else 2,
-        "base_m": spec.base,
-        "convergence_deg": rounded(np.degrees(spec.convergence), 6),
-        "change_sigma_um": micrometres(spec.sigma),
-        "significance": spec.significance,
-        "power": spec.power,
-        "points": rows,
-    }
-
-
-TABLES = {
-    "displacement": "points",
-    "model": "points",
-    "model-source-table": "rows",
-    "cameras": "cameras",
-    "source-table": "cameras",
-}
-
-
-def plan_csv(document: Document) -> str:
-    """Return the main table of a plan as CSV; its columns are the keys of the document's rows."""
-    kind = document["kind"]
-    rows = along_rows(document) if kind == "strip" else document[TABLES[kind]]
-    return to_csv(list(rows[0]), (row.values() for row in rows))

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.planning.closed_form import ORDER, coefficients, control_sums, kernels
-from photostrip.planning.element_errors import ELEMENTS, influence
-from photostrip.planning.single_model import ModelControl, orientation_operator
+from photostrip.planning.model.closed_form import ORDER, coefficients, control_sums, kernels
+from photostrip.planning.model.element_errors import ELEMENTS, influence
+from photostrip.planning.model.single_model import ModelControl, orientation_operator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,9 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.planning import closed_form, deformation
-from photostrip.planning.element_errors import ELEMENTS, FREE, element_covariance, free_covariance, measured_covariance
-from photostrip.planning.given_errors import (
+from photostrip.planning.model import closed_form, deformation
+from photostrip.planning.model.adjustment import adjust_model
+from photostrip.planning.model.element_errors import (
+    ELEMENTS,
+    FREE,
+    element_covariance,
+    free_covariance,
+    measured_covariance,
+)
+from photostrip.planning.model.given_errors import (
     BentModel,
     ControlErrors,
     Correction,
@@ -22,8 +29,7 @@ from photostrip.planning.given_errors import (
     correct_model,
     error_parts,
 )
-from photostrip.planning.model_adjustment import adjust_model
-from photostrip.planning.single_model import (
+from photostrip.planning.model.single_model import (
     ExpectedErrors,
     ModelControl,
     expected_errors,

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.closed_form import ORDER, coefficients, control_sums
-from photostrip.planning.element_errors import (
+from photostrip.planning.model.adjustment import adjust_model
+from photostrip.planning.model.closed_form import ORDER, coefficients, control_sums
+from photostrip.planning.model.element_errors import (
     ELEMENTS,
     FREE,
     element_covariance,
@@ -21,8 +22,7 @@ from photostrip.planning.element_errors import (
     influence,
     measured_covariance,
 )
-from photostrip.planning.model_adjustment import adjust_model
-from photostrip.planning.single_model import (
+from photostrip.planning.model.single_model import (
     ModelControl,
     deformation,
     expected_errors,

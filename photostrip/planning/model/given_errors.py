@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.planning.deformation import base_frame_elements, parallax_error, surface_of_elements
-from photostrip.planning.element_errors import influence
-from photostrip.planning.model_adjustment import AdjustedModel, adjust_model
-from photostrip.planning.single_model import ModelControl, orientation_operator, orientation_parameters
+from photostrip.planning.model.adjustment import AdjustedModel, adjust_model
+from photostrip.planning.model.deformation import base_frame_elements, parallax_error, surface_of_elements
+from photostrip.planning.model.element_errors import influence
+from photostrip.planning.model.single_model import ModelControl, orientation_operator, orientation_parameters
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

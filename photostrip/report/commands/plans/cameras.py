@@ -1,12 +1,9 @@
-"""Reports of plans: from their documents to sections of sentences, facts and tables."""
+"""The report on a comparison of cameras."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.commands.plan_displacement import displacement_sections
-from photostrip.report.commands.plan_model import model_sections, source_example_sections
-from photostrip.report.commands.plan_strip import strip_sections
 from photostrip.report.page.numbers import calibrated, fixed, short
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
@@ -15,13 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-def plan_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Make the report of a plan."""
-    title, build = BUILDERS[document["kind"]]
-    return title, build(document)
-
-
-def _cameras(document: Document) -> tuple[Section, ...]:
+def camera_sections(document: Document) -> tuple[Section, ...]:
+    """Show a comparison of cameras."""
     facts = Facts(
         (
             ("fewest photos", f"{document['fewest_photos']}, at equal standard deviations of heights"),
@@ -100,7 +92,8 @@ def _camera_table(rows: Sequence[Document]) -> Table:
     )
 
 
-def _source_table(document: Document) -> tuple[Section, ...]:
+def source_table_sections(document: Document) -> tuple[Section, ...]:
+    """Show the table of the source, computed again, and what is wrong in print."""
     table = tabulated(
         document["cameras"],
         (
@@ -141,13 +134,3 @@ def _misprints(document: Document) -> tuple[Part, ...]:
         ),
     )
     return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
-
-
-BUILDERS = {
-    "model": ("Expected errors over one model", model_sections),
-    "model-source-table": ("Accuracy of a model: the worked example of the source", source_example_sections),
-    "strip": ("Expected accuracy of a strip", strip_sections),
-    "cameras": ("Efficiency of cameras", _cameras),
-    "displacement": ("Expected accuracy of displacements", displacement_sections),
-    "source-table": ("Efficiency of cameras: the table of the source", _source_table),
-}

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.planning.control_layout import ControlLayout, Spot, across, spots_of
-from photostrip.planning.strip_methods import Accuracy, accuracy
+from photostrip.planning.strip.control_layout import ControlLayout, Spot, across, spots_of
+from photostrip.planning.strip.methods import Accuracy, accuracy
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from photostrip.planning.ideal_strip import IdealStrip
+    from photostrip.planning.strip.ideal_strip import IdealStrip
 
 WORTH = 0.01  # part of the score that a place must gain to be called better
 MOST_TRIED = 2000  # layouts that a search looks at

@@ -15,7 +15,7 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted
-from photostrip.planning.control_layout import USES, ControlLayout, Spot, Triple, numbers_of
+from photostrip.planning.strip.control_layout import USES, ControlLayout, Spot, Triple, numbers_of
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.bundle.observations import problem as bundle
@@ -29,7 +29,7 @@ from photostrip.triangulation.polynomial import terms as polynomial_terms
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
-    from photostrip.planning.ideal_strip import IdealStrip
+    from photostrip.planning.strip.ideal_strip import IdealStrip
 
 SIMILARITY, COVARIANCE, BUNDLE = "similarity", "covariance", "bundle"
 DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}

@@ -23,7 +23,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.notes import counted
-from photostrip.planning.element_errors import free_influence, influence
+from photostrip.planning.model.element_errors import free_influence, influence
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -11,7 +11,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.notes import counted
 
 if TYPE_CHECKING:
-    from photostrip.planning.ideal_strip import IdealStrip
+    from photostrip.planning.strip.ideal_strip import IdealStrip
 
 LAYOUTS = ("bands", "corners", "corners+centre", "points")
 USES = {"xyz": (True, True, True), "xy": (True, True, False), "z": (False, False, True)}

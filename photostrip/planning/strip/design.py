@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.planning.control_layout import ControlLayout, Spot, spots_of
-from photostrip.planning.ideal_strip import IdealStrip, StripGeometry, ideal_strip
-from photostrip.planning.placement import BestPlaces, Placement, Required, best_places, worst
-from photostrip.planning.strip_methods import BUNDLE, COVARIANCE, DEGREES, METHODS, SIMILARITY, Accuracy, accuracy
+from photostrip.planning.strip.control_layout import ControlLayout, Spot, spots_of
+from photostrip.planning.strip.ideal_strip import IdealStrip, StripGeometry, ideal_strip
+from photostrip.planning.strip.methods import BUNDLE, COVARIANCE, DEGREES, METHODS, SIMILARITY, Accuracy, accuracy
+from photostrip.planning.strip.placement import BestPlaces, Placement, Required, best_places, worst
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
 
 if TYPE_CHECKING:

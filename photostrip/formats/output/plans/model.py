@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.planning.closed_form import ORDER
-from photostrip.planning.element_errors import ELEMENTS, FREE
-from photostrip.planning.model_plan import (
+from photostrip.planning.model.closed_form import ORDER
+from photostrip.planning.model.element_errors import ELEMENTS, FREE
+from photostrip.planning.model.plan import (
     BothForms,
     Forecast,
     GivenErrors,
@@ -17,7 +17,7 @@ from photostrip.planning.model_plan import (
     simple_accuracy,
     source_example,
 )
-from photostrip.planning.single_model import PARAMETERS
+from photostrip.planning.model.single_model import PARAMETERS
 from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
 
 if TYPE_CHECKING:

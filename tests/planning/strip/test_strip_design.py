@@ -11,17 +11,17 @@ import pytest
 
 from benchmarks.planning import Task, repetitions
 from photostrip.errors import GeometryError, InputError
-from photostrip.planning.control_layout import ControlLayout, Spot, across, spots_of
-from photostrip.planning.ideal_strip import StripGeometry, ideal_strip
-from photostrip.planning.placement import Placement, Required, best_places, equal_ways, worst
-from photostrip.planning.strip_design import Design, along_the_strip, bands_needed, outcome, plan_strip
-from photostrip.planning.strip_methods import BUNDLE, COVARIANCE, METHODS, SIMILARITY, accuracy
+from photostrip.planning.strip.control_layout import ControlLayout, Spot, across, spots_of
+from photostrip.planning.strip.design import Design, along_the_strip, bands_needed, outcome, plan_strip
+from photostrip.planning.strip.ideal_strip import StripGeometry, ideal_strip
+from photostrip.planning.strip.methods import BUNDLE, COVARIANCE, METHODS, SIMILARITY, accuracy
+from photostrip.planning.strip.placement import Placement, Required, best_places, equal_ways, worst
 from photostrip.simulation import FILM, Points
 from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
-    from photostrip.planning.ideal_strip import IdealStrip
+    from photostrip.planning.strip.ideal_strip import IdealStrip
 
 SIMPLE = Points(rows=3, scatter_percent=0.0, extra_per_model=0)
 

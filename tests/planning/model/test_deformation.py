@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.planning.deformation import (
+from photostrip.planning.model.deformation import (
     CENTRAL,
     PRINTED,
     SIDE,
@@ -25,7 +25,7 @@ from photostrip.planning.deformation import (
     rigorous_covariance,
     surface_of_elements,
 )
-from photostrip.planning.model_plan import source_example
+from photostrip.planning.model.plan import source_example
 from photostrip.triangulation.relative_orientation import six_points
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import ground_errors, relative_differentials

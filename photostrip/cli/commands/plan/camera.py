@@ -1,0 +1,36 @@
+"""``photostrip plan camera``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from photostrip.cli.commands.plan.delivery import Delivery
+from photostrip.cli.commands.plan.options import PlanFile
+from photostrip.cli.failures import failures_as
+
+
+def camera(
+    *,
+    file: PlanFile = None,
+    source_table: Annotated[
+        bool, typer.Option("--source-table", help="The table of the source, with what is misprinted in it.")
+    ] = False,
+    delivery: Delivery,
+) -> None:
+    """Compare cameras by their efficiency coefficient K = f m_p: the smaller, the fewer photos."""
+    with failures_as(delivery.form):
+        from photostrip.errors import Fault, InputError
+        from photostrip.formats.output.plans.cameras import camera_document, source_document
+        from photostrip.project.plans.cameras import load_camera_plan
+
+        if source_table == (file is not None):
+            message = "a list of cameras and --source-table exclude each other" if file else "no cameras are given"
+            raise InputError(Fault(message, "plan-cameras", fix="name a YAML file, or use --source-table"))
+        delivery.require_output()
+        if file is None:
+            delivery.deliver(source_document(), ())
+        else:
+            given = load_camera_plan(file, delivery.assignments or [])
+            delivery.deliver(camera_document(given.name, given.cameras, given.reference, given.survey), given.files)

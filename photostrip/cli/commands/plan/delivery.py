@@ -1,0 +1,111 @@
+"""How a plan is changed by options, printed and written."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from photostrip.cli.documents import FORMS, Form, Rendering, require_target, write_rule
+from photostrip.cli.options import Silent
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from photostrip.cli.commands.plan.options import Options
+    from photostrip.errors import Fault
+    from photostrip.report.page.parts import Document
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """Options of every plan: what it overrides, how it is printed, where it is written."""
+
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Set a key of the plan, as in end_lap_percent=70; may be repeated."
+        ),
+    ] = None
+    form: Annotated[Form, typer.Option("--format", help="How the answer is printed.")] = "text"
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="Write .svg or .png (a picture), .json, .csv, .md or .txt."
+        ),
+    ] = None
+    depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make; needs -o.")] = None
+    quiet: Silent = False
+
+    def require_output(self) -> bool:
+        """Refuse what cannot be written before anything is computed; return whether a picture is wanted."""
+        require_target(self.depfile, self.output)
+        return self._is_picture()
+
+    def _is_picture(self) -> bool:
+        from photostrip.report.pictures.plans import check_picture, is_picture
+
+        if self.output is None:
+            return False
+        if is_picture(self.output):
+            check_picture(self.output)
+            return True
+        if self.output.suffix.lower() not in FORMS:
+            known = ", ".join(FORMS)
+            message = f"no plan is written as '{self.output.suffix}': the name may end in .svg, .png, {known}"
+            raise typer.BadParameter(message, param_hint="--output")
+        return False
+
+    def deliver(self, document: Document, files: Sequence[str], fine: Document | None = None) -> None:
+        """Print a plan; write it, and the rule for make, when a file is named.
+
+        fine: the plan on a fine grid, for a picture.
+        """
+        from photostrip.formats.output.plans.table import plan_csv
+        from photostrip.report.commands.plans.report import plan_report
+
+        rendering = Rendering(plan_report, plan_csv)
+        if self.output is not None:
+            from photostrip.formats.text.writing import write_text
+            from photostrip.report.pictures.plans import plan_picture
+
+            ending = self.output.suffix
+            if self._is_picture():
+                write_text(self.output, plan_picture(fine or document, ending))
+            else:
+                write_text(self.output, rendering.rendered(document, FORMS[ending.lower()]))
+        if self.output is None or not self.quiet:
+            rendering.show(document, self.form)
+        write_rule(self.depfile, self.output, files)
+
+    @contextmanager
+    def assigned(self, options: Options) -> Iterator[list[str]]:
+        """Turn options into assignments to keys; those of ``--set`` come last and win.
+
+        Faults of the command line are reported at the option that they came from.
+        """
+        from photostrip.errors import InputError
+
+        given = self.assignments or []
+        overruled = {each.partition("=")[0] for each in given}
+        names = {
+            key.replace('"', ""): name
+            for key, (name, value) in options.items()
+            if value is not None and key not in overruled
+        }
+        try:
+            yield [f"{key}={value}" for key, (_, value) in options.items() if value is not None] + given
+        except InputError as error:
+            raise InputError(_by_option(fault, names) for fault in error.faults) from None
+
+
+def _by_option(fault: Fault, names: dict[str, str]) -> Fault:
+    """Name the option in place of ``--set`` and the key that it stands for."""
+    from photostrip.project.yaml.document import COMMAND_LINE
+
+    key = fault.key.replace('"', "")
+    found = [name for each, name in names.items() if key and (key.startswith(each) or each.startswith(f"{key}."))]
+    return replace(fault, file=found[-1], key="") if fault.file == COMMAND_LINE and found else fault

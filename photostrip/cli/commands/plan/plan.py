@@ -1,0 +1,40 @@
+"""``photostrip plan``: how good it would be, before any photo is taken or measured."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+from photostrip.cli.commands.plan.camera import camera
+from photostrip.cli.commands.plan.displacement import displacement
+from photostrip.cli.commands.plan.model import model
+from photostrip.cli.commands.plan.strip import strip
+from photostrip.cli.option_groups import with_groups
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+HELP_NAMES = {"help_option_names": ["--help", "-h"]}
+COMMANDS: dict[Callable[..., None], tuple[str, ...]] = {  # examples
+    model: (
+        "--camera film --overlap 60 --scale 10000 --control corners",
+        "model.yaml -o model.svg",
+        "--elements 5,-3,10,-8,12 -o bent.svg",
+        "--closed-form --as-printed",
+    ),
+    strip: ("--models 15 --control bands=3 --control every=5", "strip.yaml -o strip.svg"),
+    camera: ("cameras.yaml", "cameras.yaml --set height_sigma=0.2 --set relief=400", "--source-table"),
+    displacement: ("--camera 'UMK 10/1318' --base 30 --distances 50,100,200", "--stations 1 --distances 80"),
+}
+
+plan = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    context_settings=HELP_NAMES,
+    help="Expected accuracy of a model, of a strip with its control, of displacements; which camera is the better one.",
+)
+for command, examples in COMMANDS.items():
+    name = command.__name__
+    text = "\b\nExamples:\n" + "\n".join(f"  photostrip plan {name} {example}" for example in examples)
+    plan.command(name, context_settings=HELP_NAMES, epilog=text)(with_groups(command))
