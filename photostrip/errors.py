@@ -12,8 +12,9 @@ Readers collect faults and raise one ``InputError`` for all of them; mathematics
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -27,7 +28,7 @@ EXIT_GEOMETRY = 3
 EXIT_INTERNAL = 70
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Fault:
     """One thing that is wrong with an input, and where."""
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
+
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

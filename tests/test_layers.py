@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Bottom to top. A room is a module or a folder directly below photostrip/.
 LAYERS = (
-    {"arrays", "errors", "notes", "threads", "distributions", "visible"},
+    {"arrays", "errors", "frozen", "notes", "threads", "distributions", "visible"},
     {"points", "camera", "statistics", "geometry", "geodesy", "rejection"},
     {"triangulation", "terrestrial"},
     {"simulation"},
@@ -31,7 +31,7 @@ LAYERS = (
     {"__main__"},
 )
 # Rooms that may not use each other although their layers would allow it: (who, not whom).
-TAUGHT = {"errors", "notes", "visible"}  # all that a report may know of the program
+TAUGHT = {"errors", "frozen", "notes", "visible"}  # all that a report may know of the program
 LEAVES = {"report"}
 APART = {
     ("terrestrial", "triangulation"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ from photostrip.formats.text.files import read_bytes
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.source import Source, reading_from
 from photostrip.formats.text.table_text import LARGEST_TABLE
+from photostrip.frozen import dataclass
 from photostrip.geodesy.crs import grid_names
 from photostrip.project.yaml.merging import override, path_of, read_tree
 

@@ -6,12 +6,12 @@ import glob
 import os
 import sys
 from collections import defaultdict
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -22,7 +22,7 @@ LIST = "@"
 LARGEST_LIST = 100 * MEGABYTE
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ChosenProject:
     """A project of the batch."""
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import typer
 
 from photostrip.cli.stdout import print_json, print_sections
+from photostrip.frozen import dataclass
 from photostrip.visible import visible
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from photostrip.frozen import dataclass
 
 # Kinds of quantities and the unit of their absolute tolerances. Statistics have two: metres, micrometres.
 UNITS = {
@@ -18,7 +18,7 @@ UNITS = {
 SETS = ("ids", "choices", "rejected", "findings")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Tolerance:
     """Tolerance of one kind of quantity; the larger of its two parts counts."""
 
@@ -28,7 +28,7 @@ class Tolerance:
     ignore: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SetTolerance:
     """How many elements of a set may be missing or new."""
 
@@ -37,7 +37,7 @@ class SetTolerance:
     ignore: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Tolerances:
     """Tolerances of all kinds.
 

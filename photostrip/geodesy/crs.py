@@ -6,11 +6,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from photostrip.errors import PhotostripError
+from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import FrameSpec, Kind, Refusal
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geodesy.proj_operation import load_pyproj

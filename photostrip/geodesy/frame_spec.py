@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from photostrip.errors import Fault
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,12 +10,12 @@ the matrix is not orthogonal).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import Ellipsoid, eccentricity_squared, prime_vertical_radius
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def strip_azimuth(first: ArrayLike, last: ArrayLike) -> float:
     return float(np.arctan2(-dy, dx))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class IntermediateFrame:
     """The Cartesian frame Pi in which a strip is adjusted. Source: [001] eq. 142-144, 152."""
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import EARTH_RADIUS
 
 if TYPE_CHECKING:

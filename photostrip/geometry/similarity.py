@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.points import frozen
 

@@ -5,11 +5,12 @@ Source: [001] eq. 153 for Earth curvature in the frames; see docs/frames.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import curvature_correction
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames

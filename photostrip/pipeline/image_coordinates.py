@@ -5,11 +5,12 @@ Source: [001] for interior orientation and corrections, see docs/image-coordinat
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.pipeline.common_points import mean_points
 from photostrip.pipeline.given_points import measured_control
 from photostrip.pipeline.strips.adjusting import adjust_formed

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings

@@ -8,11 +8,11 @@ Source: [004b] eq. 1-8, with the corrections listed in docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation.image_coordinates.lens_distortion import ideal_from_image
 
 if TYPE_CHECKING:

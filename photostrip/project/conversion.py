@@ -5,12 +5,13 @@ Here the user's units, axes and directions end: inside there are millimetres wit
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from photostrip import camera
+from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import mean_radius, radius_in_azimuth
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import WGS84
@@ -42,7 +43,7 @@ PER_MILLIMETRE = {"mm": 1.0, "um": 1e3, "0.1um": 1e4}
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of angles
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ImageSystem:
     """Unit, direction and origin of measured image coordinates."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from photostrip.formats.measured.models import ModelTable, read_models
 from photostrip.formats.text.findings import Findings, listed, suggestion
+from photostrip.frozen import dataclass
 from photostrip.pipeline import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
 from photostrip.project.yaml.document import Node, fault_at

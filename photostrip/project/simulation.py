@@ -6,7 +6,7 @@ here, values there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator
@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BeforeValidator
 from photostrip import camera, simulation
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
+from photostrip.frozen import dataclass
 from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.for_editors import described

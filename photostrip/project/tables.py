@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.text.findings import Findings, listed, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
+from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.project.models import ModelTables, model_tables, read_model_points
 from photostrip.project.yaml.document import Node, fault_at

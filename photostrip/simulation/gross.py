@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import dataclass
 from photostrip.simulation.draws import Draws, Purpose
 
 if TYPE_CHECKING:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.flight import CUT_SIGMAS, Photos, position_sigma
 from photostrip.simulation.imaging import sees

@@ -6,12 +6,13 @@ brought into the system of the instrument, with errors that do not depend on eac
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import from_vector
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.simulation.draws import Draws, Purpose

@@ -7,9 +7,10 @@ in the name or are metres, millimetres in the image or plain numbers.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from photostrip.camera import Camera
+from photostrip.frozen import dataclass
 
 FILM = Camera(
     "film",

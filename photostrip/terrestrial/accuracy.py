@@ -7,12 +7,12 @@ in mm, reduced to the principal point; ``rotation`` (3, 3) takes the photo to th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo, partials
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def grid(photo_format: tuple[float, float], step: float, *, level: bool = True) 
     return axes[0], axes[1]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Example:
     """A worked example of the source."""
 
@@ -125,7 +125,7 @@ EXAMPLES = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class WorkedExample:
     """An example computed again, step by step; standard errors in arcseconds."""
 

@@ -7,11 +7,11 @@ fitted to the stable points and tested against zero. A stable point that does no
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile

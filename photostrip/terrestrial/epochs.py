@@ -7,12 +7,13 @@ covariance.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.terrestrial.camera_motion import ANGLES, ImagePair, Motion, find_motion
 from photostrip.terrestrial.displacement import displacements, limit
 from photostrip.terrestrial.frame import small_turn

@@ -15,11 +15,11 @@ Directions (..., 2) are azimuths lambda, clockwise from the ground's Y axis in (
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def direction_gradient(vector: ArrayLike) -> Floats:
     return gradient
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Phototheodolite:
     """What a terrestrial camera is made of."""
 

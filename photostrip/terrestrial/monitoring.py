@@ -6,12 +6,12 @@ share (of the reference photos, when pseudo-parallaxes were measured against the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.terrestrial.displacement import SPACE, limit, statistic
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ REASONS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MonitoringSettings:
     """How displacements are tested."""
 

@@ -7,12 +7,12 @@ quadruple of coordinates: x and z of the left photo, x and z of the right one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.terrestrial.frame import GROUND_FROM_HOUSE, TURN_AXES, rays
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -20,6 +19,7 @@ from photostrip.cli.documents import Rendering, require_target, say, write_rule
 from photostrip.cli.failures import failures_as
 from photostrip.cli.option_groups import with_groups
 from photostrip.cli.options import Silent
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from photostrip.project.terrestrial.survey import Survey

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from photostrip.batch.local_pool import Executor, LocalPool
@@ -17,6 +16,7 @@ from photostrip.cli.stdout import BatchFormat, Format, ascii_only, print_section
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_files, write_text
+from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
 from photostrip.report.page import messages, text

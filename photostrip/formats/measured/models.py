@@ -5,7 +5,6 @@ Files of blocks, a model's id, lines ``point x y z`` and -99, are read as well.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from photostrip.formats.measured.columns import AXES, PHOTO, POINT, SIGMAS, numbers, refuse_without_sigma, sigmas
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

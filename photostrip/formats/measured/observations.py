@@ -5,7 +5,7 @@ Lists of a stereocomparator, a row for each point of a pair, are read as well: s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,7 @@ from photostrip.formats.measured.columns import PHOTO, POINT, numbers, refuse_wi
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from photostrip.formats.measured.columns import POINT, repeated_rows
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import from_angles
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.pipeline.given_points import cartesian_of

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.frozen import dataclass
 from photostrip.pipeline.plausibility.base_directions import closer_look
 from photostrip.triangulation.plausibility.photos import flight_order, units
 

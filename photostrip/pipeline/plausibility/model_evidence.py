@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.strips.models import form_models
 from photostrip.triangulation.plausibility.control.control_strip import StripPoints

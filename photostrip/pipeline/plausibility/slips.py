@@ -7,11 +7,12 @@ nothing wrong with the given points of a strip has compared them better than the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.pipeline.given_points import rejected_control, rows_of_given
 from photostrip.points import locate
 from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile

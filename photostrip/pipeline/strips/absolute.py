@@ -5,13 +5,13 @@ Source: [001] eq. 142-149.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.frozen import dataclass
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.geometry.similarity import Similarity, similarity_derivatives
 from photostrip.pipeline.given_points import rows_of_given

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.frozen import dataclass
 from photostrip.pipeline.overruling import CENTER
 from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes

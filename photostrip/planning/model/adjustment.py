@@ -9,11 +9,11 @@ Source: [000], where the covariance is meant "for the adjustment of coordinates"
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.planning.model.element_errors import free_influence
 from photostrip.planning.model.single_model import PARAMETERS, ModelControl, parameter_rows
 

@@ -8,11 +8,11 @@ Source: [000] eq. 1, 5-8; [003] eq. 10.8, 10.12.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.planning.model.adjustment import AdjustedModel, adjust_model
 from photostrip.planning.model.deformation import base_frame_elements, parallax_error, surface_of_elements
 from photostrip.planning.model.element_errors import influence

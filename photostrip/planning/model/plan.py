@@ -5,12 +5,12 @@ Errors that are given, or misclosures that were found, go to the points of the m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import dataclass
 from photostrip.planning.model import closed_form, deformation
 from photostrip.planning.model.adjustment import adjust_model
 from photostrip.planning.model.element_errors import (

@@ -16,12 +16,12 @@ Source: [000] eq. 1-8, with the corrections listed in docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.planning.model.element_errors import free_influence, influence
 

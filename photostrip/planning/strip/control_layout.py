@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import dataclass
 from photostrip.notes import counted
 
 if TYPE_CHECKING:

@@ -6,7 +6,6 @@ Values arrive as texts (see ``yaml.document``) and get their type here. ``wrong`
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
@@ -16,6 +15,7 @@ from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import SMALLEST, NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.tables import CONTROL_CHARACTER
+from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 
 if TYPE_CHECKING:

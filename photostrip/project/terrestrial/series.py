@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from photostrip.errors import Fault
 from photostrip.formats.measured import terrestrial
 from photostrip.formats.text.findings import Findings, listed, suggestion
+from photostrip.frozen import dataclass
 from photostrip.notes import Note, counted
 from photostrip.points import locate
 from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLIMETRES, refuse_outside
@@ -24,7 +24,7 @@ REFERENCE, SECOND = "first", "second"  # names of epochs that have none
 FEWEST_EPOCHS = 2
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Table:
     """What the numbers of a table mean."""
 
@@ -36,7 +36,7 @@ class Table:
     sigma_d: float | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Wanted:
     """What the project says of epochs and points."""
 

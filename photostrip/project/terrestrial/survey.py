@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +10,7 @@ from photostrip.errors import InputError
 from photostrip.formats.output.terrestrial_directions import Theodolite
 from photostrip.formats.output.terrestrial_displacements import ReportFrame
 from photostrip.formats.text.findings import Findings, suggestion
+from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.project.terrestrial.cameras import listed_cameras, own_presets
 from photostrip.project.terrestrial.options import SightingOptions, read_sightings

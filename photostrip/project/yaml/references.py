@@ -5,11 +5,11 @@ All checks look at the tree, not at the validated project, so that they also run
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
+from photostrip.frozen import dataclass
 from photostrip.project.yaml.document import COMMAND_LINE, Node, Path, fault_at
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 LEAST_MARKS = 2
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ListedPhoto:
     """One photo of one strip: its id, where it stands, and the camera of its strip."""
 

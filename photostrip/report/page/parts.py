@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
+
+from photostrip.frozen import dataclass
 
 Document = dict[str, Any]  # of a result, a plan, a comparison: plain values, as JSON has them
 DASH = "–"  # stands where there is no value

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.planning.model.deformation import Paraboloid, determines_paraboloid, fit_paraboloid
 from photostrip.result.quantities import record
 from photostrip.statistics import t_p_value

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import angles
 from photostrip.result.numbers import PER_RADIAN, Document, Plain, rounded
 from photostrip.result.points.ground import coordinates

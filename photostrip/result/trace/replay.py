@@ -6,11 +6,12 @@ step; that they end where the run ended is tested.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, solve_elements, start_values

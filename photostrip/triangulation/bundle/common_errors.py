@@ -11,12 +11,13 @@ Source: derived, see docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.observations.problem import CALIBRATION
 from photostrip.triangulation.bundle.selection import Selection, selected

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation.bundle.observations.ray_batches import Batch, SortedRays, arrange, sort_rays
 
 if TYPE_CHECKING:

@@ -5,10 +5,11 @@ Source: derived; block elimination from the first block on, and the backward rec
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -5,13 +5,13 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
 from photostrip.distributions import gamma_cdf
+from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.covariance_adjustment import system

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from photostrip.frozen import dataclass
 from photostrip.statistics import TEST_LEVEL
 
 # standard deviations over those of the polynomial: where the covariance does not do better than that, the polynomial

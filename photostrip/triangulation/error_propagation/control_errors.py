@@ -9,11 +9,11 @@ Source: derived, docs/precision.md, eq. 5; [001] eq. 145-151 for the fit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.triangulation.polynomial.terms import columns
 

@@ -5,10 +5,12 @@ Source: derived; see docs/precision.md, eq. 1-4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
+
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -5,11 +5,11 @@ Source: derived; see docs/precision.md, eq. 3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.points import take_rows
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, add_by_item, ranges
 from photostrip.triangulation.resection.collinearity import partials

@@ -7,13 +7,13 @@ the figure is turned as little as possible against the words.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import dataclass
 from photostrip.points import frozen
 
 if TYPE_CHECKING:

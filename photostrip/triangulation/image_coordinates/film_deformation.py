@@ -7,10 +7,11 @@ there are marks enough to see it, best eight.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -9,12 +9,13 @@ Source: [001] for the chain; seven parameters in place of one derived, see docs/
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.triangulation.independent_models import linking
 

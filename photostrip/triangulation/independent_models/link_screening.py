@@ -9,11 +9,12 @@ Source: [Baarda 1968]; order and limits derived, see docs/independent-models.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.independent_models import linking

@@ -5,12 +5,12 @@ Which degree they get is decided by evidence: an F test of each step and errors 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.statistics import f_p_value
 from photostrip.triangulation.polynomial import terms as polynomial_terms
 from photostrip.triangulation.polynomial.least_squares import AxisFit, FitProblem, fit_axes

@@ -6,10 +6,11 @@ needs four different ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

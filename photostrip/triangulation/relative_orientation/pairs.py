@@ -6,12 +6,13 @@ thousand pairs cost little more than one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.points import PhotoPoints, take_rows
 

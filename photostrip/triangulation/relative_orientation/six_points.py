@@ -8,10 +8,11 @@ Source: derived from the linear condition; the weight numbers of the dependent p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

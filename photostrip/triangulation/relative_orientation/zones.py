@@ -13,11 +13,11 @@ Source: [004a], [001]; base and spread from the points are chosen here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation.relative_orientation.solution import base_rays
 
 if TYPE_CHECKING:

@@ -5,13 +5,13 @@ Source: [Grunert 1841] in the form of [Haralick 1994] for three points.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import counted
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives

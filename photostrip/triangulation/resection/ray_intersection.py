@@ -6,11 +6,11 @@ Source: derived.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ Source: [001] eq. 139-141.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.robust import medians, scales
 

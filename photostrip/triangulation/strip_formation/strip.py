@@ -8,12 +8,13 @@ Source: [001] eq. 125-141.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.solution import base_rays
 from photostrip.triangulation.strip_formation.intersection import intersect

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +11,7 @@ import typer
 
 from photostrip.cli.documents import FORMS, Form, Rendering, require_target, write_rule
 from photostrip.cli.options import Silent
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

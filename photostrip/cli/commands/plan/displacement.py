@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
 import typer
@@ -10,6 +9,7 @@ import typer
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import SIGMA_UM, PlanFile, PlanOptions, Sets
 from photostrip.cli.failures import failures_as
+from photostrip.frozen import dataclass
 
 
 @dataclass(frozen=True)

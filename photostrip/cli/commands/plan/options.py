@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, NamedTuple, get_args, get_type_hints
 
 import typer
+
+from photostrip.frozen import dataclass
 
 Options = dict[str, tuple[str, str | None]]  # by the key that it sets: name of an option, and its value
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import counted, named
 from photostrip.triangulation.bundle.normal_equations import datum

@@ -9,11 +9,11 @@ Source: [Granshaw 1980] for the elimination.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, Rays, by_point
 from photostrip.triangulation.bundle.structure import triangle
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation.bundle.normal_equations.band import Band
 from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated, blocks_of, eliminate, squares
 from photostrip.triangulation.bundle.normal_equations.sparse import Sparse

@@ -9,11 +9,12 @@ A sigma that is infinite switches an observation off; a sigma of zero is refused
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import GROUND_AXES
 
 if TYPE_CHECKING:

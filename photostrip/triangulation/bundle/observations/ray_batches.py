@@ -11,11 +11,12 @@ Batches are cut so small that what is computed for one stays in the cache of the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers

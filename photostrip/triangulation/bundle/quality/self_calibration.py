@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.statistics import t_p_value
 from photostrip.triangulation.bundle.observations.calibration import corrections
 from photostrip.triangulation.bundle.observations.problem import CALIBRATION, BundleProblem

@@ -6,11 +6,12 @@ share of the redundancy, until the ratios are one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation.bundle.quality import reliability
 
 if TYPE_CHECKING:

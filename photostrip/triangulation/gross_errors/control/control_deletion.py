@@ -13,13 +13,14 @@ Source: derived; data snooping with correlated observations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.statistics import chi2_quantile, f_p_value
 from photostrip.triangulation.gross_errors.pairs.deletion import gains
 from photostrip.triangulation.polynomial import terms

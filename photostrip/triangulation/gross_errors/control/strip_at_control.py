@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.absolute_orientation import Targets
 

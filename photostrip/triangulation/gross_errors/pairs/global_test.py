@@ -5,11 +5,12 @@ Source: derived; [004a] stops at tests of single residuals. See docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, normal_quantile
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS

@@ -12,11 +12,12 @@ Source: derived; the order of work is chosen here, see docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.rejection import Rejection
 from photostrip.triangulation.gross_errors.pairs import deletion
 from photostrip.triangulation.gross_errors.pairs.global_test import FIFTH_WRONG, GlobalTest, ParallaxScatter

@@ -12,13 +12,14 @@ Source: [004a]; the two-sided form and the order of work are chosen here, see do
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import InputError
+from photostrip.frozen import dataclass
 from photostrip.statistics import grubbs_limit, tau_limit
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, rejection, search

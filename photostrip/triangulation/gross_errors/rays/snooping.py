@@ -9,7 +9,7 @@ Source: [Baarda 1968], [Pope 1976].
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass
 from photostrip.rejection import Rejection
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up

@@ -9,12 +9,12 @@ Source: least median of squares (Rousseeuw 1984); derived, see docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.statistics import SIGMA_FROM_MEDIAN, t_quantile
 
 if TYPE_CHECKING:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.statistics import t_quantile
 from photostrip.triangulation.plausibility.control.control_fit import (

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import dataclass
 from photostrip.notes import MOST_NAMED, listed
 from photostrip.triangulation.plausibility.finding import found
 from photostrip.triangulation.plausibility.photos import mosaic
