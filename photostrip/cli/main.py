@@ -106,6 +106,7 @@ def _call(name: str, arguments: list[str]) -> int:
     """
     import typer
 
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # to look for them it reads every installed package, 8 ms
     entry = COMMANDS[name]
     target = getattr(import_module(entry.module), name)
     app = target
