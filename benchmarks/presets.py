@@ -55,6 +55,7 @@ KINDS = {
     "digital-frame": Kind("digital", 1.8, 12, refraction=True),
     "uav-corridor": Kind("digital", 3.0, 60, refraction=False),
     "teaching": Kind("film", 10.0, 12, refraction=False),
+    "as-printed": Kind("film", 10.0, 12, refraction=False),
 }
 
 

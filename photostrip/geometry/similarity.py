@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from photostrip.points import frozen
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
 
 SIMILARITY_PARAMETERS = 7  # shift, rotation, logarithm of the scale
 
@@ -63,6 +63,29 @@ class Similarity:
         rotation = (u * sign) @ vt
         scale = float((values * sign).sum() / (w[:, None] * da**2).sum())
         return cls(scale, rotation, center_b - scale * rotation @ center_a)
+
+
+class PairScales(NamedTuple):
+    """Scales between two systems from the distances of all pairs of points."""
+
+    # first, second: (k,): rows of the two points of a pair
+    first: Numbers
+    second: Numbers
+    # source, target: (k,): their distance in each system
+    source: Floats
+    target: Floats
+
+    @property
+    def mean(self) -> float:
+        """The scale r of all: sum of the target's distances over sum of the source's."""
+        return float(self.target.sum() / self.source.sum())
+
+
+def pair_scales(source: Floats, target: Floats) -> PairScales:
+    """Compare the distances of corresponding points (n, 3) in two systems; a first look at control. [001] eq. 147."""
+    first, second = np.triu_indices(len(source), 1)
+    in_source, in_target = (np.linalg.norm(xyz[second] - xyz[first], axis=1) for xyz in (source, target))
+    return PairScales(first=first, second=second, source=in_source, target=in_target)
 
 
 def collinearity(points: ArrayLike, weights: ArrayLike | None = None) -> float:

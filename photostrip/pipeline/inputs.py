@@ -17,6 +17,7 @@ from photostrip.triangulation.polynomial import correction as polynomial
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.triangulation.strip_formation.strip import NOTHING_GIVEN, FirstPhoto
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
@@ -36,6 +37,7 @@ class Strip:
     id: str
     camera: Camera  # the camera of all its photos
     photos: tuple[str, ...]  # photos in flight order; a single one only in a bundle adjustment
+    first: FirstPhoto = NOTHING_GIVEN  # frame and scale of the strip as long as it has no control
     # parameters of its camera that a bundle adjustment estimates, of ``bundle.settings.CALIBRATION``
     calibrate: tuple[str, ...] = ()
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from photostrip.points import ModelPoints, PhotoPoints
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
     from photostrip.triangulation.independent_models.settings import LinkSettings
+    from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
 CENTER = "center of photo "  # before the name of a perspective centre in model coordinates
 
@@ -36,6 +37,24 @@ def require_named(settings: LinkSettings, measured: ModelPoints) -> None:
     nodes = [measured.name(node).removeprefix(CENTER) for node in measured.node.tolist()]
     known = {f"{measured.model_ids[k]}/{name}" for k, name in zip(measured.model.tolist(), nodes, strict=True)}
     _require_known(settings, known, "links", "model/point or model/photo, as in the table of models")
+
+
+def require_weighted(settings: StripFormationSettings, observations: PhotoPoints) -> None:
+    """Refuse weights of points that no photo shows, with a fault for each."""
+    known = set(observations.point_ids)
+    faults = [
+        Fault(
+            f"`{name}` is no point of the photos",
+            code="no-such-measurement",
+            key="processing.scale_weights",
+            points=(name,),
+            expected="points of the table of observations",
+        )
+        for name in settings.scale_weights
+        if name not in known
+    ]
+    if faults:
+        raise InputError(faults)
 
 
 def _require_known(settings: RelativeSettings | LinkSettings, known: set[str], block: str, expected: str) -> None:

@@ -15,10 +15,13 @@ from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import mean_radius, radius_in_azimuth
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import WGS84
+from photostrip.geometry.rotation import from_angles
 from photostrip.pipeline import Settings, Strip
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.image_coordinates import certificate
+from photostrip.triangulation.strip_formation import strip
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -30,7 +33,7 @@ if TYPE_CHECKING:
     from photostrip.formats.measured.control import ControlTable
     from photostrip.formats.measured.exterior import OrientationTable, PositionTable
     from photostrip.formats.measured.measurements import Measurements
-    from photostrip.project.schema.cameras import Camera, Distortion
+    from photostrip.project.schema.cameras import Camera, Distortion, FirstPhoto
     from photostrip.project.schema.ground import CameraPositions as PositionsBlock
     from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
     from photostrip.project.schema.processing import Processing
@@ -104,6 +107,7 @@ def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[St
             id=str(each.id),
             camera=known[each.camera],
             photos=tuple(map(str, each.photos)),
+            first=_first_photo(each.first_photo),
             calibrate=tuple(
                 dict.fromkeys(usual if (wanted := project.cameras[each.camera].self_calibration) is None else wanted)
             ),
@@ -111,6 +115,14 @@ def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[St
         for each in project.strips
         if each.camera is not None
     )
+
+
+def _first_photo(given: FirstPhoto | None) -> strip.FirstPhoto:
+    """Return the frame and the scale of a strip."""
+    if given is None:
+        return strip.NOTHING_GIVEN
+    rotation = from_angles(np.array(given.angles) * RADIANS[given.unit], given.system)
+    return strip.FirstPhoto(rotation, given.base)
 
 
 def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, camera.Camera]) -> PhotoPoints:
@@ -323,7 +335,11 @@ def settings(project: ProjectFile) -> Settings:
         cross_validation=wanted.cross_validation,
         relative=_laid_over(usual.relative, wanted.relative),
         links=_laid_over(usual.links, wanted.links),
-        formation=replace(usual.formation, scale_transfer=wanted.scale_transfer),
+        formation=StripFormationSettings(
+            scale_transfer=wanted.scale_transfer,
+            scale_weights={str(name): weight for name, weight in wanted.scale_weights.items()},
+            intersection=wanted.intersection,
+        ),
         absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=radius),
         polynomial=_laid_over(usual.polynomial, wanted.polynomial),
         covariance=_laid_over(usual.covariance, wanted.covariance),

@@ -33,6 +33,8 @@ OF_PHOTOS = (
     "covariance",
     "bundle",
     "scale_transfer",
+    "scale_weights",
+    "intersection",
     "principal_point",
     "distortion",
     "refraction",

@@ -10,6 +10,7 @@ import pytest
 from photostrip.errors import InputError
 from photostrip.pipeline import Result, Settings, triangulate
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings as Relative
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 from tests.strips import Flown, control_points, fly, project
 
 WRONG = ("105", "p4_1")
@@ -60,6 +61,15 @@ def test_a_measurement_that_is_dropped_takes_no_part_and_is_reported() -> None:
     result = adjusted(drop=("103/p2_0",))
     assert not in_use(result, "103", "p2_0")
     assert [note.code for note in result.notes if note.code.startswith("user-")] == ["user-drop"]
+
+
+def test_a_weight_of_a_point_that_no_photo_shows_is_refused() -> None:
+    strip = spoiled()
+    inputs = project(strip, control_points({name: strip.xyz[strip.at[name]] for name in strip.bands(0, 3, 6)}))
+    formation = StripFormationSettings(scale_weights={"p2_0": 2.0, "nobody": 1.0})
+    with pytest.raises(InputError, match="`nobody` is no point of the photos") as told:
+        triangulate(inputs, Settings(formation=formation))
+    assert [fault.key for fault in told.value.faults] == ["processing.scale_weights"]
 
 
 @pytest.mark.parametrize(

@@ -212,6 +212,13 @@ FAULTS = [
         "project.yaml:15",
         "refr",
     ),
+    (
+        "first photo",
+        {P: PROJECT.replace("id: A\n", "id: A\n    first_photo: {base: 92}\n", 1)},
+        "needs-image-coordinates",
+        "project.yaml:",
+        "first_photo",
+    ),
 ]
 
 

@@ -16,8 +16,16 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 PRESETS = sorted((ROOT / "configs").glob("*.yaml"))
-SCALE = {"film-archive": 1, "film-mapping": 1, "digital-frame": 0.01, "uav-corridor": 0.01, "teaching": 1}
+SCALE = {
+    "film-archive": 1,
+    "film-mapping": 1,
+    "digital-frame": 0.01,
+    "uav-corridor": 0.01,
+    "teaching": 1,
+    "as-printed": 1,
+}
 SIGMA = {"film-archive": 0.010, "film-mapping": 0.005, "digital-frame": 0.003, "uav-corridor": 0.005, "teaching": 0.010}
+SIGMA["as-printed"] = SIGMA["teaching"]
 
 
 def bare(folder: Path, preset: Path, files: dict[str, str]) -> Sample:

@@ -13,7 +13,9 @@ def test_every_preset_is_tried() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("preset", ["film-archive", "film-mapping", "digital-frame", "uav-corridor", "teaching"])
+@pytest.mark.parametrize(
+    "preset", ["film-archive", "film-mapping", "digital-frame", "uav-corridor", "teaching", "as-printed"]
+)
 def test_a_preset_does_what_it_is_made_for(preset: str) -> None:
     found = presets.outcome(preset, 1)
     assert found.found == found.wrong > 0

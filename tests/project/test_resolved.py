@@ -72,6 +72,7 @@ processing:
     grubbs_alpha: 0.05
     parallax_limit: auto
   scale_transfer: least_squares
+  intersection: mean
   earth_curvature: auto
   earth_radius: 6371000.0
   precision: true

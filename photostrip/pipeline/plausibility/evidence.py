@@ -102,7 +102,7 @@ class EvidenceStrip:
         gone = np.asarray(~np.isfinite(strip.model_xyz).all(axis=1), bool)
         if not gone.any():
             return self
-        models = model_points(orientation)
+        models = model_points(orientation, strip.first, left_ray=strip.left_ray)
         pair = orientation.pairs.pair
         turned = np.einsum("mij,mj->mi", strip.rotations[pair], models.vectors)
         back = strip.centers[pair] + strip.scale[pair, None] * turned

@@ -29,5 +29,6 @@ def form_strips(inputs: Inputs, observations: PhotoPoints, settings: Settings) -
 def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings) -> list[FormedPhotos]:
     """Form the strips of photos; a single photo, which only a bundle adjustment can orient, forms nothing."""
     overruling.require(settings.relative, observations)
+    overruling.require_weighted(settings.formation, observations)
     whole = [strip for strip in inputs.strips if len(strip.photos) > 1 or settings.adjustment != "bundle"]
     return [form_strip(strip, observations, settings) for strip in whole]

@@ -254,8 +254,12 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     oriented, scatter = screened.orientation, screened.scatter.by_pair
     refuse_unusable(oriented, screened.converged, strip.photos)
     wrong: tuple[Rejection, ...] = ()
+    given = settings.formation.scale_weights
+    point_weight = np.array([given.get(name, 1.0) for name in observations.point_ids]) if given else None
     if settings.relative.screening == "none":
-        formed = form_from_pairs(oriented, settings.formation, strip.photos, scatter)
+        formed = form_from_pairs(
+            oriented, settings.formation, strip.photos, scatter, first=strip.first, point_weight=point_weight
+        )
     else:  # the strip decides what its pairs could not
         rays = StripRays(
             observations=observations,
@@ -266,7 +270,15 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
             kept=overruling.rows(settings.relative.keep, observations),
         )
         readmit = settings.relative.screening in screening.SEARCHES
-        oriented, formed, wrong = form_screened(oriented, rays, strip.photos, settings.formation, readmit=readmit)
+        oriented, formed, wrong = form_screened(
+            oriented,
+            rays,
+            strip.photos,
+            settings.formation,
+            readmit=readmit,
+            first=strip.first,
+            point_weight=point_weight,
+        )
         rejections = with_readmitted(screened.rejections, oriented.used)
         screened = replace(screened, orientation=oriented, rejections=rejections)
     return FormedPhotos(

@@ -12,17 +12,17 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_R
 from photostrip.triangulation.relative_orientation.orientation import orient_again
 from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT
 from photostrip.triangulation.strip_formation import non_neighbours
-from photostrip.triangulation.strip_formation.strip import form_from_pairs, without_rows
+from photostrip.triangulation.strip_formation.strip import NOTHING_GIVEN, form_from_pairs, without_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Flags
+    from photostrip.arrays import Flags, Floats
     from photostrip.rejection import Rejection
     from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
+    from photostrip.triangulation.strip_formation.strip import FirstPhoto, FormedStrip
 
 
 class ScreenedStrip(NamedTuple):
@@ -40,14 +40,17 @@ def form_screened(
     settings: StripFormationSettings,
     *,
     readmit: bool,
+    first: FirstPhoto = NOTHING_GIVEN,
+    point_weight: Floats | None = None,
 ) -> ScreenedStrip:
     """Form a strip, leave out what its rays contradict, take back what they confirm, and form it again.
 
     Where pairs and junctions had nothing to reject, nothing is looked for.
 
     readmit: whether points that a pair rejected may be taken back.
+    first, point_weight: as in ``form_from_pairs``.
     """
-    formed = form_from_pairs(of_pairs, settings, photos, rays.sigma)
+    formed = form_from_pairs(of_pairs, settings, photos, rays.sigma, first=first, point_weight=point_weight)
     if of_pairs.used.all() and formed.junctions.used.all():
         return ScreenedStrip(of_pairs, formed, ())
     from photostrip.triangulation.gross_errors.rays.strip_network import wrong_rays  # needs the bundle adjustment
@@ -59,7 +62,9 @@ def form_screened(
     changed = np.unique(of_pairs.pairs.pair[used != of_pairs.used])
     oriented = orient_again(of_pairs, np.where(used, rays.weight, 0.0), changed) if len(changed) else of_pairs
     try:
-        formed = form_from_pairs(oriented, settings, photos, rays.sigma, aside, searched=True)
+        formed = form_from_pairs(
+            oriented, settings, photos, rays.sigma, aside, searched=True, first=first, point_weight=point_weight
+        )
     except GeometryError:
         oriented = of_pairs  # nothing would join two models: what joined them before stays
     formed = without_rows(formed, oriented, aside)

@@ -6,7 +6,20 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from photostrip.project.schema.values import Id, Number, Pair, Positive, Section, choice, if_empty, key, quoted, wrong
+from photostrip.project.schema.ground import Angles
+from photostrip.project.schema.values import (
+    Id,
+    Number,
+    Pair,
+    Positive,
+    Section,
+    Triple,
+    choice,
+    if_empty,
+    key,
+    quoted,
+    wrong,
+)
 from photostrip.triangulation.bundle.settings import CALIBRATION
 from photostrip.triangulation.image_coordinates.certificate import PLACES
 
@@ -80,6 +93,13 @@ class Camera(Section):
         return self
 
 
+class FirstPhoto(Angles):
+    """Orientation of the first photo of a strip, and the length of its first base: its frame and its scale."""
+
+    angles: Triple = key("Angles of the first photo in the strip, in the order of their system", (0.0, 0.0, 0.0))
+    base: Positive = key("Length of the first base in the strip", 1.0, unit="any")
+
+
 class Strip(Section):
     """Photos of one flight line."""
 
@@ -92,4 +112,7 @@ class Strip(Section):
         "Independent models in flight order, one for every two neighbouring photos. Default: by their perspective"
         " centres",
         None,
+    )
+    first_photo: FirstPhoto | None = key(
+        "Angles of the first photo and length of the first base, for strip coordinates as in a textbook", None
     )

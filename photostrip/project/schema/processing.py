@@ -17,6 +17,7 @@ from photostrip.project.schema.values import (
     Flag,
     Fraction,
     Id,
+    NotNegative,
     Number,
     NumberOrAuto,
     Positive,
@@ -34,7 +35,7 @@ from photostrip.triangulation.bundle.settings import CALIBRATION, SCREENINGS, TE
 from photostrip.triangulation.gross_errors.pairs.screening import METHODS
 from photostrip.triangulation.independent_models.settings import METHODS as LINK_METHODS
 from photostrip.triangulation.polynomial.correction import DEGREES
-from photostrip.triangulation.strip_formation.scale_transfer import SCALE_TRANSFERS
+from photostrip.triangulation.strip_formation.scale_transfer import INTERSECTIONS, SCALE_TRANSFERS
 
 DEFAULTS = Settings()
 
@@ -162,6 +163,15 @@ class Processing(Section):
     scale_transfer: Annotated[str, *choice(SCALE_TRANSFERS)] = key(
         "`least_squares`: all common points with their precision; `distances`: the textbook's mean of ratios",
         DEFAULTS.formation.scale_transfer,
+    )
+    scale_weights: Annotated[dict[str, NotNegative], BeforeValidator(if_empty)] = key(
+        "Weights of points in the scale transfer, by name, 1 for all others; with 0 a point joins models only where no"
+        " other does",
+        {},
+    )
+    intersection: Annotated[str, *choice(INTERSECTIONS)] = key(
+        "`mean`: Y of a model point is the mean of both rays; `left`: the point lies on the left ray, as printed",
+        DEFAULTS.formation.intersection,
     )
     earth_curvature: Annotated[str, *choice(("auto", "model", "image", "none"))] = key(
         "`auto` or `none`: the frames carry it, `local` is truly Cartesian; `model`: D^2/2R, for plane map"

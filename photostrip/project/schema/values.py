@@ -201,6 +201,7 @@ def quoted(words: tuple[str, ...]) -> str:
 
 
 _read_number = number_between("a number")
+_read_not_negative = number_between("a number from 0 on", least=-SMALLEST)
 _read_positive = number_between("a number larger than 0", least=SMALLEST)
 _read_fraction = number_between("a number between 0 and 1", least=0.0, most=1.0)
 _ANY = {"type": ["string", "number", "boolean", "null"]}  # whatever an id looks like, it is read as text
@@ -212,6 +213,7 @@ _AXES = {"type": "array", "items": {"enum": [*GROUND_AXES, *CARTESIAN_AXES]}, "m
 Id = Annotated[str, *typed(text, _ANY)]
 Words = Annotated[str, *typed(text, {"type": "string", "minLength": 1})]
 Number = Annotated[float, *typed(_read_number, _NUMBER)]
+NotNegative = Annotated[float, *typed(_read_not_negative, {"type": "number", "minimum": 0})]
 Positive = Annotated[float, *typed(_read_positive, _POSITIVE)]
 Fraction = Annotated[float, *typed(_read_fraction, _FRACTION)]
 PositiveOrAuto = Annotated[float | None, *typed(or_auto(_read_positive), {"anyOf": [AUTO, _POSITIVE]})]

@@ -91,6 +91,11 @@ def _only_models(root: Node) -> Iterator[Fault]:
         if root.has(name):
             message = f"`{name}` and `models` exclude each other: a strip is made of photos or of models"
             yield fault_at(root, (name,), message, "photos-and-models", fix="remove one of the two")
+    for number, strip in enumerate(root.list_at("strips")):
+        if strip.has("first_photo"):
+            message = "independent models stand in the frame of the first of them: `first_photo` is for photos"
+            place = ("strips", number, "first_photo")
+            yield fault_at(root, place, message, "needs-image-coordinates", fix="remove it")
     for name, (words, expected) in NEEDS_IMAGES.items():
         word = root.word("processing", name)
         if word.casefold() in words:

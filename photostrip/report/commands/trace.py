@@ -33,6 +33,9 @@ def trace_sections(document: Document) -> tuple[Section, ...]:
     """Return symbols, then for each strip its pairs, the chain, junctions, absolute orientation and polynomials."""
     unit = document["angles"]
     found = [Section("Symbols", (Facts(tuple(document["symbols"].items())), Words(f"Angles in {unit}.")))]
+    if document["departures"]:
+        departures = tabulated(document["departures"], DEPARTURES)
+        found.append(Section("Where this run departs from the textbook", (departures,)))
     for strip in document["strips"]:
         found += [_pair(pair, unit) for pair in strip["pairs"]]
         found.append(_chain(strip, unit))
@@ -41,6 +44,15 @@ def trace_sections(document: Document) -> tuple[Section, ...]:
         if strip["polynomial"] is not None:
             found.append(_polynomial(strip))
     return tuple(found)
+
+
+DEPARTURES = (
+    words("subject", "subject"),
+    words("source", "source"),
+    words("textbook", "textbook"),
+    words("here", "here"),
+    words("to follow it", "key"),
+)
 
 
 def _pair(pair: Document, unit: str) -> Section:
@@ -52,6 +64,10 @@ def _pair(pair: Document, unit: str) -> Section:
         parts.append(_iterations(each, unit))
     if pair["rejected"]:
         parts.append(tabulated(pair["rejected"], REJECTED))
+    own = pair["photo_system"]
+    base = ", ".join(f"{name} {fixed(own[name], 6)}" for name in ("bx", "by", "bz"))
+    turns = ", ".join(f"{GREEK[name]} {fixed(own[name], 6)}" for name in ("tau", "nu", "alpha", "omega", "kappa"))
+    parts.append(Words(f"In the system of the left photo: {base}; {turns} {unit}."))
     parts.append(Words(f"σ0 of an image coordinate: {fixed(pair['sigma0_um'], 2)} µm. The points, eq. 137-138:"))
     parts.append(tabulated(pair["points"], POINTS))
     return Section(SOURCE["pairs"].format(**pair), tuple(parts))
@@ -155,13 +171,30 @@ def _absolute(strip: Document, unit: str) -> Section:
         found["control"], CONTROL, note="v: strip minus given after the similarity, in the intermediate frame."
     )
     steps = tabulated(found["steps"], columns, (end,), sigma0)
-    return Section(SOURCE["absolute"].format(**strip), (facts, steps, control))
+    return Section(SOURCE["absolute"].format(**strip), (facts, *_approximate(found["approximate"]), steps, control))
+
+
+def _approximate(found: Document | None) -> tuple[Part, ...]:
+    """Show the scales of pairs of control points, r and t."""
+    if found is None:
+        return ()
+    center = ", ".join(fixed(value, 6) for value in found["centroid"])
+    r, t = (short(found[name], digits=9) for name in ("r", "t"))
+    text = Words(f"r = {r}, t = s/r = {t}; centroid of the strip's control {center}.")
+    return (tabulated(found["pairs"], PAIR_SCALES), text) if found["pairs"] else (text,)
 
 
 def _left_over(place: int) -> Callable[[Document], float]:
     return lambda row: row["oriented"][place] - row["given"][place]
 
 
+PAIR_SCALES = (
+    words("from", "from"),
+    words("to", "to"),
+    number("D", "D", 6, "strip"),
+    number("DG", "DG", 3, "m"),
+    number("r", "r", partial(short, digits=9)),
+)
 CONTROL = (
     words("point", "point"),
     words("use", "use"),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import dataclass
+from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.result.quantities import grouped, records
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,7 @@ def _models(strip: StripResult, ids: Sequence[str]) -> list[Document]:
         "left": photos[:-1],
         "right": photos[1:],
         "elements": {"unit": "deg", **dict(zip(ELEMENTS, np.degrees(oriented.elements).T, strict=True))},
+        "photo_system": _in_left_photo(oriented),
         "sigmas": {"unit": "deg", **dict(zip(ELEMENTS, np.degrees(oriented.sigmas).T, strict=True))},
         "sigma0_um": 1000.0 * oriented.sigma0,
         "rms_parallax_um": 1000.0 * sums.rms,
@@ -79,11 +82,28 @@ def _models(strip: StripResult, ids: Sequence[str]) -> list[Document]:
         "condition": oriented.condition,
         "iterations": oriented.iterations,
         "base": np.linalg.norm(np.diff(strip.centers, axis=0), axis=1),
-        "scale_factor": formed.scale,
+        "scale_factor": formed.scale_factor,
         "base_direction_deg": np.degrees(formed.base_direction),
         "base_inclination_deg": np.degrees(formed.base_inclination),
     }
     return records("models", columns)
+
+
+def _in_left_photo(oriented: Orientation) -> dict[str, object]:
+    """Return base and right photo in the system of the left one: the elements that belong to two photos, [001]."""
+    base, rotation = oriented.relative
+    bx, by, bz = base.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = by / bx, bz / bx
+    angles = np.degrees(alpha_omega_kappa(rotation))
+    return {
+        "unit": "deg",
+        "by_bx": slopes[0],
+        "bz_bx": slopes[1],
+        "tau": np.degrees(np.arctan2(by, bx)),
+        "nu": np.degrees(np.arcsin(np.clip(bz, -1.0, 1.0))),
+        **dict(zip(("alpha", "omega", "kappa"), angles.T, strict=True)),
+    }
 
 
 def _detectable(strip: StripResult) -> Floats:

@@ -9,31 +9,37 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.geometry.similarity import pair_scales
 from photostrip.result.numbers import EXACT, PER_RADIAN, Document, rounded, significant
 from photostrip.result.quantities import as_records
+from photostrip.result.trace.departures import departures_of
 from photostrip.result.trace.replay import PairRound, SimilarityStep, pair_rounds, similarity_steps
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.relative_orientation.solution import ELEMENTS, base_rays
-from photostrip.triangulation.strip_formation.intersection import intersect
+from photostrip.triangulation.relative_orientation.solution import ELEMENTS
+from photostrip.triangulation.strip_formation.strip import FirstPhoto, intersect_models
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline import Result, StripResult
+    from photostrip.points import ControlPoints
 
 SCHEMA = 1
 ANGLE, STEP, SQUARES, MILLIMETRES, MODEL, COSINE, METRES = 9, 6, 6, 5, 9, 10, 4  # decimals, digits of steps and squares
+RATIO = 10  # digits
+PAIRED = 15  # control points whose 105 distances can still be read
 SYMBOLS = {
     "x1, y1, x2, y2": "image coordinates of the left and right photo, mm from the principal point, corrected",
     "alpha1 to kappa2": "elements of relative orientation in the base frame, written with a prime",
     "q": "y1h - y2h, y parallax of the photos turned into the base frame, mm",
     "[wqq]": "sum of the weighted squares of q, mm^2",
-    "tau, nu": "direction and inclination of the base in the frame of the first photo",
+    "tau, nu": "direction and inclination of the base, in the strip; of one pair in the left photo, with bx, by, bz",
     "A": "rotation of a photo, image to strip, by rows",
     "BX, BY, BZ": "components of the base, scale of the strip",
-    "N": "ray factor of the left ray, from the model with base 1",
+    "N": "ray factor of the left ray, from the model whose base is as long as the first one",
     "D, D'": "distance of a pass point from the common centre, in the model before and after the junction",
     "k": "scale factor of a model; k_t of one pass point",
+    "r, t": "D_G/D of two control points, over all pairs sum of D_G over sum of D; s = r t",
     "A0": "azimuth of X of the intermediate frame, clockwise from north",
     "M": "axes of the intermediate frame, as columns, in the Cartesian frame",
     "s, xi, eta, theta": "scale and angles of the similarity, in the sense of alpha, omega, kappa",
@@ -56,6 +62,7 @@ def trace_of(result: Result) -> Document:
         "name": result.inputs.name,
         "angles": unit,
         "symbols": SYMBOLS,
+        "departures": [] if result.model_strips else departures_of(result.settings),
         "strips": [_strip(result, strip, PER_RADIAN[unit]) for strip in result.strips],
     }
 
@@ -84,10 +91,24 @@ def _pairs(result: Result, strip: StripResult, factor: float) -> list[Document]:
             "rejected": _rejected(result, strip, number),
             "sigma0_um": rounded(orientation.sigma0[number] * 1000, 2),
             "elements": _named(orientation.elements[number] * factor, ANGLE),
+            "photo_system": _in_left_photo(strip, number, factor),
             "points": _points(result, strip, number),
         }
         for number, rounds in enumerate(pair_rounds(result, strip))
     ]
+
+
+def _in_left_photo(strip: StripResult, number: int, factor: float) -> Document:
+    """Return base and right photo in the system of the left one; the base is as long as the first one."""
+    formed = strip.of_photos.formed
+    bases, rotations = strip.of_photos.orientation.relative
+    base = bases[number] * formed.first.base
+    angles = np.array([np.arctan2(base[1], base[0]), np.arcsin(np.clip(bases[number, 2], -1.0, 1.0))]) * factor
+    return {
+        **dict(zip(("bx", "by", "bz"), rounded(base, MODEL), strict=True)),
+        **dict(zip(("tau", "nu"), rounded(angles, ANGLE), strict=True)),
+        **dict(zip(("alpha", "omega", "kappa"), _angles(rotations[number], factor), strict=True)),
+    }
 
 
 def _named(values: Floats, decimals: int) -> Document:
@@ -126,17 +147,18 @@ def _rejected(result: Result, strip: StripResult, number: int) -> list[Document]
 def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
     """Image coordinates, parallax, ray factor and strip coordinates of the points of a pair."""
     orientation, ids = strip.of_photos.orientation, result.refined.observations.point_ids
+    formed = strip.of_photos.formed
     rows = orientation.pairs.rows_of(np.array([number]))
     pairs = orientation.pairs.take(np.array([number]))
-    left, right = base_rays(orientation.elements[[number]], pairs)
-    model = intersect(np.array([1.0, 0.0, 0.0]), left, right, pairs.focal)
+    left = FirstPhoto(formed.rotations[number], formed.first.base)
+    model, _ = intersect_models(orientation.take(np.array([number])), left, left_ray=formed.left_ray)
     image = rounded(np.column_stack([pairs.left, pairs.right]).T, MILLIMETRES)
     columns = {
         "point": [ids[point] for point in orientation.point[rows]],
         **dict(zip(("x1", "y1", "x2", "y2"), image, strict=True)),
         "q": rounded(orientation.parallax[rows], MILLIMETRES),
-        "N": rounded(model.ray_factor, MODEL),
-        **dict(zip("XYZ", rounded(strip.of_photos.formed.model_xyz[rows].T, MODEL), strict=True)),
+        "N": rounded(model.ray_factor * left.base, MODEL),
+        **dict(zip("XYZ", rounded(formed.model_xyz[rows].T, MODEL), strict=True)),
         "used": (pairs.weight > 0).tolist(),
     }
     return as_records(columns)
@@ -155,7 +177,7 @@ def _chain(strip: StripResult, factor: float) -> list[Document]:
                 "tau": rounded(formed.base_direction[number - 1] * factor, ANGLE),
                 "nu": rounded(formed.base_inclination[number - 1] * factor, ANGLE),
                 "B": rounded(base, MODEL),
-                "k": rounded(formed.scale[number - 1], MODEL),
+                "k": rounded(formed.scale_factor[number - 1], MODEL),
             }
         found.append(row)
     return found
@@ -174,12 +196,12 @@ def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
         rows = np.flatnonzero(joined.junction == number)
         center = formed.centers[number + 1]
         before = np.linalg.norm(formed.model_xyz[joined.before[rows]] - center, axis=1)
-        after = np.linalg.norm(formed.model_xyz[joined.after[rows]] - center, axis=1) / formed.scale[number + 1]
+        after = np.linalg.norm(formed.model_xyz[joined.after[rows]] - center, axis=1) / formed.scale_factor[number + 1]
         points = {
             "point": [ids[point] for point in joined.point[rows]],
             "D": rounded(before, MODEL),
             "D'": rounded(after, MODEL),
-            "k_t": rounded(joined.ratio[rows] * formed.scale[number], MODEL),
+            "k_t": rounded(joined.ratio[rows] * formed.scale_factor[number], MODEL),
             "used": joined.used[rows].tolist(),
         }
         found.append(
@@ -187,8 +209,8 @@ def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
                 "photo": strip.strip.photos[number + 1],
                 "form": result.settings.formation.scale_transfer,
                 "points": as_records(points),
-                "k": rounded(factor * formed.scale[number], MODEL),
-                "sd_of_one": rounded(joined.spread[number] * factor * formed.scale[number], MODEL),
+                "k": rounded(factor * formed.scale_factor[number], MODEL),
+                "sd_of_one": rounded(joined.spread[number] * factor * formed.scale_factor[number], MODEL),
             }
         )
     return found
@@ -214,8 +236,31 @@ def _absolute(result: Result, strip: StripResult, factor: float) -> Document:
             _similarity_step(number, step, factor) for number, step in enumerate(similarity_steps(result, strip), 1)
         ],
         **_similarity(similarity, factor),
+        "approximate": _approximate(strip.control, points, given, similarity.scale),
         "sigma0": significant(strip.absolute.sigma0),
         "control": as_records(control),
+    }
+
+
+def _approximate(control: ControlPoints, points: Floats, given: Floats, scale: float) -> Document | None:
+    """Return the scale r from the distances of control points that are given in full, t = s / r; eq. 145-148."""
+    full = np.flatnonzero(control.use.all(axis=1))
+    if len(full) < 2:
+        return None
+    found = pair_scales(points[full], given[full])
+    ids = [control.ids[row] for row in full.tolist()]
+    pairs = {
+        "from": [ids[row] for row in found.first.tolist()],
+        "to": [ids[row] for row in found.second.tolist()],
+        "D": rounded(found.source, MODEL),
+        "DG": rounded(found.target, METRES),
+        "r": significant(found.target / found.source, RATIO),
+    }
+    return {
+        "centroid": rounded(points[full].mean(axis=0), MODEL),
+        "pairs": as_records(pairs) if len(full) <= PAIRED else [],
+        "r": significant(found.mean, RATIO),
+        "t": significant(scale / found.mean, RATIO),
     }
 
 

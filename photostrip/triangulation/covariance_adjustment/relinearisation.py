@@ -87,10 +87,10 @@ def formed_again(
 
     Points and junctions are those of ``formed``; ``model_xyz`` holds the points that were left out, too.
     """
-    models = model_points(orientation)
+    models = model_points(orientation, formed.first, left_ray=formed.left_ray)
     junctions = _joined(formed.junctions, orientation, models.vectors)
     there = np.asarray(np.isfinite(formed.model_xyz).all(axis=1), bool)
-    again = place_models(orientation, models, junctions, orientation.used & there)
+    again = place_models(orientation, models, junctions, orientation.used & there, formed.first)
     if not len(formed.bridging):
         return again
     return non_neighbours.bridge(again, observations, photos, orientation.pairs.focal, formed.bridging)

@@ -14,9 +14,13 @@ from photostrip.geometry.rotation import angle_rates, from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.solution import base_rays, linearised_parallaxes, normal_matrices
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from photostrip.arrays import Floats
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.relative_orientation.pairs import Pairs
+
+    _ByRay = Callable[[Floats], Floats]  # from changes of a ray, (m, 3, k), to those of the points
 
 SYSTEM = "alpha-omega-kappa"
 LEFT, RIGHT = slice(0, 2), slice(2, 5)  # elements that turn the left and the right photo
@@ -38,11 +42,14 @@ class PairErrors:
     base: Floats  # (p, 3): right from left perspective centre, metres
 
 
-def differentiate_pairs(orientation: Orientation, rotations: Floats, scale: Floats) -> PairErrors:
+def differentiate_pairs(
+    orientation: Orientation, rotations: Floats, scale: Floats, across: Floats | None = None
+) -> PairErrors:
     """Differentiate all pairs of a strip.
 
     ``rotations`` (p, 3, 3) bring the left photo of each pair to the frame of the ground, ``scale`` (p,) is the length
-    of each base in metres. Rows whose rays do not meet hold numbers without meaning; they take part in nothing.
+    of each base in metres; ``across`` (p, 3), for points on left rays, is the strip's Y in the frames of left photos.
+    Rows whose rays do not meet hold numbers without meaning; they take part in nothing.
     """
     pairs = orientation.pairs
     al1, ka1, al2, om2, ka2 = orientation.elements.T
@@ -58,7 +65,7 @@ def differentiate_pairs(orientation: Orientation, rotations: Floats, scale: Floa
     to_ground = rotations @ left.rotation.transpose(0, 2, 1) * scale[:, None, None]
     turn = np.concatenate([-left.rates, right.rates], axis=2)
     with np.errstate(all="ignore"):
-        points = _points(orientation, left, right)
+        points = _points(orientation, left, right, across)
     base = np.zeros((pairs.size, 3, 5))
     base[:, :, LEFT] = -_crossed(left.rates, np.array([1.0, 0.0, 0.0]))  # the left photo is held, the base turns
     of_row = to_ground[pairs.pair]
@@ -121,24 +128,55 @@ def _levelled(ray: Floats, change: Floats, focal: float) -> Floats:
     return np.asarray(-focal * (change[:, :2] - slope.T[:, :, None] * change[:, 2:]) / ray[2][:, None, None], float)
 
 
-def _points(orientation: Orientation, left: _Turns, right: _Turns) -> _Points:
-    """Differentiate N = 1 / (x1 - x2), X = N x1, Y = N (y1 + y2) / 2, Z = -N f of image coordinates made level."""
+def _points(orientation: Orientation, left: _Turns, right: _Turns, across: Floats | None) -> _Points:
+    """Differentiate the intersection by both rays, and these by elements and image coordinates."""
     pairs = orientation.pairs
-    both = base_rays(orientation.elements, pairs)
-    level = [-pairs.focal * ray[:2] / ray[2] for ray in both]
+    rays = base_rays(orientation.elements, pairs)
+    if across is None:
+        point, by_ray = _on_both_rays(*rays, pairs.focal)
+    else:
+        point, by_ray = _on_left_rays(*rays, np.einsum("pij,pj->pi", left.rotation, across)[pairs.pair])
+    by_elements, by_image = np.empty((len(point), 3, 5)), np.empty((len(point), 3, 4))
+    for side, (columns, photo) in enumerate(zip((LEFT, RIGHT), (left, right), strict=True)):
+        by_elements[:, :, columns] = by_ray[side](_crossed(photo.rates[pairs.pair], rays[side].T))
+        by_image[:, :, 2 * side : 2 * side + 2] = by_ray[side](photo.rotation[pairs.pair][:, :, :2])
+    by_elements[:, :, LEFT] -= _crossed(left.rates[pairs.pair], point)  # in the frame of the left photo, which is held
+    return _Points(point, by_elements, by_image)
+
+
+def _on_both_rays(left: Floats, right: Floats, focal: float) -> tuple[Floats, tuple[_ByRay, _ByRay]]:
+    """Differentiate N = 1 / (x1 - x2), X = N x1, Y = N (y1 + y2) / 2, Z = -N f of image coordinates made level."""
+    level = [-focal * ray[:2] / ray[2] for ray in (left, right)]
     factor = 1 / (level[0][0] - level[1][0])  # eq. 138 with the base along x
     middle = (level[0][1] + level[1][1]) / 2
-    point = np.column_stack([factor * level[0][0], factor * middle, -factor * pairs.focal])
+    point = np.column_stack([factor * level[0][0], factor * middle, -factor * focal])
     by_level = np.zeros((2, len(factor), 3, 2))
     by_level[0, :, :, 0] = -factor[:, None] * point
     by_level[1, :, :, 0] = factor[:, None] * point
     by_level[0, :, 0, 0] += factor
     by_level[:, :, 1, 1] = factor / 2
-    by_elements, by_image = np.empty((len(factor), 3, 5)), np.empty((len(factor), 3, 4))
-    for side, (columns, ray, photo) in enumerate(zip((LEFT, RIGHT), both, (left, right), strict=True)):
-        turned = _crossed(photo.rates[pairs.pair], ray.T)
-        by_elements[:, :, columns] = by_level[side] @ _levelled(ray, turned, pairs.focal)
-        image = photo.rotation[pairs.pair][:, :, :2]
-        by_image[:, :, 2 * side : 2 * side + 2] = by_level[side] @ _levelled(ray, image, pairs.focal)
-    by_elements[:, :, LEFT] -= _crossed(left.rates[pairs.pair], point)  # in the frame of the left photo, which is held
-    return _Points(point, by_elements, by_image)
+    return point, (
+        lambda change: by_level[0] @ _levelled(left, change, focal),
+        lambda change: by_level[1] @ _levelled(right, change, focal),
+    )
+
+
+def _on_left_rays(left: Floats, right: Floats, across: Floats) -> tuple[Floats, tuple[_ByRay, _ByRay]]:
+    """Differentiate P = N l with N = w . (b x r) / w . (l x r): the rays l and r meet, seen along w; b = (1, 0, 0).
+
+    Where a y parallax is left over, w matters to the point; how the elements turn it is of second order.
+    """
+    first, second = left.T, right.T
+    base = np.cross(across, np.array([1.0, 0.0, 0.0]))
+    size = np.einsum("mi,mi->m", across, np.cross(first, second))[:, None]
+    factor = np.einsum("mi,mi->m", base, second)[:, None] / size
+    by_first = -factor * np.cross(second, across) / size
+    by_second = (base - factor * np.cross(across, first)) / size
+
+    def along(gradient: Floats, change: Floats) -> Floats:
+        return np.asarray(first[:, :, None] * np.einsum("mi,mik->mk", gradient, change)[:, None, :], float)
+
+    return factor * first, (
+        lambda change: along(by_first, change) + factor[:, :, None] * change,
+        lambda change: along(by_second, change),
+    )

@@ -81,7 +81,8 @@ def differentiate_strip(
     sigma: (k, 2), standard deviations of all image points in the observations, mm.
     """
     rotations = similarity.rotation @ formed.rotations
-    pairs = pair_errors.differentiate_pairs(orientation, rotations[:-1], similarity.scale * formed.scale)
+    across = formed.rotations[:-1, 1] if formed.left_ray else None
+    pairs = pair_errors.differentiate_pairs(orientation, rotations[:-1], similarity.scale * formed.scale, across)
     centers = similarity(formed.centers)
     origin = centers.mean(axis=0)
     strip = PlacedStrip(

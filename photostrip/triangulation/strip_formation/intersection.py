@@ -25,14 +25,15 @@ class Intersection:
     sound: Flags
 
 
-def intersect(base: Floats, left: Floats, right: Floats, focal: float) -> Intersection:
+def intersect(base: Floats, left: Floats, right: Floats, focal: float, *, left_ray: bool = False) -> Intersection:
     """Forward intersection of the rays of two photos.
 
     base: (3,) or (3, m), base components BX, BY, BZ; BX is the longest.
     left, right: (3, m), rays of the left and right photo, turned into the frame of the base, mm.
+    left_ray: Y of the left ray, as [001] has it, instead of the mean of both, which the theory of errors of [000]
+        assumes too.
 
-    Source: [001] eq. 137 (second line corrected to y2) and 138; [001] takes Y from the left ray, here it
-    is the mean of both, which the theory of errors of [000] assumes too.
+    Source: [001] eq. 137 (second line corrected to y2) and 138.
     """
     bx, by, bz = base
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -43,6 +44,7 @@ def intersect(base: Floats, left: Floats, right: Floats, focal: float) -> Inters
         n2 = n1 + bz / focal
         y_left, y_right = n1 * y1, by + n2 * y2
         sound = (np.abs(parallax) > PARALLEL * focal) & (n1 > 0) & (n2 > 0) & (left[2] < 0) & (right[2] < 0)
-        xyz = np.column_stack([n1 * x1, (y_left + y_right) / 2, -n1 * focal])
+        y = y_left if left_ray else (y_left + y_right) / 2
+        xyz = np.column_stack([n1 * x1, y, -n1 * focal])
     xyz[~sound] = np.nan
     return Intersection(xyz=xyz, ray_factor=n1, gap=y_left - y_right, sound=sound)

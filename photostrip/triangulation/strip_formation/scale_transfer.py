@@ -9,6 +9,7 @@ Source: [001] eq. 139-141.
 
 from __future__ import annotations
 
+from dataclasses import field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 SCALE_TRANSFERS = ("least_squares", "distances")
+LEFT_RAY = "left"
+INTERSECTIONS = ("mean", LEFT_RAY)
 ALPHA = 0.01  # probability that a strip without gross errors loses a pass point
 FEWEST = 3  # with two ratios nobody can tell which is wrong
 SMALLEST_SIGMA = 1e-3  # mm, of a y parallax, when the pairs' own residuals have to say it
@@ -32,11 +35,15 @@ SMALLEST_SIGMA = 1e-3  # mm, of a y parallax, when the pairs' own residuals have
 
 @dataclass(frozen=True)
 class StripFormationSettings:
-    """How models are brought to one scale."""
+    """How model points are intersected, and models brought to one scale."""
 
     # ``"least_squares"``: all pass points with their precision; ``"distances"``: the textbook's mean of the ratios of
     # distances from the common centre
     scale_transfer: str = "least_squares"
+    # weights of points in that, by name, on top of what the form gives them; 1 for all others
+    scale_weights: dict[str, float] = field(default_factory=dict)
+    # ``"mean"``: Y is the mean of both rays; ``"left"``: points lie on the left ray, as in the source
+    intersection: str = "mean"
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +83,7 @@ def transfer_scale(
     doubtful: Flags | None = None,
     *,
     searched: bool = False,
+    point_weight: Floats | None = None,
 ) -> Junctions:
     """Scale of every model from the one before it, through the pass points at their common photo.
 
@@ -85,6 +93,7 @@ def transfer_scale(
     doubtful: (m,), optional, rows that must not join models, unless a junction has no other.
     searched: whether the rays have been searched for gross errors: then all pass points count. Before that, those that
         lie far from the median of their junction are left out.
+    point_weight: weight of each point on top of that of the form, by number; 0 joins models only where no other does.
     Raises GeometryError when no point is common to three photos in a row.
     """
     junctions = orientation.pairs.size - 1
@@ -94,6 +103,9 @@ def transfer_scale(
     # eq. 139-141: distances from the common centre, before over after
     ratios = np.linalg.norm(vectors[every.before] - base[every.junction], axis=1)
     ratios /= np.linalg.norm(vectors[every.after], axis=1)
+    if point_weight is not None:
+        idle = point_weight[orientation.point] == 0
+        doubtful = idle if doubtful is None else doubtful | idle
     joining = _joining(every, junctions, doubtful)
     (junction, before, after), ratio = (each[joining] for each in every), ratios[joining]
     depth = depths(vectors[before], base[junction]), depths(vectors[after], base[junction + 1])
@@ -102,6 +114,9 @@ def transfer_scale(
     if settings.scale_transfer == "least_squares":
         # a distance from the centre is known to sigma_p / p of itself, and p is inverse to the depth along the base
         weight = quality / (depth[0] ** 2 + depth[1] ** 2)
+    if point_weight is not None:
+        given = point_weight[orientation.point[before]]
+        weight = weight * np.where(given > 0, given, 1.0)
     scatter = _scatter(orientation) if sigma is None else sigma
     # an image coordinate has half the variance of a parallax; that of the common photo acts on both distances
     coordinate = (scatter[junction] ** 2 + scatter[junction + 1] ** 2) / 4 / quality

@@ -17,8 +17,13 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.solution import base_rays
-from photostrip.triangulation.strip_formation.intersection import intersect
-from photostrip.triangulation.strip_formation.scale_transfer import Junctions, StripFormationSettings, transfer_scale
+from photostrip.triangulation.strip_formation.intersection import Intersection, intersect
+from photostrip.triangulation.strip_formation.scale_transfer import (
+    LEFT_RAY,
+    Junctions,
+    StripFormationSettings,
+    transfer_scale,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,11 +34,22 @@ if TYPE_CHECKING:
 STEEPEST_BASE = 1e-6  # cosine of the base inclination
 
 
+class FirstPhoto(NamedTuple):
+    """What is given of the first photo of a strip, and of its first base: the frame and the scale of the strip."""
+
+    rotation: Floats  # (3, 3): photo to strip
+    base: float  # length of the first base in the strip
+
+
+NOTHING_GIVEN = FirstPhoto(np.eye(3), 1.0)
+
+
 class StereoModels(NamedTuple):
     """Points of every model, each in the frame of its left photo."""
 
     vectors: Floats  # (m, 3): from the left perspective centre, base length 1; NaN where rays do not meet in front
     gap: Floats  # (m,): Y gap of the two rays at photo scale, mm
+    left_ray: bool = False  # whether points lie on the left ray, where the right one meets it seen along the strip's Y
 
     @property
     def sound(self) -> Flags:
@@ -47,7 +63,7 @@ class FormedStrip:
 
     centers: Floats  # (n, 3): perspective centres
     rotations: Floats  # (n, 3, 3): photo to strip
-    scale: Floats  # (n-1,): scale factor k of each model
+    scale: Floats  # (n-1,): length of each base
     # base_direction, base_inclination: (n-1,): tau and nu of each base in radians
     base_direction: Floats
     base_inclination: Floats
@@ -60,10 +76,21 @@ class FormedStrip:
     xyz: Floats  # (q, 3): strip coordinates, mean over the models that hold the point
     model_count: Numbers  # (q,): number of those models
     junctions: Junctions
+    left_ray: bool = False  # as in ``StereoModels``
     # (b,): rows of the observations that place points without a model: of photos that are not neighbours
     bridging: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
     # (q,): model with which such a point moves, -1 for all others; empty when there is none
     home: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+
+    @property
+    def first(self) -> FirstPhoto:
+        """The frame and the scale of the strip."""
+        return FirstPhoto(self.rotations[0], float(self.scale[0]))
+
+    @property
+    def scale_factor(self) -> Floats:
+        """Scale factor k of each model, which has a base as long as the first one; shape (n-1,)."""
+        return np.asarray(self.scale / self.scale[0], float)
 
     @property
     def ends(self) -> Floats:
@@ -79,49 +106,74 @@ def form_from_pairs(
     doubtful: Flags | None = None,
     *,
     searched: bool = False,
+    first: FirstPhoto = NOTHING_GIVEN,
+    point_weight: Floats | None = None,
 ) -> FormedStrip:
-    """Form the strip from its oriented pairs, in the frame of the first photo.
+    """Form the strip from its oriented pairs, in the frame of the first photo unless its angles are given.
 
-    sigma, doubtful, searched: as in ``transfer_scale``.
+    sigma, doubtful, searched, point_weight: as in ``transfer_scale``.
     Raises GeometryError when a junction is broken or a base is parallel to the strip's Z axis.
     """
-    models = model_points(orientation)
-    junctions = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful, searched=searched)
-    formed = place_models(orientation, models, junctions, orientation.used & models.sound)
+    models = model_points(orientation, first, left_ray=settings.intersection == LEFT_RAY)
+    junctions = transfer_scale(
+        orientation, models.vectors, settings, photos, sigma, doubtful, searched=searched, point_weight=point_weight
+    )
+    formed = place_models(orientation, models, junctions, orientation.used & models.sound, first)
     _refuse_vertical_base(np.diff(formed.centers, axis=0) / formed.scale[:, None], photos)
     return formed
 
 
-def model_points(orientation: Orientation) -> StereoModels:
-    """Points of every model in the frame of its left photo, base length 1."""
+def model_points(
+    orientation: Orientation, first: FirstPhoto = NOTHING_GIVEN, *, left_ray: bool = False
+) -> StereoModels:
+    """Points of every model in the frame of its left photo, base length 1; `first` is of use on left rays only."""
+    found, frames = intersect_models(orientation, first, left_ray=left_ray)
+    vectors = np.einsum("mji,mj->mi", frames[orientation.pairs.pair], found.xyz)
+    return StereoModels(vectors, found.gap / found.ray_factor, left_ray)
+
+
+def intersect_models(orientation: Orientation, first: FirstPhoto, *, left_ray: bool) -> tuple[Intersection, Floats]:
+    """Intersect the rays of all pairs, base length 1; return the rotations of the left photos to the frames, too.
+
+    For the mean of both rays these are the base frames: there the x parallax is the whole parallax at any kappa; along
+    the strip's X it may vanish. For the left ray it is the frame of the strip, as in [001].
+    """
     pairs = orientation.pairs
-    left, right = base_rays(orientation.elements, pairs)
-    # In the base frame the x parallax is the whole parallax at any kappa; along the strip's X it may vanish.
-    found = intersect(np.array([1.0, 0.0, 0.0]), left, right, pairs.focal)
-    al1, ka1 = orientation.elements[:, 0], orientation.elements[:, 1]
-    to_base = from_alpha_omega_kappa(al1, 0.0, ka1)
-    vectors = np.einsum("mji,mj->mi", to_base[pairs.pair], found.xyz)
-    return StereoModels(vectors, found.gap / found.ray_factor)
+    if not left_ray:
+        al1, ka1 = orientation.elements[:, 0], orientation.elements[:, 1]
+        frames = np.asarray(from_alpha_omega_kappa(al1, 0.0, ka1), float)
+        rays = base_rays(orientation.elements, pairs)
+        return intersect(np.array([1.0, 0.0, 0.0]), *rays, pairs.focal), frames
+    base, rotation = orientation.relative
+    chain = hand_on_rotations(rotation, first.rotation)
+    left, right = (
+        np.einsum("mij,mj->im", turns[pairs.pair], np.column_stack([xy, np.full(len(xy), -pairs.focal)]))
+        for turns, xy in ((chain[:-1], pairs.left), (chain[1:], pairs.right))
+    )
+    along = np.einsum("pij,pj->ip", chain[:-1], base)[:, pairs.pair]
+    return intersect(along, left, right, pairs.focal, left_ray=True), chain[:-1]
 
 
-def hand_on_rotations(rotations: Floats) -> Floats:
+def hand_on_rotations(rotations: Floats, first: Floats | None = None) -> Floats:
     """Rotations (p + 1, 3, 3) of all photos to the strip, each from its left neighbour: A2 = A1 R with R = A1'^T A2'.
 
-    The first photo is the frame; R, (p, 3, 3), takes the right photo of every pair to the left one. Source: [001] eq.
-    131-134.
+    The first photo is the frame unless its rotation is given; R, (p, 3, 3), takes the right photo of every pair to the
+    left one. Source: [001] eq. 131-134.
     """
     chain = np.empty((len(rotations) + 1, 3, 3))
-    chain[0] = np.eye(3)
+    chain[0] = np.eye(3) if first is None else first
     for number, rotation in enumerate(rotations):
         chain[number + 1] = chain[number] @ rotation  # eq. 131
     return chain
 
 
-def place_models(orientation: Orientation, models: StereoModels, junctions: Junctions, use: Flags) -> FormedStrip:
+def place_models(
+    orientation: Orientation, models: StereoModels, junctions: Junctions, use: Flags, first: FirstPhoto = NOTHING_GIVEN
+) -> FormedStrip:
     """Put oriented models of known scales one behind the other; `use`, shape (m,), says which rows make points."""
     base, rotation = orientation.relative
-    rotations = hand_on_rotations(rotation)
-    scale = np.concatenate([[1.0], np.cumprod(junctions.factor)])
+    rotations = hand_on_rotations(rotation, first.rotation)
+    scale = first.base * np.concatenate([[1.0], np.cumprod(junctions.factor)])
     bases = scale[:, None] * np.einsum("pij,pj->pi", rotations[:-1], base)
     centers = np.concatenate([np.zeros((1, 3)), np.cumsum(bases, axis=0)])  # eq. 136
     pair = orientation.pairs.pair
@@ -140,6 +192,7 @@ def place_models(orientation: Orientation, models: StereoModels, junctions: Junc
         xyz=mean.xyz,
         model_count=mean.model_count,
         junctions=junctions,
+        left_ray=models.left_ray,
     )
 
 

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 from scipy.spatial.transform import Rotation
 
 from photostrip.cli.main import main
 from photostrip.pipeline import Settings
 from photostrip.report.commands.trace import _left_over, trace_sections, trace_title
 from photostrip.report.page.text import to_text
+from photostrip.result.trace.departures import CHOICES
 from photostrip.result.trace.trace import SYMBOLS, trace_of
 from photostrip.simulation.spec import GrossError
 from photostrip.triangulation.polynomial.correction import PolynomialSettings
@@ -220,6 +222,89 @@ def test_an_ending_that_is_not_known_is_refused_before_the_run(
     assert main(["run", str(project), "-o", str(tmp_path / "out"), "--trace", str(tmp_path / "t.pdf")]) == 2
     assert "--trace" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+AS_PRINTED = f"extends: {ROOT / 'configs/as-printed.yaml'}\n"
+FIRST = "    first_photo: {angles: [2.0, -3.0, 12.0], unit: gon, base: 92.0}\n"
+
+
+def as_printed(folder: Path, *options: str) -> Document:
+    project = write_project(folder, spec(bands=4), AS_PRINTED)
+    text = project.read_text(encoding="utf-8")
+    project.write_text(text.replace("observations:", FIRST + "observations:", 1), encoding="utf-8")
+    file = folder / "trace.json"
+    assert main(["run", str(project), "--quiet", "--trace", str(file), *options]) in {0, 1}
+    found: Document = json.loads(file.read_text(encoding="utf-8"))
+    return found
+
+
+@pytest.mark.slow
+def test_the_preset_as_printed_departs_in_nothing_that_can_be_chosen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    document = as_printed(tmp_path)
+    assert [row["key"] for row in document["departures"]] == ["", ""]
+    usual = trace("projected")["departures"]
+    assert [row["subject"] for row in usual] == [choice.subject for choice in CHOICES]
+    assert "processing.intersection: left" in [row["key"] for row in usual]
+    strip = document["strips"][0]
+    first = strip["chain"][0]
+    angles = [first[name] for name in ("alpha", "omega", "kappa")]
+    assert angles == pytest.approx([1.8, -2.7, 10.8], abs=1e-8)  # 2, -3 and 12 gon
+    assert np.linalg.norm(strip["chain"][1]["B"]) == pytest.approx(92.0, abs=1e-7)
+    assert strip["chain"][1]["k"] == 1.0
+    for pair, left, right in nonempty(zip(strip["pairs"], strip["chain"], strip["chain"][1:], strict=False)):
+        base = np.array(right["B"])
+        for point in nonempty(pair["points"][::5]):
+            (x1, y1), (x2, _) = (
+                -153.0
+                * (ray := np.array(at["A"]).reshape(3, 3) @ [point[f"x{n}"], point[f"y{n}"], -153.0])[:2]
+                / ray[2]
+                for n, at in ((1, left), (2, right))
+            )
+            n = (base[0] + x2 * base[2] / 153.0) / (x1 - x2)  # eq. 138
+            found = [point[axis] for axis in "XYZ"]
+            assert found == pytest.approx(left["S"] + np.array([n * x1, n * y1, -n * 153.0]), abs=2e-4)
+            assert point["N"] * right["k"] == pytest.approx(n, rel=2e-6)
+
+
+def test_a_pair_in_the_system_of_its_left_photo() -> None:
+    models = {(each["left"], each["right"]): each for each in solved("projected").document["models"]}
+    for strip in nonempty(trace("projected")["strips"]):
+        for pair in strip["pairs"]:
+            e, own = pair["elements"], pair["photo_system"]
+            left = rotation(e["alpha1"], 0.0, e["kappa1"])
+            right = rotation(e["alpha2"], e["omega2"], e["kappa2"])
+            base = left.inv().apply([1.0, 0.0, 0.0])
+            assert [own[name] for name in ("bx", "by", "bz")] == pytest.approx(base, abs=1e-8)
+            assert math.tan(math.radians(own["tau"])) == pytest.approx(base[1] / base[0], abs=1e-9)
+            assert math.sin(math.radians(own["nu"])) == pytest.approx(base[2], abs=1e-9)
+            # first order: by = -b kappa1', bz = -b alpha1', dalpha = alpha2' - alpha1'
+            small = np.radians([e["kappa1"], e["alpha1"]]) ** 2
+            assert own["by"] == pytest.approx(-math.radians(e["kappa1"]), abs=small.sum() + 1e-8)
+            assert own["bz"] == pytest.approx(-math.radians(e["alpha1"]), abs=small.sum() + 1e-8)
+            turn = rotation(own["alpha"], own["omega"], own["kappa"]).as_matrix()
+            assert turn == pytest.approx((left.inv() * right).as_matrix(), abs=1e-9)
+            model = models[pair["left"], pair["right"]]["photo_system"]
+            assert model["by_bx"] == pytest.approx(base[1] / base[0], abs=2e-8)
+            assert [model[name] for name in ("alpha", "omega", "kappa", "tau", "nu")] == pytest.approx(
+                [own[name] for name in ("alpha", "omega", "kappa", "tau", "nu")], abs=2e-6
+            )
+
+
+@pytest.mark.parametrize("name", ["projected", "geocentric"])
+def test_scales_of_pairs_of_control_points(name: str) -> None:
+    found = trace(name)["strips"][0]["absolute"]
+    approximate, control = found["approximate"], {row["point"]: row for row in found["control"]}
+    strip, ground = (pdist([control[point][key] for point in control]) for key in ("strip", "given"))
+    assert approximate["r"] == pytest.approx(ground.sum() / strip.sum(), rel=1e-7)
+    assert approximate["r"] * approximate["t"] == pytest.approx(found["s"], rel=1e-9)
+    assert [row["r"] for row in approximate["pairs"]] == pytest.approx((ground / strip).tolist(), rel=1e-6)
+    assert abs(approximate["t"] - 1) < 1e-4
+    assert approximate["centroid"] == pytest.approx(
+        np.mean([row["strip"] for row in control.values()], axis=0), abs=1e-8
+    )
 
 
 def test_rotations_are_written_with_ten_decimals() -> None:

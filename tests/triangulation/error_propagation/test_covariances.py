@@ -28,32 +28,33 @@ CLOSE = 1e-6  # of the largest derivative; differences of a run know no more
 MIXED = {"xyz": 0.4, "xy": 0.3, "z": 0.3}
 
 
-def settings(adjustment: str, transfer: str = "least_squares") -> Settings:
+def settings(adjustment: str, transfer: str = "least_squares", intersection: str = "mean") -> Settings:
     degree = adjustment if adjustment in {"1", "2", "3"} else "auto"
     return Settings(
         adjustment="similarity" if adjustment == "similarity" else "polynomial",
         relative=UNSCREENED,
-        formation=StripFormationSettings(transfer),
+        formation=StripFormationSettings(transfer, intersection=intersection),
         polynomial=correction.PolynomialSettings(degree),
     )
 
 
 CASES = [
-    ("similarity", 60.0, "least_squares", None),
-    ("similarity", 80.0, "distances", None),
-    ("3", 62.0, "least_squares", None),
-    ("2", 70.0, "least_squares", MIXED),
+    ("similarity", 60.0, "least_squares", "mean", None),
+    ("similarity", 80.0, "distances", "mean", None),
+    ("similarity", 62.0, "distances", "left", None),
+    ("3", 62.0, "least_squares", "mean", None),
+    ("2", 70.0, "least_squares", "mean", MIXED),
 ]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("adjustment", "lap", "transfer", "use"), CASES)
+@pytest.mark.parametrize(("adjustment", "lap", "transfer", "intersection", "use"), CASES)
 def test_derivatives_are_those_of_the_whole_run(
-    adjustment: str, lap: float, transfer: str, use: dict[str, float] | None
+    adjustment: str, lap: float, transfer: str, intersection: str, use: dict[str, float] | None
 ) -> None:
     """Relative orientation, chain, scale transfer, intersection, means, similarity, polynomials, resection at once."""
     inputs = without_noise(spec(8, lap, use=use))
-    wanted = settings(adjustment, transfer)
+    wanted = settings(adjustment, transfer, intersection)
     result = triangulate(inputs, wanted)
     found = errors_of(result)
     images, operator = found.errors.images, found.fit.operator

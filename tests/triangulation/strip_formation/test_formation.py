@@ -27,6 +27,7 @@ from photostrip.triangulation.strip_formation.scale_transfer import (
     transfer_scale,
 )
 from photostrip.triangulation.strip_formation.strip import (
+    FirstPhoto,
     FormedStrip,
     _refuse_vertical_base,
     form_from_pairs,
@@ -132,6 +133,82 @@ def test_the_chain_of_the_formula_book(example: Vector) -> None:
     assert np.allclose(given_["S1"] + base, expected["S2"], rtol=0, atol=tol * given_["base"])
     assert np.degrees(np.arctan2(base[1], base[0])) == pytest.approx(expected["tau_deg"], abs=tol)
     assert np.degrees(np.arcsin(base[2] / given_["base"])) == pytest.approx(expected["nu_deg"], abs=tol)
+
+
+@pytest.mark.parametrize("example", cases("strip_local"))
+def test_the_strip_of_the_formula_book_in_its_own_frame(example: Vector) -> None:
+    """With the angles of the first photo and the length of the first base printed coordinates come out as they are."""
+    observations = measured({f"{number}": image for number, image in enumerate(example.input["photos"], start=1)})
+    names, tol = observations.photo_ids, example.tol
+    oriented = orient_pairs(collect_pairs(observations, names, example.input["f"]), names)
+    first = FirstPhoto(attitude(example.input["eo1_deg"])[0], example.input["base"])
+    strip = form_from_pairs(oriented, StripFormationSettings("distances", intersection="left"), names, first=first)
+    for number, model in nonempty(enumerate(example.expected["models"])):
+        assert np.degrees(strip.base_direction[number]) == pytest.approx(model["tau_deg"], abs=tol["angles_deg"])
+        assert np.degrees(strip.base_inclination[number]) == pytest.approx(model["nu_deg"], abs=tol["angles_deg"])
+        assert strip.scale_factor[number] == pytest.approx(model["k"], abs=tol["k"])
+    for number, camera in nonempty(enumerate(example.expected["cameras"])):
+        degrees = np.degrees(alpha_omega_kappa(strip.rotations[number]))
+        assert np.allclose(degrees, camera["alpha_omega_kappa_deg"], rtol=0, atol=tol["angles_deg"])
+        assert np.allclose(strip.centers[number], camera["S"], rtol=0, atol=tol["coords"])
+    for number, xyz in nonempty(zip(strip.point.tolist(), strip.xyz, strict=True)):
+        expected = example.expected["points"][observations.point_ids[number]]
+        assert np.allclose(xyz, expected, rtol=0, atol=tol["coords"])
+
+
+FIRST = FirstPhoto(Rotation.from_euler("YXZ", [-4, 3, 25], degrees=True).as_matrix(), 92.0)
+
+
+def test_what_is_given_of_the_first_photo_turns_and_scales_the_strip() -> None:
+    flown = fly(5, 5, sigma=5 * MICROMETRE, extra=12)
+    oriented, settings = flown.oriented(), StripFormationSettings()
+    usual = form_from_pairs(oriented, settings, flown.photos)
+    given_ = form_from_pairs(oriented, settings, flown.photos, first=FIRST)
+    assert np.allclose(given_.centers, 92 * usual.centers @ FIRST.rotation.T, rtol=0, atol=1e-10)
+    assert np.allclose(given_.xyz, 92 * usual.xyz @ FIRST.rotation.T, rtol=0, atol=1e-10)
+    assert np.allclose(given_.rotations, FIRST.rotation @ usual.rotations, rtol=0, atol=1e-13)
+    assert np.allclose(given_.scale_factor, usual.scale_factor, rtol=1e-14)
+    assert np.allclose(np.linalg.norm(np.diff(given_.centers, axis=0), axis=1), given_.scale)
+
+
+def test_points_on_the_left_ray_follow_the_printed_formula() -> None:
+    flown = fly(6, 4, sigma=10 * MICROMETRE, extra=12)
+    oriented = flown.oriented()
+    strip = form_from_pairs(
+        oriented, StripFormationSettings("distances", intersection="left"), flown.photos, first=FIRST
+    )
+    f, pair = oriented.pairs.focal, oriented.pairs.pair
+    for row in nonempty(np.flatnonzero(np.isfinite(strip.model_xyz[:, 0]))[::7].tolist()):
+        at = pair[row]
+        (x1, y1), (x2, _) = (
+            -f * (ray := strip.rotations[photo] @ [*image[row], -f])[:2] / ray[2]
+            for photo, image in ((at, oriented.pairs.left), (at + 1, oriented.pairs.right))
+        )
+        bx, _, bz = strip.centers[at + 1] - strip.centers[at]
+        n = (bx + x2 * bz / f) / (x1 - x2)  # eq. 138
+        expected = strip.centers[at] + [n * x1, n * y1, -n * f]
+        assert np.allclose(strip.model_xyz[row], expected, rtol=0, atol=1e-9)
+    both = form_from_pairs(oriented, StripFormationSettings("distances"), flown.photos, first=FIRST)
+    away = np.linalg.norm(both.model_xyz - strip.model_xyz, axis=1)
+    depth = np.linalg.norm(strip.model_xyz - strip.centers[pair], axis=1)
+    q = np.abs(oriented.parallax) * depth / f
+    # half a y parallax in Y, and, where the frame is turned by 25 degrees, what it does to N
+    assert 0.5 < np.nanmedian(away / np.maximum(q, 1e-12)) < 2.0
+
+
+def test_weights_of_points_are_those_of_the_mean_ratio() -> None:
+    flown = fly(7, 4, sigma=10 * MICROMETRE, extra=12)
+    oriented, settings = flown.oriented(), StripFormationSettings("distances")
+    usual = form_from_pairs(oriented, settings, flown.photos, searched=True).junctions
+    weight = np.random.default_rng(8).choice([0.0, 0.5, 1.0, 2.0], len(flown.observations.point_ids))
+    found = form_from_pairs(oriented, settings, flown.photos, searched=True, point_weight=weight).junctions
+    for junction in nonempty(range(len(usual.factor))):
+        rows = usual.junction == junction
+        expected = np.average(usual.ratio[rows], weights=weight[usual.point[rows]])
+        assert found.factor[junction] == pytest.approx(expected, rel=1e-14)
+        assert set(found.point[found.junction == junction]) == set(usual.point[rows & (weight[usual.point] > 0)])
+    none = form_from_pairs(oriented, settings, flown.photos, searched=True, point_weight=np.zeros(len(weight)))
+    assert np.array_equal(none.junctions.factor, usual.factor)  # a junction keeps what it has
 
 
 def oriented_as(elements: Floats, points: int = 6) -> Orientation:
