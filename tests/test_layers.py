@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Bottom to top. A room is a module or a folder directly below photostrip/.
 LAYERS = (
-    {"arrays", "errors", "frozen", "notes", "threads", "distributions", "visible"},
+    {"arrays", "errors", "frozen", "notes", "threads", "distributions", "units", "visible"},
     {"points", "camera", "statistics", "geometry", "geodesy", "rejection"},
     {"triangulation", "terrestrial"},
     {"simulation"},

@@ -14,13 +14,13 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.triangulation.image_coordinates.lens_distortion import ideal_from_image
+from photostrip.units import MILLIMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.camera import Distortion
 
-METRE = 1e3  # mm
 KILOMETRE = 1e6  # mm
 GRID = 41  # points along and across a model in which a distortion is tried
 
@@ -80,7 +80,7 @@ class FlownCamera:
     @property
     def flying_height(self) -> float:
         """H above the ground, metres."""
-        return self.camera.focal * self.scale / METRE
+        return self.camera.focal * self.scale / MILLIMETRES
 
     @property
     def height_sigma(self) -> float:
@@ -95,7 +95,7 @@ class FlownCamera:
 
 def scale_of(camera: ComparedCamera, height_sigma: float) -> float:
     """Return the denominator of the photo scale at which heights have a standard deviation, metres."""
-    return height_sigma * METRE * camera.height_ratio / camera.focal
+    return height_sigma * MILLIMETRES * camera.height_ratio / camera.focal
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Survey:
         if self.height_sigma is not None:
             return FlownCamera(camera, scale_of(camera, self.height_sigma))
         if self.flying_height is not None:
-            return FlownCamera(camera, self.flying_height * METRE / camera.focal)
+            return FlownCamera(camera, self.flying_height * MILLIMETRES / camera.focal)
         return FlownCamera(camera, self.scale or np.nan)
 
 
@@ -157,7 +157,7 @@ def suitability(camera: ComparedCamera, survey: Survey) -> Suitability:
     steepest = float(np.arctan(camera.focal / outermost))
     by_relief = 0.0
     if above and survey.scale is not None and share > 0:
-        by_relief = above * METRE / (share * flown.scale)
+        by_relief = above * MILLIMETRES / (share * flown.scale)
     elif above and not above <= highest:
         by_relief = np.inf
     return Suitability(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.units import MICROMETRES
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -25,7 +27,6 @@ RADIANS = 9
 ROTATION = 12  # decimals of direction cosines
 SIGNIFICANT = 4  # digits of what has no natural size
 EXACT = 12  # digits of what others compute with
-MICROMETRES = 1000.0  # in a millimetre
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}  # units of angles
 DIGITS = re.compile("([0-9]+)")
 

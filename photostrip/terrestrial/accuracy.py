@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import dataclass
-from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo, partials
+from photostrip.terrestrial.frame import ground_from_photo, partials
+from photostrip.units import ARCSECONDS
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

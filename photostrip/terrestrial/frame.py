@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
 
-ARCSECONDS = 180.0 * 3600.0 / np.pi  # in a radian
 GROUND_FROM_HOUSE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 # what small turns of a camera in its own axes are as a vector: (alpha, omega, kappa) -> (omega, -alpha, kappa)
 TURN_AXES = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -8,8 +8,8 @@ import numpy as np
 
 from photostrip.notes import Note, named
 from photostrip.statistics import chi2_quantile
-from photostrip.terrestrial.frame import ARCSECONDS
 from photostrip.terrestrial.monitoring import MEASURED, REASONS, Monitoring
+from photostrip.units import ARCSECONDS, MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from photostrip.terrestrial.camera_motion import Turn
 
 SURE = 0.99  # probability below which a misfit may be chance
-MICROMETRES = 1000.0  # in a millimetre
 
 
 def remarks(result: Monitoring) -> Iterator[Note]:

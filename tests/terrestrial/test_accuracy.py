@@ -20,7 +20,8 @@ from photostrip.terrestrial.accuracy import (
     supported,
     worked,
 )
-from photostrip.terrestrial.frame import ARCSECONDS, directions_from_photo, ground_from_photo
+from photostrip.terrestrial.frame import directions_from_photo, ground_from_photo
+from photostrip.units import ARCSECONDS
 from tests.loops import nonempty
 from tests.vectors import cases
 

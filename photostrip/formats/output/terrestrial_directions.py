@@ -9,8 +9,9 @@ import numpy as np
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.result.numbers import EXACT, Document, rounded, significant
 from photostrip.terrestrial import accuracy
-from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite, directions_from_photo, photo_from_directions
+from photostrip.terrestrial.frame import Phototheodolite, directions_from_photo, photo_from_directions
 from photostrip.terrestrial.orientation import ANGLES, REFRACTION, OrientationSettings, PhotoOrientation, Sightings
+from photostrip.units import ARCSECONDS, MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,7 +25,6 @@ ANGLE, ARCSEC, MILLIMETRE, MICROMETRE, RATIO = 8, 5, 6, 4, 5  # decimals: finer 
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi}
 FULL_CIRCLE = 2 * np.pi
 ROUNDING = 1e-12  # rad
-UM = 1000.0  # in a millimetre
 
 
 class Attitude(NamedTuple):
@@ -81,7 +81,7 @@ def directions_document(
     directions = directions_from_photo(reduced, camera.principal_distance, attitude.rotation)
     document = _points_and_directions("directions", camera, attitude, ids, reduced, directions)
     if sigma is not None:
-        document["image_sigma_um"] = rounded(sigma * UM, MICROMETRE)
+        document["image_sigma_um"] = rounded(sigma * MICROMETRES, MICROMETRE)
         errors = accuracy.required(reduced, camera.principal_distance, sigma, attitude.rotation)
         for row, angle, vertical in zip(document["points"], errors.angle, errors.vertical, strict=True):
             row["sigma_lambda_arcsec"] = rounded(angle * ARCSECONDS, ARCSEC)
@@ -121,7 +121,7 @@ def required_accuracy(
     xz = _grid_points(grid)
     exact = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)
     document = _oriented_head("direction-accuracy", camera, attitude)
-    document["image_sigma_um"] = rounded(sigma * UM, MICROMETRE)
+    document["image_sigma_um"] = rounded(sigma * MICROMETRES, MICROMETRE)
     document["formulas"] = "as printed" if as_printed else "exact"
     document["units"] = {"x": "mm from the principal point", "z": "mm from the principal point"}
     columns = {"angle_arcsec": exact.angle, "horizontal_arcsec": exact.horizontal, "vertical_arcsec": exact.vertical}
@@ -159,7 +159,7 @@ def theodolite_accuracy(
     horizontal, vertical, rounds = theodolite
     means = [accuracy.of_rounds(each, rounds) for each in (horizontal, vertical)]
     by = (means[0] / ARCSECONDS, means[1] / ARCSECONDS)
-    image = accuracy.supported(xz, camera.principal_distance, *by, attitude.rotation) * UM
+    image = accuracy.supported(xz, camera.principal_distance, *by, attitude.rotation) * MICROMETRES
     document = _oriented_head("theodolite-accuracy", camera, attitude)
     document["theodolite"] = {
         "horizontal_arcsec": rounded(horizontal, ARCSEC),
@@ -176,7 +176,7 @@ def theodolite_accuracy(
     if sigma is not None:
         needed = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)
         document["wanted"] = {
-            "image_sigma_um": rounded(sigma * UM, MICROMETRE),
+            "image_sigma_um": rounded(sigma * MICROMETRES, MICROMETRE),
             "rounds_horizontal": accuracy.rounds_for(horizontal, float(needed.horizontal.min()) * ARCSECONDS),
             "rounds_vertical": accuracy.rounds_for(vertical, float(needed.vertical.min()) * ARCSECONDS),
         }
@@ -197,7 +197,7 @@ def worked_examples() -> Document:
                 "f_mm": example.f,
                 "x_mm": example.x,
                 "z_mm": example.z,
-                "image_sigma_um": rounded(example.sigma * UM, MICROMETRE),
+                "image_sigma_um": rounded(example.sigma * MICROMETRES, MICROMETRE),
                 "horizontal_printed_arcsec": example.horizontal,
                 "horizontal_exact_arcsec": rounded(found.horizontal, ARCSEC),
                 "vertical_printed_arcsec": example.vertical,
@@ -270,7 +270,7 @@ def _element(name: str, value: float, sigma: float, unit: str) -> Document:
             "sigma_unit": "",
         }
     found = {"value": rounded(value, MILLIMETRE), "unit": "mm"}
-    return {"name": name, **found, "sigma": rounded(sigma * UM, MICROMETRE), "sigma_unit": "um"}
+    return {"name": name, **found, "sigma": rounded(sigma * MICROMETRES, MICROMETRE), "sigma_unit": "um"}
 
 
 def _sighted(sightings: Sightings, found: PhotoOrientation) -> list[Document]:

@@ -7,19 +7,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.formats.output.csv_text import to_csv
-from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, UM, Attitude, head
+from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, Attitude, head
 from photostrip.result.numbers import Document, natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.displacement import ellipses
-from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite
 from photostrip.terrestrial.monitoring import REASONS, CameraState, Monitoring, Step
 from photostrip.terrestrial.normal_case import SIDES
+from photostrip.units import ARCSECONDS, MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from photostrip.arrays import Floats
     from photostrip.notes import Note
+    from photostrip.terrestrial.frame import Phototheodolite
     from photostrip.terrestrial.one_station import OneStation, OneStationResult
 
 METRE = 6  # decimals: a micrometre on the ground
@@ -149,7 +150,7 @@ def _summary(result: Monitoring) -> Document:
 
 def _rms_um(values: Floats) -> float | None:
     known = values[np.isfinite(values)]
-    found: float | None = rounded(np.sqrt(np.mean(known**2)) * UM if len(known) else np.nan, MICROMETRE)
+    found: float | None = rounded(np.sqrt(np.mean(known**2)) * MICROMETRES if len(known) else np.nan, MICROMETRE)
     return found
 
 
@@ -187,7 +188,7 @@ def _point(result: Monitoring, row: int, order: list[int], axes: Sequence[str]) 
         if np.isfinite(result.positions[number].values[row, 0]):
             entry |= _by_axis("", result.positions[number].values[row][order])
             entry |= _by_axis("sigma_", result.positions[number].sigma[row][order])
-            entry["parallax_um"] = rounded(result.parallax[number, row] * UM, MICROMETRE)
+            entry["parallax_um"] = rounded(result.parallax[number, row] * MICROMETRES, MICROMETRE)
         if number and np.isfinite(result.since_first[number - 1].values[row, 0]):
             entry["since_first"] = _step(result, result.since_first[number - 1], row, order, axes)
             if number > 1:

@@ -22,6 +22,7 @@ from photostrip.triangulation.independent_models import (
     perspective_centers,
 )
 from photostrip.triangulation.independent_models.formation import FormedModels, form_from_models, require_links
+from photostrip.units import MILLIMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     WithControlScreened = ScreenedStrip[model_errors.ModelErrors]
 
 LEAST_SOLID = 4  # points that can tell a body from its mirror image
-MILLIMETRES = 1000.0  # in a metre
 
 
 @dataclass(frozen=True, eq=False)

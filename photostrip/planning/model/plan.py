@@ -35,6 +35,7 @@ from photostrip.planning.model.single_model import (
     expected_errors,
     influence_after_orientation,
 )
+from photostrip.units import MILLIMETRES
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -45,7 +46,6 @@ Place = tuple[float, float]
 Three = tuple[float, float, float]
 NO_ERROR = (0.0, 0.0, 0.0)
 LAYOUTS = ("corners", "corners+centre", "six")
-METRE = 1e3  # mm
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class ModelSpec:
     @property
     def ground_unit(self) -> float:
         """Metres on the ground of a millimetre at photo scale."""
-        return self.scale / METRE
+        return self.scale / MILLIMETRES
 
 
 def standard_zones(base: float, width: float) -> tuple[Place, ...]:

@@ -34,6 +34,7 @@ from photostrip.project.checks.table_rows import gaps_of, observations_used, tab
 from photostrip.project.loading import Project, load_project
 from photostrip.project.yaml.document import fault_at
 from photostrip.triangulation.image_coordinates import corrections
+from photostrip.units import MILLIMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
     Document = dict[str, Any]
 
 LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
-MILLIMETRES = 1000.0  # in a metre
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.project.yaml.document import fault_at, key_path
+from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from photostrip.project.loading import Project
 
     Document = dict[str, Any]
-
-MICROMETRES = 1000.0  # in a millimetre
 
 
 def links_of_models(project: Project, models: MeasuredModels) -> Iterator[Fault]:

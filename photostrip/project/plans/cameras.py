@@ -14,13 +14,13 @@ from photostrip.project.conversion import distortion_of
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Percent, SigmaUm, read_plan
 from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.values import Id, Number, Positive, Range, Section, Words, bounded, key, one_of, wrong
+from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
 
-MICROMETRES = 1000.0  # in a millimetre
 Lap = Annotated[Number, AfterValidator(bounded(Range(0.0, 90.0, "%")))]
 Relief = Annotated[Number, AfterValidator(bounded(Range(0.0, 9000.0, "m")))]
 Slope = Annotated[Number, AfterValidator(bounded(Range(0.0, 89.0, "deg")))]

@@ -14,13 +14,13 @@ from photostrip.project.terrestrial.cameras import Distance, Size
 from photostrip.project.terrestrial.options import chosen_camera, required_format
 from photostrip.project.terrestrial.ranges import BASE, DISTANCE, SIGNIFICANCE
 from photostrip.terrestrial.forecast import DisplacementSpec
+from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
 PRESET = "UMK 10/1318"
-MICROMETRES = 1000.0  # in a millimetre
 CONVERGENCE = Range(-45.0, 45.0, "deg")
 POWER = Range(0.5, 0.9999, "")
 Metres = Annotated[Number, AfterValidator(bounded(DISTANCE))]

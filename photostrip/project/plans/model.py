@@ -25,14 +25,12 @@ from photostrip.project.schema.values import (
     wrong,
 )
 from photostrip.project.simulation import camera_of
+from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-MICROMETRES = 1000.0  # in a millimetre
-MILLIMETRES = 1000.0  # in a metre
-ARCSECONDS = 206264.806  # in a radian
 USES = ("xyz", "xy", "z")
 REACH = Range(5.0, 100.0, "%")
 GRID = Range(2, 101, "points")
@@ -177,7 +175,7 @@ def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
         base=base,
         width=width,
         scale=scale,
-        image_sigma=given.image_sigma_um / 1000.0,
+        image_sigma=given.image_sigma_um / MICROMETRES,
         zone_points=given.orientation.zone_points,
         orientation_points=tuple(given.orientation.points),
         control=points or control_layout(str(given.control.layout), base, width),

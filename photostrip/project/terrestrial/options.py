@@ -14,9 +14,10 @@ from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber, number, shown
 from photostrip.project.terrestrial import ranges
 from photostrip.project.terrestrial.cameras import preset, read_presets
-from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite, ground_from_photo, photo_from_directions
+from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo, photo_from_directions
 from photostrip.terrestrial.one_station import OneStation
 from photostrip.terrestrial.orientation import FREE, Sightings
+from photostrip.units import ARCSECONDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

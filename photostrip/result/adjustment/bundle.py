@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.result.numbers import MICROMETRES, PER_RADIAN, Document, rms
+from photostrip.result.numbers import PER_RADIAN, Document, rms
 from photostrip.result.quantities import record
 from photostrip.triangulation.bundle.quality import reliability
+from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

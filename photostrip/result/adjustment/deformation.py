@@ -12,6 +12,7 @@ from photostrip.planning.model.deformation import Paraboloid, determines_parabol
 from photostrip.result.quantities import record
 from photostrip.statistics import t_p_value
 from photostrip.triangulation.absolute_orientation import Targets
+from photostrip.units import ARCSECONDS, MILLIMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,10 +22,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
 
-MILLIMETRES = 1000.0  # per metre
 LEVEL = 0.05  # of all tests together
 LEAST_MODELS = 3  # whose scatter says how far their mean may be from zero
-ARCSECONDS = float(np.degrees(1.0)) * 3600.0
 TERMS = ("twist", "bending")
 
 

@@ -10,11 +10,12 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.result.adjustment.bundle import Kind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import AXES, names_of
-from photostrip.result.numbers import MICROMETRES, Document, natural, rounded
+from photostrip.result.numbers import Document, natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
 from photostrip.triangulation.gross_errors.control.control_rejections import EXCHANGED, WRONG_IMAGE
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation.scale_transfer import depths
+from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.result.numbers import EXACT, MICROMETRES, Document, natural_rank, significant
+from photostrip.result.numbers import EXACT, Document, natural_rank, significant
 from photostrip.result.quantities import grouped
+from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats

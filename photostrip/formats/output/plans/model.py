@@ -19,13 +19,13 @@ from photostrip.planning.model.plan import (
 )
 from photostrip.planning.model.single_model import PARAMETERS
 from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
+from photostrip.units import ARCSECONDS, MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats
 
-ARCSECONDS = 206264.806
 IN_PHOTO = 2  # decimals of mm: places of points
 SURFACE = ("E0", "A", "B", "C", "D")
 AXES = ("x", "y", "z")
@@ -82,19 +82,8 @@ def _expected(name: str, camera: str, forecast: Forecast) -> Document:
         "control": _control(forecast),
         "control_sigma_m": list(spec.control_sigma),
         "points": [
-            {
-                "x_mm": x,
-                "y_mm": y,
-                "sigma_x_m": s[0],
-                "sigma_y_m": s[1],
-                "sigma_plan_m": s[2],
-                "sigma_z_m": s[3],
-                "adjusted_plan_m": a[2],
-                "adjusted_z_m": a[3],
-            }
-            for (x, y), s, a in zip(
-                rounded(forecast.places, IN_PHOTO), _with_plan(together), _with_plan(adjusted), strict=True
-            )
+            {"x_mm": x, "y_mm": y, **sigmas}
+            for (x, y), sigmas in zip(rounded(forecast.places, IN_PHOTO), _sigmas(together, adjusted), strict=True)
         ],
         "sources": [_share(source, values) for source, values in shares.items()],
         "worst": {
@@ -125,6 +114,13 @@ def _with_plan(sigmas: Floats) -> list[list[float]]:
     return rows
 
 
+def _sigmas(plain: Floats, adjusted: Floats) -> list[Document]:
+    """Return the standard deviations of each point, alone and with the elements as unknowns."""
+    names = ("sigma_x_m", "sigma_y_m", "sigma_plan_m", "sigma_z_m", "adjusted_plan_m", "adjusted_z_m")
+    rows = zip(_with_plan(plain), _with_plan(adjusted), strict=True)
+    return [dict(zip(names, (*alone, *together[2:]), strict=True)) for alone, together in rows]
+
+
 def _element_sigmas(forecast: Forecast) -> list[Document]:
     found = (_element(name, value) for name, value in zip(FREE, forecast.elements.tolist(), strict=True))
     return [{"element": each["element"], "sigma": each["value"], "unit": each["unit"]} for each in found]
@@ -132,7 +128,7 @@ def _element_sigmas(forecast: Forecast) -> list[Document]:
 
 def _element(name: str, value: float) -> Document:
     if name in ("dby", "dbz"):
-        return {"element": name, "value": rounded(value * 1000.0, 2), "unit": "um"}
+        return {"element": name, "value": rounded(value * MICROMETRES, 2), "unit": "um"}
     return {"element": name, "value": rounded(value * ARCSECONDS, 2), "unit": "arcsec"}
 
 
@@ -167,21 +163,8 @@ def _named_points(forecast: Forecast) -> Document:
     spec = forecast.spec
     if not spec.points:
         return {}
-    rows = zip(spec.points, _with_plan(forecast.at_points), _with_plan(forecast.at_points_adjusted), strict=True)
-    return {
-        "named": [
-            {
-                **_place(point.name, point.at, point.height),
-                "sigma_x_m": s[0],
-                "sigma_y_m": s[1],
-                "sigma_plan_m": s[2],
-                "sigma_z_m": s[3],
-                "adjusted_plan_m": a[2],
-                "adjusted_z_m": a[3],
-            }
-            for point, s, a in rows
-        ]
-    }
+    rows = zip(spec.points, _sigmas(forecast.at_points, forecast.at_points_adjusted), strict=True)
+    return {"named": [{**_place(point.name, point.at, point.height), **sigmas} for point, sigmas in rows]}
 
 
 def _place(name: str, at: tuple[float, float], height: float) -> Document:
