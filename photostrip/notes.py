@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 MOST_NAMED = 8  # ids in one message
 
@@ -40,10 +40,11 @@ def before(file: str, line: int, column: int) -> str:
     return f"{place}: " if place else ""
 
 
-def listed(names: Sequence[str], most: int = MOST_NAMED) -> str:
-    """Name the first of many in a message, and say how many more there are."""
-    head = ", ".join(names[:most])
-    return head if len(names) <= most else f"{head} and {len(names) - most} more"
+def listed(names: Iterable[str], most: int = MOST_NAMED) -> str:
+    """Name the first of many, and say how many more there are: ``A1, A2 and 7 more``."""
+    every = list(names)
+    head = ", ".join(every[:most])
+    return head if len(every) <= most else f"{head} and {len(every) - most} more"
 
 
 def counted(number: int, one: str, many: str = "") -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.notes import named
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,10 +25,9 @@ def finite_rows(rows: Floats) -> Flags:
 def named_rows(bad: Flags, ids: Sequence[str] | None) -> str:
     """Say which rows are meant, the first of them by name; without ids by number, counted from 0."""
     rows = np.flatnonzero(bad)
-    names = [str(row) if ids is None else ids[int(row)] for row in rows[:_ROWS_NAMED]]
-    what = "row" if ids is None else "point"
-    more = f" and {len(rows) - len(names)} more" if len(rows) > len(names) else ""
-    return f"{what}{'s' if len(rows) > 1 else ''} {', '.join(names)}{more}"
+    if ids is None:
+        return named("row", [str(row) for row in rows], _ROWS_NAMED)
+    return named("point", [ids[int(row)] for row in rows], _ROWS_NAMED)
 
 
 def require_rows(good: Flags, trouble: str, ids: Sequence[str] | None) -> None:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.text.findings import listed
-from photostrip.notes import Note, counted
+from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
 from photostrip.project.conversion import certificate_of
 from photostrip.project.tables import Tables, alike, rays

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.formats.measured.models import ModelTable, read_models
-from photostrip.formats.text.findings import Findings, listed, suggestion
+from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.frozen import dataclass
+from photostrip.notes import listed
 from photostrip.pipeline import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
 from photostrip.project.yaml.document import Node, fault_at

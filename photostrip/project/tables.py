@@ -12,11 +12,12 @@ import numpy as np
 from photostrip.formats.measured.control import ControlTable, read_control, refuse_repeated
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable, read_orientations, read_positions
 from photostrip.formats.measured.observations import Manner, read_measurements
-from photostrip.formats.text.findings import Findings, listed, suggestion
+from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import SYSTEMS
+from photostrip.notes import listed
 from photostrip.project.models import ModelTables, model_tables, read_model_points
 from photostrip.project.yaml.document import Node, fault_at
 from photostrip.project.yaml.references import ListedPhoto, listed_photos, marks_of

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.notes import listed
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile, f_p_value
 from photostrip.terrestrial import frame
@@ -170,8 +171,7 @@ def _refuse_without_distances(sightings: Sightings, settings: OrientationSetting
     without = [name for name, each in zip(sightings.ids, sightings.distances, strict=True) if not each > 0]
     if without:
         what = "eccentricity" if settings.eccentricity else "refraction"
-        more = f" and {len(without) - 1} more" if len(without) > 1 else ""
-        msg = f"{what} acts according to the distance of a point, and that of {without[0]}{more} is not given"
+        msg = f"{what} acts according to the distance of a point, and that of {listed(without, 1)} is not given"
         raise GeometryError(msg, points=without, code="no-distance")
     nearest = float(sightings.distances.min())
     if abs(settings.eccentricity) >= nearest / 2:

@@ -11,6 +11,7 @@ import numpy as np
 from photostrip.formats.measured.columns import AXES, POINT, SIGMAS, numbers, sigmas
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
+from photostrip.notes import listed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -108,7 +109,7 @@ def _refuse_without_sigma(read: ControlTable, findings: Findings) -> None:
     rows, axes = np.nonzero(read.use & np.isnan(read.sigma))
     if len(rows):
         points = list(dict.fromkeys(read.ids[row] for row in rows))
-        message = f"no standard deviation for {points[0]}" + (f" and {len(points) - 1} more" if len(points) > 1 else "")
+        message = f"no standard deviation for {listed(points, 1)}"
         fix = "set `sigma: [sx, sy, sz]` of this control list in the project file, or fill the columns sx, sy, sz"
         findings.add(read.table.fault(int(rows[0]), f"s{AXES[axes[0]]}", message, "no-sigma", fix=fix))
 

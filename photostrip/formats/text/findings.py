@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from photostrip.notes import Note
 
 LARGEST_LIST = 200  # faults kept of one file; a wrong export has one in every row
-IDS_NAMED = 8
 
 
 @dataclass
@@ -80,10 +79,3 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     folded = {each.casefold(): each for each in reversed(names)}
     close = get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.65)
     return f"did you mean `{folded[close[0]]}`?" if close else ""
-
-
-def listed(ids: Iterable[str], limit: int = IDS_NAMED) -> str:
-    """Name some ids and count the rest: ``A1, A2 and 7 more``."""
-    names = list(ids)
-    head = ", ".join(names[:limit])
-    return head if len(names) <= limit else f"{head} and {len(names) - limit} more"

@@ -17,11 +17,11 @@ import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import BYTE_ORDER_MARK
-from photostrip.formats.text.findings import Findings, listed, suggestion
+from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import LARGEST, SMALLEST, NotANumber, number, shown
 from photostrip.formats.text.table_text import TableText, content
 from photostrip.formats.text.tables import CONTROL_CHARACTER, Column, Table
-from photostrip.notes import Note, counted
+from photostrip.notes import Note, counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -9,9 +9,9 @@ import numpy as np
 
 from photostrip.errors import Fault
 from photostrip.formats.measured import terrestrial
-from photostrip.formats.text.findings import Findings, listed, suggestion
+from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.frozen import dataclass
-from photostrip.notes import Note, counted
+from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
 from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLIMETRES, refuse_outside
 from photostrip.terrestrial.monitoring import Series

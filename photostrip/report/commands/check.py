@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.notes import counted
+from photostrip.notes import MOST_NAMED, counted, listed
 from photostrip.report.page.angles import UNITS, AngleUnit
-from photostrip.report.page.numbers import listed, short
+from photostrip.report.page.numbers import short
 from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 # What is printed without --verbose: points with a row each in the table of control, kinds of them when there are more,
 # frames that are decoded, tables of which all rows are used.
 POINTS_SHOWN, KINDS_SHOWN, FRAMES_SHOWN, TABLES_SHOWN = 12, 6, 2, 4
-IDS_SHOWN = 8
 
 
 def check_sections(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
@@ -177,7 +176,7 @@ def _rows(rows: Sequence[Document], *, everything: bool) -> Section:
         head = f"{table['file']}: {table['used']} of {counted(table['rows'], 'row')} used"
         parts.append(Words(head, "head" if table["unused"] else ""))
         for each in table["unused"]:
-            ids = listed(each["ids"], len(each["ids"]) if everything else IDS_SHOWN)
+            ids = listed(each["ids"], len(each["ids"]) if everything else MOST_NAMED)
             first = f"first in line {each['first_line']}"
             parts.append(Words(f"{counted(each['rows'], 'row')}: {each['why']} ({first}): {ids}", mark="  -"))
     if silent:

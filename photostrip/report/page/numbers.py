@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from photostrip.report.page.parts import DASH
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 Number = float | None
 
@@ -57,13 +52,6 @@ def power(value: Number, digits: int = 4) -> str:
 def percent(part: float, whole: float) -> str:
     """Return a share in percent."""
     return f"{100 * part / whole:.1f} %" if whole else DASH
-
-
-def listed(names: Iterable[str], limit: int) -> str:
-    """Name some ids and count the rest."""
-    given = list(names)
-    head = ", ".join(given[:limit])
-    return head if len(given) <= limit else f"{head} and {len(given) - limit} more"
 
 
 def joined(*notes: str) -> str:

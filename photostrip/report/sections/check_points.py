@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from photostrip.notes import counted
-from photostrip.report.page.numbers import fixed, joined, listed, metres, ratio, signed
+from photostrip.notes import counted, listed
+from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
 from photostrip.report.page.parts import Document, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.points import AXES, DIFFERENCES, IDS_NAMED, given_table, largest

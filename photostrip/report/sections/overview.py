@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from photostrip.notes import counted
+from photostrip.notes import counted, listed
 from photostrip.report.page.layout import lay_out
-from photostrip.report.page.numbers import fixed, listed, metres, micrometres, percent
+from photostrip.report.page.numbers import fixed, metres, micrometres, percent
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.decisions import choices_in_short, chosen_degrees
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 MOST_LINES = 120  # of a report, its title and its last line included
 # Points, reasons, findings, notes that are shown: as many as leave the report short.
 MOST_OF_A_KIND = (12, 8, 6, 4, 2, 1)
-STRIPS_NAMED = 8
 NAMED = 3  # worst pairs, photos and points; cameras
 SAID_BY_THE_WORST = {"rejected", "without coordinates"}
 AROUND = 4  # lines of the title and of the end
@@ -237,7 +236,7 @@ def _likewise(rest: Sequence[Document]) -> str:
         return ""
     strips = [note["strip"] for note in rest if note["strip"]]
     if len(strips) == len(rest):
-        return f" (and the same for {'strip' if len(strips) == 1 else 'strips'} {listed(strips, STRIPS_NAMED)})"
+        return f" (and the same for {'strip' if len(strips) == 1 else 'strips'} {listed(strips)})"
     return f" (and {len(rest)} more like this: --section notes)"
 
 

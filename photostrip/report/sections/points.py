@@ -6,8 +6,8 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
-from photostrip.notes import before, counted
-from photostrip.report.page.numbers import joined, listed, metres, micrometres, ratio, signed, unit
+from photostrip.notes import before, counted, listed
+from photostrip.report.page.numbers import joined, metres, micrometres, ratio, signed, unit
 from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.models import scale_word

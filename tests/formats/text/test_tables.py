@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 from photostrip.formats.measured.observations import OBSERVATIONS, read_measurements
 from photostrip.formats.text import table_reader, table_text
-from photostrip.formats.text.findings import LARGEST_LIST, Findings, listed, suggestion
+from photostrip.formats.text.findings import LARGEST_LIST, Findings, suggestion
 from photostrip.formats.text.table_reader import read_table
-from photostrip.notes import counted
+from photostrip.notes import counted, listed
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.notes import counted
-from photostrip.report.page.numbers import fixed, listed, metres, micrometres, short
+from photostrip.notes import counted, listed
+from photostrip.report.page.numbers import fixed, metres, micrometres, short
 from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
