@@ -68,7 +68,6 @@ class PointTable:
         return {name: row for row, name in enumerate(self.ids)}
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return len(self.ids)
 
 
@@ -105,7 +104,6 @@ class PhotoPoints:
 
     @cached_property
     def photo_index(self) -> dict[str, int]:
-        """Number of each photo."""
         return {name: number for number, name in enumerate(self.photo_ids)}
 
     def places(self, photos: Sequence[str]) -> Numbers:
@@ -142,7 +140,6 @@ class ControlPoints:
         object.__setattr__(self, "frame", frozen(frame, dtype=np.intp, shape=(n,)))
 
     def __len__(self) -> int:
-        """Return the number of points."""
         return len(self.ids)
 
     def take(self, rows: Sequence[int] | Numbers | Flags) -> ControlPoints:

@@ -41,7 +41,6 @@ def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
 
 @lru_cache(maxsize=4096)
 def f_quantile(probability: float, dof_numerator: float, dof_denominator: float) -> float:
-    """Quantile of F."""
     return f_isf(1 - probability, dof_numerator, dof_denominator)
 
 
@@ -52,7 +51,6 @@ def binomial_p_value(count: float, number: float, probability: float) -> float:
 
 @lru_cache(maxsize=4096)
 def chi2_quantile(probability: float, dof: float) -> float:
-    """Quantile of chi-square."""
     return chi2_ppf(probability, dof)
 
 

@@ -57,8 +57,6 @@ def _dask() -> Any:  # noqa: ANN401 (a module without types)
 
 
 class Cluster:
-    """A cluster that is connected."""
-
     def __init__(
         self,
         client: object,

@@ -41,7 +41,6 @@ class Stop:
     refusals: int = 0  # results in a row that could not be written
 
     def __call__(self) -> bool:
-        """Whether to stop."""
         return bool(self.signal) or self.refusals >= LAST_REFUSALS
 
 

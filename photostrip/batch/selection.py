@@ -24,8 +24,6 @@ LARGEST_LIST = 100 * MEGABYTE
 
 @dataclass(frozen=True)
 class ChosenProject:
-    """A project of the batch."""
-
     number: int
     project: str  # path of the project file as the user knows it
     output: str  # folder of its result below that of the batch, with slashes

@@ -40,7 +40,6 @@ class Rendering:
         return (to_markdown if form == "md" else to_text)(*self.report(document))
 
     def show(self, document: Document, form: Form) -> None:
-        """Print a document."""
         if form == "json":
             print_json(document)
         elif form == "csv":

@@ -63,7 +63,6 @@ class Tolerances:
     findings: SetTolerance = SetTolerance()
 
     def of(self, kind: str) -> Tolerance:
-        """Return the tolerance of a kind of quantity."""
         found: Tolerance = getattr(self, kind)
         return found
 

@@ -90,7 +90,6 @@ class CrsParts:
 
     @property
     def is_earth(self) -> bool:
-        """Whether the body is the Earth."""
         return abs(self.ellipsoid[0] / _EARTH_RADIUS - 1.0) < _BODY_TOLERANCE
 
 

@@ -46,7 +46,6 @@ class Strip:
         return observations.places(self.photos)
 
     def oriented(self, centers: Floats, rotations: Floats) -> KnownPhotos:
-        """Its photos with their orientations."""
         return KnownPhotos(centers, rotations, np.full(len(centers), self.camera.principal_distance))
 
     def median_sigma(self, observations: PhotoPoints) -> float:
@@ -90,8 +89,6 @@ class CameraPositions:
 
 @dataclass(frozen=True, eq=False)
 class GivenOrientations:
-    """Given exterior orientations."""
-
     photos: tuple[str, ...]  # photos, unique
     frame: FrameSpec  # ground frame of the centres; the rotations refer to its axes at each centre
     enu: Floats  # (n, 3): perspective centres in the units of the frame, internal order
@@ -123,7 +120,6 @@ class Inputs:
 
     @property
     def cameras(self) -> dict[str, Camera]:
-        """Camera of each photo."""
         return {photo: strip.camera for strip in self.strips for photo in strip.photos}
 
     @property

@@ -138,7 +138,6 @@ class StripResult:
 
     @property
     def formed(self) -> StripShape:
-        """The strip as it was formed."""
         return self.of_models.formed if self.photo_stages is None else self.photo_stages.formed
 
     @property
@@ -228,7 +227,6 @@ class BlockStart:
     free: bool  # whether nothing ties the block to the ground: its frame and scale are those of the first strip
 
     def rows_of(self, photos: Sequence[str]) -> Numbers:
-        """Rows of photos."""
         row = {photo: number for number, photo in enumerate(self.photos)}
         return np.array([row[photo] for photo in photos], np.intp)
 

@@ -57,7 +57,6 @@ class ImageSystem:
 
 
 def cameras(project: ProjectFile) -> dict[str, camera.Camera]:
-    """Return the cameras of a project."""
     return {name: _camera(name, each) for name, each in project.cameras.items()}
 
 
@@ -87,7 +86,6 @@ def _camera(name: str, given: Camera) -> camera.Camera:
 
 
 def distortion_of(given: Distortion) -> camera.Distortion:
-    """Return the lens distortion of a camera."""
     return camera.Distortion(
         model=given.model,
         direction=given.direction,
@@ -100,7 +98,6 @@ def distortion_of(given: Distortion) -> camera.Distortion:
 
 
 def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[Strip, ...]:
-    """Return the strips of a project."""
     usual = project.processing.bundle.self_calibration
     return tuple(
         Strip(

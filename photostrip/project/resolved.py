@@ -147,7 +147,6 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
 
 
 def _block(mapping: dict[str, Any], indent: str) -> Iterator[str]:
-    """Return the lines of a mapping."""
     for name, value in mapping.items():
         begin = f"{indent}{_scalar(name)}:"
         if isinstance(value, dict) and value:
@@ -178,7 +177,6 @@ def _row(begin: str, words: list[str]) -> Iterator[str]:
 
 
 def _scalar(value: object) -> str:
-    """Write one value."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Text):

@@ -104,7 +104,6 @@ class ToleranceFile(Section):
 
 
 def tolerance_schema() -> dict[str, Any]:
-    """JSON Schema of a tolerance profile."""
     return described(ToleranceFile, "photostrip tolerance profile")
 
 

@@ -35,8 +35,6 @@ EXIT_SIGNAL = 128  # plus its number, as a shell reports it
 
 @dataclass(frozen=True)
 class BatchOptions:
-    """The options of the command."""
-
     projects: list[str]
     output: Path | None
     jobs: int | None
@@ -149,7 +147,6 @@ def write_summaries(batch: Batch, code: int, folder: ResultFolder) -> list[Input
 def print_summary(
     outcomes: list[Document], code: int, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool
 ) -> None:
-    """Print the summary on stdout."""
     match form:
         case BatchFormat.CSV:
             sys.stdout.write(visible(formats.summary_csv(outcomes)))

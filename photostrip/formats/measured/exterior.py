@@ -50,8 +50,6 @@ class PositionTable(GivenTable):
 
 @dataclass(frozen=True, eq=False)
 class OrientationTable:
-    """Given exterior orientations as the table has them."""
-
     table: Table
     ids: list[str]
     # xyz, sigma: (n, 3): perspective centres and their standard deviations, columns x, y, z; NaN where a cell is empty

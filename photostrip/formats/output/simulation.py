@@ -151,7 +151,6 @@ def _of_photos(simulation: Simulation) -> list[str]:
 
 
 def _camera(camera: Camera) -> list[str]:
-    """Lines of the camera."""
     lines = [
         f"  {on_one_line(camera.name)}:",
         f"    principal_distance: {camera.principal_distance!r}",

@@ -99,7 +99,6 @@ def ground_decimals(frame: GroundFrame, step: float) -> list[int]:
 
 
 def control_csv(simulation: Simulation, number: int, frame: GroundFrame) -> str:
-    """One control list."""
     control = simulation.control.take(simulation.control.frame == number)
     noise = simulation.spec.control.noise
     step = GROUND_STEP_FREE if noise is not None and not any(noise) else GROUND_STEP

@@ -216,7 +216,6 @@ def worked_examples() -> Document:
 def oriented(
     camera: Phototheodolite, sightings: Sightings, found: PhotoOrientation, settings: OrientationSettings, unit: str
 ) -> Document:
-    """Return a photo oriented by directions."""
     document = head("photo-orientation", camera)
     if settings.eccentricity:
         document["eccentricity_m"] = rounded(settings.eccentricity, EXACT)

@@ -177,7 +177,6 @@ def _camera(result: Monitoring, state: CameraState) -> Document:
 
 
 def _point(result: Monitoring, row: int, order: list[int], axes: Sequence[str]) -> Document:
-    """Return all epochs of one point."""
     series = result.series
     epochs = []
     for number, epoch in enumerate(series.epochs):
@@ -249,7 +248,6 @@ def displacements_csv(document: Document) -> str:
 
 
 def cameras_csv(document: Document) -> str:
-    """Return the turns of the cameras as CSV."""
     turn = ("right", "up", "counter_clockwise")
     names = (
         "epoch",

@@ -154,7 +154,6 @@ def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
 
 
 def _points_of_photos(observations: PhotoPoints) -> dict[str, set[int]]:
-    """Numbers of the points of each photo."""
     order = np.argsort(observations.photo, kind="stable")
     ends = np.cumsum(np.bincount(observations.photo, minlength=len(observations.photo_ids)))
     parts = np.split(observations.point[order], ends[:-1])

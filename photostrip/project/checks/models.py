@@ -80,7 +80,6 @@ def points_of_strip(models: MeasuredModels, number: int) -> Numbers:
 
 
 def photos_of_points(models: MeasuredModels) -> dict[str, set[str]]:
-    """Return the photos of the models that hold each point."""
     shown = {
         name: strip.photos[place : place + 2] for strip in models.strips for place, name in enumerate(strip.models)
     }

@@ -113,8 +113,6 @@ class CameraPlanFile(Section):
 
 
 class CameraPlan(NamedTuple):
-    """Cameras to compare."""
-
     name: str
     cameras: tuple[camera_efficiency.ComparedCamera, ...]
     reference: camera_efficiency.ComparedCamera

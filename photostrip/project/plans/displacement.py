@@ -68,8 +68,6 @@ class DisplacementPlanFile(Section):
 
 
 class DisplacementPlan(NamedTuple):
-    """A plan of displacements."""
-
     name: str
     spec: DisplacementSpec
     files: Sequence[str]

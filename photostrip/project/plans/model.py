@@ -153,8 +153,6 @@ def elements_option(text: str | None) -> dict[str, str]:
 
 
 class ModelPlan(NamedTuple):
-    """A plan of one model."""
-
     name: str
     camera: str
     spec: ModelSpec

@@ -170,8 +170,6 @@ class StripPlanFile(Flown):
 
 @dataclass(frozen=True, eq=False)
 class StripPlan:
-    """A plan of a strip."""
-
     name: str
     design: Design
     reading: Reading

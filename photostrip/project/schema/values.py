@@ -37,7 +37,6 @@ def wrong(message: str, *, code: str = "value", expected: str = "", fix: str = "
 
 
 def single(value: object, expected: str) -> str:
-    """Require a single value."""
     if not isinstance(value, str):
         what = "a list" if isinstance(value, list) else "a mapping"
         raise wrong(f"{what} is given here", code="type", expected=expected)

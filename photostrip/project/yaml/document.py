@@ -99,7 +99,6 @@ class Node:
         return node.text if node is not None else ""
 
     def has(self, *path: str | int) -> bool:
-        """Whether there is a node at a path."""
         return self.find(*path) is not None
 
     def place_of(self, path: Path) -> Place:

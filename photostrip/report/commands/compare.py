@@ -33,7 +33,6 @@ ONE = {"photos": "photo", "points": "point", "models": "model", "strips": "strip
 
 
 def compare_sections(document: Document, *, quiet: bool = False, everything: bool = False) -> tuple[Section, ...]:
-    """Return the sections of a comparison."""
     same = document["status"] == "same"
     verdict = Words(headline(document), "good" if same else "failed")
     if quiet:

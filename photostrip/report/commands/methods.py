@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
 
 def methods_sections(document: Document) -> tuple[Section, ...]:
-    """Return the sections of a comparison of methods."""
     done = [row for row in document["methods"] if row["status"] != "refused"]
     parts: list[Part] = [_table(done, role) for role in ("check", "control")] if done else []
     parts += [

@@ -8,7 +8,6 @@ from photostrip.report.page.tables import number, tabulated, words
 
 
 def sources_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Make the report of the sources."""
     worked = tabulated(
         document["worked"],
         (

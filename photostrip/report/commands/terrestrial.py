@@ -16,7 +16,6 @@ ANGLE_DECIMALS = 5  # in deg and gon: 0.04 and 0.03 seconds of arc
 
 
 def direction_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Return the report of a direction computation."""
     title, build = BUILDERS[document["kind"]]
     return title, build(document)
 

@@ -30,7 +30,6 @@ def displacement_report(document: Document) -> tuple[str, tuple[Section, ...]]:
 
 
 def one_station_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Return the report of displacements from one station."""
     angles, camera, turn = document["orientation"], document["camera"], document["turn"]
     looking = ", ".join(f"{name} {fixed(angles[name], 4)}" for name in ("alpha", "omega", "kappa"))
     facts = [

@@ -25,7 +25,6 @@ SOURCE = {
 
 
 def trace_title(document: Document) -> str:
-    """Return the title of a trace."""
     return f"Trace: {document['name']}"
 
 

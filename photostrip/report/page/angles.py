@@ -28,7 +28,6 @@ class AngleUnit(NamedTuple):
         return fixed(self.of(degrees), decimals + self.more)
 
     def of(self, degrees: Number) -> Number:
-        """Return an angle in this unit."""
         return None if degrees is None else degrees * self.per_degree
 
     def of_seconds(self, seconds: Number) -> Number:

@@ -15,8 +15,6 @@ FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]") 
 
 
 class Case(NamedTuple):
-    """One test case."""
-
     name: str
     failure: str = ""  # why it failed, in one line; empty when it passed
     details: str = ""

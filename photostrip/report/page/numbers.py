@@ -35,7 +35,6 @@ def ratio(value: Number) -> str:
 
 
 def short(value: Number, digits: int = 4) -> str:
-    """Return a number with significant digits."""
     return DASH if value is None else f"{value:.{digits}g}"
 
 
@@ -50,7 +49,6 @@ def power(value: Number, digits: int = 4) -> str:
 
 
 def percent(part: float, whole: float) -> str:
-    """Return a share in percent."""
     return f"{100 * part / whole:.1f} %" if whole else DASH
 
 

@@ -11,8 +11,6 @@ DASH = "–"  # stands where there is no value
 
 
 class Column(NamedTuple):
-    """One column of a table."""
-
     name: str
     unit: str = ""  # unit of its numbers, in the second line of the head
     left: bool = False
@@ -21,8 +19,6 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Table:
-    """A table."""
-
     columns: tuple[Column, ...]
     rows: tuple[tuple[str, ...], ...]
     foot: tuple[tuple[str, ...], ...] = ()
@@ -38,8 +34,6 @@ class Facts:
 
 @dataclass(frozen=True)
 class Words:
-    """A paragraph."""
-
     text: str
     style: str = ""  # ``"good"``, ``"unverified"``, ``"look"``, ``"failed"`` or empty
     mark: str = ""  # what stands before it: a number or a bullet; lines after the first are indented below the text
@@ -50,7 +44,5 @@ Part = Table | Facts | Words
 
 @dataclass(frozen=True)
 class Section:
-    """One section of a report."""
-
     title: str
     parts: tuple[Part, ...]

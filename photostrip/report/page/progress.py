@@ -117,7 +117,6 @@ class BatchTable:
         self._live: Live | None = None
 
     def start(self) -> None:
-        """Show the table."""
         if self.live:
             from rich.console import Console
             from rich.live import Live

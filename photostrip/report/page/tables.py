@@ -29,7 +29,6 @@ class Shown(NamedTuple):
 
 
 def words(name: str, value: Value, unit: str = "", *, rank: int = 0) -> Shown:
-    """Return a column of words."""
     read = _reader(value)
     return Shown(Column(name, unit, left=True, rank=rank), lambda row: str(read(row)))
 

@@ -15,7 +15,6 @@ BEFORE = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_[]<>|#"})
 
 
 def to_text(title: str, sections: Iterable[Section], width: int = USUAL, *, ascii_only: bool = False) -> str:
-    """Return a report as plain text."""
     lines = lay_out(title, sections, width, ascii_only=ascii_only)
     return "".join(f"{line.text}\n" for line in lines)
 

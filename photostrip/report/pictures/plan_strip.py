@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 
 def strip_figure(document: Document) -> Figure:
-    """Draw the plan of a strip."""
     rows = len(document["layouts"])
     title = (
         f"{document['name']}: {document['camera']['name']}, 1:{document['geometry']['scale']:g},"

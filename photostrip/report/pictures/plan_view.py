@@ -27,8 +27,6 @@ class Spot(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """The plan of a result."""
-
     spots: list[Spot]
     strips: list[list[Spot]]
     north: Pair

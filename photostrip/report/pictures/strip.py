@@ -46,7 +46,6 @@ class Sheet(NamedTuple):
     height: float  # of the picture
 
     def place(self, spot: Spot) -> svg.Point:
-        """Return the place of a spot on the picture."""
         along, across = spot.along - self.low[0], spot.across - self.low[1]
         return self.origin[0] + along * self.scale, self.origin[1] - across * self.scale
 

@@ -79,13 +79,11 @@ def element(name: str, content: str = "", **attributes: str | float) -> str:
 
 
 def text(place: Point, words: str, kind: str = "", anchor: str = "start") -> str:
-    """Give words at a place."""
     x, y = place
     return element("text", escape(words), x=x, y=y, kind=f"label {kind}".strip(), text_anchor=anchor)
 
 
 def line(start: Point, end: Point, kind: str) -> str:
-    """Return a straight line."""
     return element("line", x1=start[0], y1=start[1], x2=end[0], y2=end[1], kind=kind)
 
 

@@ -26,7 +26,6 @@ FAILED_SHOWN = 3
 
 
 def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
-    """Differences at the check points."""
     rows = [row for row in document["control"] if row["role"] == "check" and row["measured"]]
     if not rows:
         proven = "cross_validation" in document

@@ -68,7 +68,6 @@ class SectionName(StrEnum):
 
 
 def sections_of(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
-    """Return all sections of the accuracy report."""
     return tuple(section for _, section in _named(document, everything=everything))
 
 
@@ -161,5 +160,4 @@ def require_complete(document: Document, file: str) -> None:
 
 
 def title_of(document: Document) -> str:
-    """Return the title of the report."""
     return f"Accuracy report: {document['name']}"

@@ -24,7 +24,6 @@ WORST_POINTS = 8
 
 
 def control_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
-    """Residuals at the control."""
     rows = [row for row in document["control"] if row["role"] == "control" and row["measured"] and row["use"] != "off"]
     text = (
         "Adjusted minus given. These points took part in the adjustment: what is left here is smaller than the errors "

@@ -117,7 +117,6 @@ def _adjustment_of(document: Document) -> str:
 
 
 def camera_line(camera: Document) -> str:
-    """Return a camera in a line."""
     x0, y0 = camera["principal_point_mm"]
     text = f"principal distance {camera['principal_distance_mm']:g} mm, principal point {x0:g}, {y0:g} mm"
     if camera["format_mm"]:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """Values of all parameters."""
-
     centers: Floats  # (m, 3): perspective centres in the order of the problem, metres
     rotations: Floats  # (m, 3, 3): rotations in that order, photo to Cartesian frame
     xyz: tuple[Floats, ...]  # (3, S): points of each batch
@@ -62,8 +60,6 @@ class PreparedProblem:
 
 @dataclass(frozen=True, eq=False)
 class ParameterStep:
-    """A step of all parameters."""
-
     photos: Floats  # (m, 6): steps of the photos in the order of the band, in their own axes
     common: Floats  # (p,): steps of the common parameters
     points: tuple[Floats, ...]  # (3, S): steps of the points of each batch, metres

@@ -30,7 +30,6 @@ class Selection:
 
     @classmethod
     def everything(cls, problem: BundleProblem) -> Selection:
-        """Return the selection of all observations that are given."""
         return cls(
             images=np.ones(len(problem.images), bool),
             control=np.isfinite(problem.control.sigma),

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class IterationStep:
-    """One step of the adjustment."""
-
     chi_square: float  # weighted sum of squares of all residuals before the step
     length: float  # length of the step in standard deviations: the root of ``dx' N dx`` over all parameters
     damping: float  # damping of the step; 0 for a full Gauss-Newton step

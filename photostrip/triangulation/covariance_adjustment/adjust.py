@@ -78,7 +78,6 @@ class StripOnControl:
 
 
 def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdjustment:
-    """Adjust a strip with its own covariance."""
     factor, basis = image_variance(start.orientation, start.sigma)
     one, formations = _solved(start, np.zeros((len(start.errors.images.row), 2)), settings, factor), 1
     turn = rate = relinearisation.largest_turn(one.system)

@@ -61,7 +61,6 @@ class StripErrors:
 
     @property
     def models(self) -> int:
-        """Number of models."""
         return len(self.steps)
 
     def with_doubt(self, scale: Floats) -> StripErrors:

@@ -55,8 +55,6 @@ NOTHING_BENT = Bending()
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """Refined image coordinates."""
-
     # ideal image coordinates, reduced to the principal point, mm; every measured row, also what is rejected later
     observations: PhotoPoints
     # largest shift by each effect that was corrected, micrometres: ``"principal point"``, ``"distortion"``,

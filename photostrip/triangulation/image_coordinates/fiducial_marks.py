@@ -42,7 +42,6 @@ class Marks:
 
     @property
     def count(self) -> Numbers:
-        """Number of marks on each photo."""
         return np.asarray((self.weights > 0).sum(1), np.intp)
 
     def take(self, rows: Flags) -> Marks:
@@ -50,7 +49,6 @@ class Marks:
         return take_rows(self, rows, ("photos", "measured", "weights"))
 
     def on_photo(self, row: int) -> tuple[str, ...]:
-        """Return the marks measured on one photo."""
         return tuple(name for name, weight in zip(self.names, self.weights[row], strict=True) if weight > 0)
 
 

@@ -16,8 +16,6 @@ WARNING = "warning"
 
 
 class Kind(NamedTuple):
-    """A kind of mistake."""
-
     title: str  # what it is, in a few words
     severity: str  # ``"error"``: a result made from such data is wrong as a whole; ``"warning"``: some of it may be
 

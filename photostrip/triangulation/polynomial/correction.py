@@ -62,8 +62,6 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False)
 class Polynomial:
-    """The correction of a strip."""
-
     degree: int  # highest power of X in use; 0: similarity alone
     axes: tuple[AxisFit, AxisFit, AxisFit]  # fits of X, Y, Z
     evidence: tuple[Evidence, ...]  # degrees that were weighed, ascending

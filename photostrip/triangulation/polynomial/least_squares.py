@@ -23,8 +23,6 @@ CONVERGED = 1e-9  # m
 
 @dataclass(frozen=True, eq=False)
 class AxisFit:
-    """Polynomial of one axis."""
-
     terms: tuple[str, ...]  # names of the terms, keys of ``POWERS``; empty when the axis is not corrected
     # coefficients, sigmas: (k,): coefficients for X and Y in metres and their standard deviations (NaN without
     # redundancy)

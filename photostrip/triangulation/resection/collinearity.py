@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
 
 class KnownPhotos(NamedTuple):
-    """Photos of known orientation."""
-
     centers: Floats  # (m, 3): perspective centres
     rotations: Floats  # (m, 3, 3): photo to the frame of the centres
     focal: Floats  # (m,): principal distances, mm

@@ -10,7 +10,6 @@ DECIMALS = 4  # of metres
 
 
 def displacement_sections(document: Document) -> tuple[Section, ...]:
-    """Make the sections of the plan of displacements."""
     camera = document["camera"]
     width, height = (short(size) for size in camera["format_mm"])
     focal = calibrated(camera["principal_distance_mm"])

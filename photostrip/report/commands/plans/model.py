@@ -25,7 +25,6 @@ CAUSES = {"measuring": "measuring, δ1", "elements": "the elements, δ2", "contr
 
 
 def model_sections(document: Document) -> tuple[Section, ...]:
-    """Make the sections of the plan of one model."""
     geometry, worst = document["geometry"], document["worst"]
     sigmas = "; ".join(
         f"{each['element']} {fixed(each['sigma'], 1)}{' µm' if each['unit'] == 'um' else '″'}"

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 
 def plan_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Make the report of a plan."""
     title, build = BUILDERS[document["kind"]]
     return title, build(document)
 

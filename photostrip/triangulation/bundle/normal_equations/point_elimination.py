@@ -26,8 +26,6 @@ SMALL_GROUP = 24  # points: up to here it pays to bring the numbers of a group t
 
 @dataclass(frozen=True, eq=False)
 class Eliminated:
-    """Points of a batch, eliminated."""
-
     root: PointFactors
     # (6 k + more + 1, 3, S): T: for each ray six rows, then the common parameters; last L^-1 times the right-hand side
     # of the point

@@ -131,8 +131,6 @@ class BundleCameras:
 
 @dataclass(frozen=True, eq=False)
 class StartValues:
-    """Where the adjustment starts."""
-
     centers: Floats  # (m, 3): perspective centres, Cartesian, metres
     rotations: Floats  # (m, 3, 3): rotations, photo to Cartesian frame
     points: Floats  # (q, 3): points, Cartesian, metres
@@ -166,11 +164,9 @@ class BundleProblem:
         return len(self.start.points)
 
     def photo_name(self, number: int) -> str:
-        """Name of a photo for a message."""
         return self.photo_ids[number] if self.photo_ids else f"number {number}"
 
     def point_name(self, number: int) -> str:
-        """Name of a point for a message."""
         return self.point_ids[number] if self.point_ids else f"number {number}"
 
     def common_names(self) -> tuple[str, ...]:

@@ -70,7 +70,6 @@ class ScreenedBundle:
     def of(
         cls, problem: BundleProblem, selection: Selection, settings: BundleSettings, *, rough: bool = False
     ) -> ScreenedBundle:
-        """Adjust a selection."""
         chosen = selected(problem, selection)
         solution = solve(chosen, rough=rough)
         return cls(
@@ -83,7 +82,6 @@ class ScreenedBundle:
 
     @cached_property
     def joint(self) -> JointCofactors:
-        """Joint cofactors of the photos."""
         return JointCofactors.of_solution(self.solution)
 
 

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class StripRays:
-    """All rays of a strip."""
-
     observations: PhotoPoints
     position: Numbers  # (n,): place in the strip of the photo of every image point; -1 for photos of other strips
     sigma: Floats  # (p,): standard deviations of a y parallax of weight one in each pair, mm

@@ -150,8 +150,6 @@ def upright_coordinates(xyz: Floats, turn: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class LevelStrip:
-    """A strip, turned level."""
-
     w: Complex  # (n,): places of its points
     z: Floats  # (n,): their heights, in the same unit
     similarity: PlanSimilarity  # the strip on its control in plan

@@ -16,8 +16,6 @@ MOST_DECIMALS = 4
 
 
 class Slip(NamedTuple):
-    """A slip of the pen."""
-
     meant: float  # the coordinate that was meant
     text: str  # what happened, in words
 
