@@ -40,6 +40,7 @@ from photostrip.errors import PhotostripError  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.pipeline.inputs import CameraPositions  # noqa: E402
+from photostrip.points import locate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
 
@@ -235,7 +236,7 @@ def adjusted(project: Project, settings: Settings) -> Run:
     given = {name for name, check in zip(control.ids, control.check, strict=True) if not check}
     names = [result.refined.observations.point_ids[number] for number in result.points.number]
     new = [row for row, name in enumerate(names) if name not in given]
-    errors = result.points.cartesian - truth.xyz[[truth.index[name] for name in names]]
+    errors = result.points.cartesian - truth.xyz[locate(names, truth.ids)]
     used, placing = taking_part(result, len(project.names))
     notes = [note for note in result.notes if note.code in {"control-rejected", "position-rejected"}]
     return Run(

@@ -62,11 +62,6 @@ class PointTable:
         """Freeze the array."""
         object.__setattr__(self, "xyz", frozen(self.xyz, shape=(len(self.ids), 3)))
 
-    @cached_property
-    def index(self) -> dict[str, int]:
-        """Row of each id."""
-        return {name: row for row, name in enumerate(self.ids)}
-
     def __len__(self) -> int:
         return len(self.ids)
 

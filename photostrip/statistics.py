@@ -71,16 +71,15 @@ def noncentrality(significance: float, power: float, dof: float) -> float:
 
 
 @lru_cache(maxsize=4096)
-def grubbs_limit(n: int, alpha: float, *, two_sided: bool = True) -> float:
+def grubbs_limit(n: int, alpha: float) -> float:
     """Critical value of Grubbs' test for one outlier among n values, n at least 3: limit of max |value - mean| / s.
 
-    `alpha` is the probability of rejecting a value of a clean sample; two-sided when the sign of the outlier is
-    unknown.
+    `alpha` is the probability of rejecting a value of a clean sample; the sign of the outlier is unknown. Where it is
+    known, one-sided, the limit is that of twice the probability.
 
     Source: [004a]; [Grubbs 1969] as a function of Student's t.
     """
-    tail = alpha / (2 * n if two_sided else n)
-    t2 = t_quantile(1 - tail, n - 2) ** 2
+    t2 = t_quantile(1 - alpha / (2 * n), n - 2) ** 2
     return (n - 1) / sqrt(n) * sqrt(t2 / (n - 2 + t2))
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.points import ControlPoints, PhotoPoints, PointTable, frozen
+from photostrip.points import ControlPoints, PhotoPoints, PointTable, frozen, locate
 
 
 def table(ids: list[str] | tuple[str, ...]) -> PointTable:
@@ -53,9 +53,9 @@ def test_frozen_brings_any_layout_into_shape() -> None:
 # ------------------------------------------------------------------------------------------- PointTable
 
 
-def test_rows_are_found_by_id() -> None:
+def test_rows_are_found_by_id_and_cannot_be_changed() -> None:
     points = table(["0123", "123", "NO"])
-    assert points.index == {"0123": 0, "123": 1, "NO": 2}  # ids are text: 0123 is not 123
+    assert locate(["123", "0123", "23"], points.ids).tolist() == [1, 0, -1]  # ids are text: 0123 is not 123
     assert points.xyz.shape == (3, 3)
     with pytest.raises(ValueError, match="read-only"):
         points.xyz[0, 0] = 1

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 SINGULAR = 1e-9  # smallest over largest singular value: below, rounding decides
 ITERATIONS = 50
 CONVERGED = 1e-12  # in units of the spread of the points
-ROUNDING = 1e-14  # relative; a large shift of the target costs digits of the source
 LINEAR = [0, 1, 3]  # columns of x, y and 1
 
 
@@ -50,13 +49,6 @@ class PlaneTransform:
         values = _terms(np.asarray(points, float)) @ self.coefficients.swapaxes(-1, -2)
         return values[..., :2] / values[..., 2:]
 
-    @property
-    def inverse(self) -> PlaneTransform | PlaneInverse:
-        """The transformation from target to source; that of a bilinear one is found by iteration."""
-        if self.coefficients[..., 2].any():
-            return PlaneInverse(self)
-        return PlaneTransform(_from_matrix(_inverse(self.coefficients[..., LINEAR])))
-
     def residuals(self, source: ArrayLike, target: ArrayLike) -> Floats:
         """Subtract the target from the transformed source."""
         return np.asarray(self(source) - np.asarray(target, float), float)
@@ -73,32 +65,6 @@ class PlaneTransform:
     def take(self, rows: ArrayLike) -> PlaneTransform:
         """Give some transformations of an array of them, by their numbers along the first axis."""
         return PlaneTransform(self.coefficients[np.asarray(rows)])
-
-
-@dataclass(frozen=True, eq=False)
-class PlaneInverse:
-    """Inverse of a transformation with a bilinear term, by Newton's iteration from its affine part."""
-
-    inverse: PlaneTransform  # the transformation that it is the inverse of
-
-    def __call__(self, points: ArrayLike) -> Floats:
-        """Transform points (..., n, 2) back to those on the side of the origin.
-
-        Raises GeometryError when there is no such point: the transformation folds the plane before it.
-        """
-        target = np.asarray(points, float)
-        found = PlaneTransform(_from_matrix(_inverse(self.inverse.coefficients[..., LINEAR])))(target)
-        for _ in range(ITERATIONS):
-            jacobian = self.inverse.jacobian(found)
-            area = np.abs(np.linalg.det(jacobian))
-            if not (area > 0).all():
-                break
-            step = np.linalg.solve(jacobian, self.inverse.residuals(found, target)[..., None])[..., 0]
-            found = found - step
-            rounding = ROUNDING * np.abs(target).max(initial=0.0) / np.sqrt(area[..., None])
-            if (np.abs(step) <= CONVERGED * (1 + np.abs(found)) + rounding).all():
-                return found
-        raise GeometryError("the bilinear transformation has no inverse at some point", code="no-inverse")
 
 
 def conformal_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> PlaneTransform:
@@ -169,7 +135,7 @@ def projective_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayL
         step = _solve(design, _stacked(local_b - value)[..., None], twice)[..., 0]
         h = h + step
         if (np.abs(step) <= CONVERGED).all():
-            back = _inverse(_shift_and_scale(*_center_and_size(b, w)))
+            back = np.linalg.inv(_shift_and_scale(*_center_and_size(b, w)))
             return PlaneTransform(_from_matrix(back @ _with_last_row(h)) @ substitution)
     raise GeometryError("the projective fit did not converge", code="projective")
 
@@ -313,7 +279,3 @@ def _from_matrix(matrix: Floats) -> Floats:
     coefficients = np.zeros((*matrix.shape[:-1], 4))
     coefficients[..., LINEAR] = matrix
     return coefficients
-
-
-def _inverse(matrix: Floats) -> Floats:
-    return np.asarray(np.linalg.inv(matrix), np.float64)

@@ -65,20 +65,6 @@ def test_a_transformation_comes_back(kind: str, seed: int) -> None:
 
 @kinds
 @given(seed=SEEDS)
-def test_the_inverse_goes_back(kind: str, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    transform = random_transform(kind, rng)
-    points = rng.uniform(-115, 115, (20, 2))
-    there = transform(points)
-    scale = np.sqrt(np.abs(np.linalg.det(transform.jacobian(points)))).min()
-    allowed = PICOMETRE + 1e-13 * np.abs(there).max() / scale  # the shift costs digits, as many as it is long
-    assert np.abs(transform.inverse(there) - points).max() < allowed
-    back = transform.inverse.inverse
-    assert np.allclose(back(points), there, rtol=0, atol=1e-11 * np.abs(there).max())
-
-
-@kinds
-@given(seed=SEEDS)
 def test_the_jacobian_agrees_with_differences(kind: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     transform = random_transform(kind, rng)
@@ -199,12 +185,6 @@ def test_points_beyond_the_horizon_are_refused() -> None:
     bend = plane.PlaneTransform(np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0.02, 0, 0, 1]]))  # x = -50 goes to infinity
     with pytest.raises(GeometryError, match="both sides"):
         plane.projective_from_points(EIGHT, bend(EIGHT))
-
-
-def test_a_point_that_no_bilinear_image_reaches_is_refused() -> None:
-    fold = plane.PlaneTransform(np.array([[1, 0, 0.01, 0], [0, 1, 0.01, 0], [0, 0, 0, 1]]))
-    with pytest.raises(GeometryError, match="no inverse"):
-        fold.inverse([[-100.0, -100.0]])
 
 
 @pytest.mark.parametrize(

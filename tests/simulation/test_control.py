@@ -10,6 +10,7 @@ from pyproj import CRS, Transformer
 from scipy import stats
 
 from photostrip.errors import InputError
+from photostrip.points import locate
 from photostrip.simulation import Control, Flight, Ground, Points, Simulation, Spec, simulate
 from photostrip.simulation.control import band_photos
 from tests.loops import nonempty
@@ -19,7 +20,7 @@ NONE = (0.0, 0.0, 0.0)
 
 def true_ground(done: Simulation, ids: tuple[str, ...]) -> np.ndarray:
     """True coordinates of points in the output frame."""
-    return done.truth.ground.xyz[[done.truth.ground.index[name] for name in ids]]
+    return done.truth.ground.xyz[locate(ids, done.truth.ground.ids)]
 
 
 def stations(done: Simulation) -> list[list[int]]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
+from photostrip.points import locate
 from photostrip.simulation import (
     Control,
     Film,
@@ -98,7 +99,7 @@ def test_points_mistaken_for_each_other() -> None:
 def test_control_errors(crs: str) -> None:
     entries = (GrossError("control", point="G02", axis="z", size_m=-3.0), GrossError("control", count=2, size_m=8.0))
     done = simulate(replace(FREE, ground=Ground(crs=crs), gross_errors=entries))
-    true = done.truth.ground.xyz[[done.truth.ground.index[name] for name in done.control.ids]]
+    true = done.truth.ground.xyz[locate(done.control.ids, done.truth.ground.ids)]
     off = done.control.enu - true
     assert done.truth.errors[0] == InjectedError("control", "G02", axis="z", size=-3.0)
     expected = np.zeros_like(off)

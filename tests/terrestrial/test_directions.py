@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.terrestrial.frame import (
-    ARCSECONDS,
     angles_of,
     direction_gradient,
     directions_from_photo,
@@ -22,6 +21,7 @@ from photostrip.terrestrial.frame import (
     small_turn,
     vectors_of,
 )
+from photostrip.units import ARCSECONDS
 from tests.terrestrial.simulated import attitude
 from tests.vectors import cases
 

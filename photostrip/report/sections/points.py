@@ -229,10 +229,10 @@ def missing_points(document: Document) -> list[tuple[str, list[str]]]:
     return [(reason, [row["id"] for row in group]) for reason, group in groupby(missing, key=itemgetter("reason"))]
 
 
-def notes_section(document: Document, *, everything: bool, most: int = 2 * WORST_SHOWN) -> Section:
+def notes_section(document: Document, *, everything: bool) -> Section:
     """Return the notes of the run, said again at the end."""
     notes = document["notes"]
-    limit = len(notes) if everything else most
+    limit = len(notes) if everything else 2 * WORST_SHOWN
     parts: list[Part] = [
         Words(f"{note['severity']}: {sentence_of(note)}", "look" if note["severity"] == "warning" else "", "-")
         for note in notes[:limit]

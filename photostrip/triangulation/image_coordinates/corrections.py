@@ -63,17 +63,11 @@ class Refined:
 
 
 def refine(
-    observations: PhotoPoints,
-    camera_of_photo: Mapping[str, Camera],
-    settings: ImageCorrectionSettings,
-    *,
-    flying_height: float | None = None,
-    ground_height: float | None = None,
+    observations: PhotoPoints, camera_of_photo: Mapping[str, Camera], settings: ImageCorrectionSettings
 ) -> Refined:
     """Refine photo coordinates of all photos: principal point, distortion, refraction and Earth curvature.
 
     observations: photo coordinates, mm, in the system in which the principal point of the camera is given.
-    flying_height, ground_height: heights above sea level in metres that count where the settings have none.
     Returns ideal coordinates in the same rows with the same standard deviations; the same table when no camera has
         anything to correct.
     Raises InputError when a distortion has no inverse over the format, or refraction or curvature is asked for without
@@ -83,7 +77,7 @@ def refine(
     cameras = {name: settings.applied_to(camera) for name, camera in cameras.items()}
     number = {name: row for row, name in enumerate(cameras)}
     camera_of = np.array([number[camera_of_photo[photo].name] for photo in observations.photo_ids], np.intp)
-    bending = _bending(settings, flying_height, ground_height)
+    bending = _bending(settings)
     rows_of = {name: np.flatnonzero(camera_of[observations.photo] == row) for name, row in number.items()}
     _refuse_distortion(observations, cameras, rows_of)
     xy = observations.xy
@@ -122,11 +116,10 @@ def distort(ideal_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT
     return np.asarray(xy + np.array(camera.principal_point), np.float64)
 
 
-def _bending(settings: ImageCorrectionSettings, flying_height: float | None, ground_height: float | None) -> Bending:
+def _bending(settings: ImageCorrectionSettings) -> Bending:
     if not settings.needs_heights:
         return NOTHING_BENT
-    flying = flying_height if settings.flying_height is None else settings.flying_height
-    ground = ground_height if settings.ground_height is None else settings.ground_height
+    flying, ground = settings.flying_height, settings.ground_height
     if flying is None or ground is None:
         what = "refraction" if settings.refraction else "earth_curvature"
         message = f"{what}: flying height and height of the ground are not known"

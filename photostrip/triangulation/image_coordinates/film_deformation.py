@@ -14,14 +14,12 @@ import numpy as np
 from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from photostrip.arrays import Floats, Numbers
 
 LEAST_MARKS = 4  # three carry the plane that every transformation has already
 FLAT = 0.01  # ratio of the extents of the marks below which they stand on one line
-CONVERGED = 1e-12  # mm
-ITERATIONS = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,21 +47,14 @@ class Deformation:
 
         Source: [Kraus], interpolation of the residuals of fiducial marks; the spline is that of scipy.interpolate.
         """
-        return self._each(photo, xy, lambda points, shift: points + shift(points))
-
-    def deformed(self, photo: Numbers, xy: Floats) -> Floats:
-        """Deform coordinates (n, 2); the inverse of ``corrected``, exact to 1e-9 mm."""
-        return self._each(photo, xy, _undone)
-
-    def _each(self, photo: Numbers, xy: Floats, way: Callable[[Floats, Callable[[Floats], Floats]], Floats]) -> Floats:
         from scipy.interpolate import RBFInterpolator
 
         found = np.array(xy, float)
         order = np.argsort(photo, kind="stable")
         for rows in np.split(order, np.flatnonzero(np.diff(photo[order])) + 1):
             if len(rows) and len(nodes := self.nodes[photo[rows[0]]]):
-                shifts = self.shifts[photo[rows[0]]]
-                found[rows] = way(found[rows], RBFInterpolator(nodes, shifts, kernel="thin_plate_spline"))
+                shift = RBFInterpolator(nodes, self.shifts[photo[rows[0]]], kernel="thin_plate_spline")
+                found[rows] += shift(found[rows])
         return found
 
 
@@ -73,13 +64,3 @@ def _spread(marks: Floats) -> bool:
         return False
     extent = np.linalg.svd(marks - marks.mean(axis=0), compute_uv=False)
     return bool(extent[1] > FLAT * extent[0])
-
-
-def _undone(target: Floats, shift: Callable[[Floats], Floats]) -> Floats:
-    """Solve ``X + D(X) = target``; D changes by micrometres over centimetres, so that plain iteration converges."""
-    found = target
-    for _ in range(ITERATIONS):
-        last, found = found, target - shift(found)
-        if (np.abs(found - last) <= CONVERGED).all():
-            break
-    return found

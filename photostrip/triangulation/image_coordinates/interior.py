@@ -89,21 +89,6 @@ def transform(observations: PhotoPoints, interior: InteriorOrientation) -> Photo
     return replace(observations, xy=xy, sigma=np.sqrt(variance))
 
 
-def measured(photo_points: PhotoPoints, interior: InteriorOrientation) -> PhotoPoints:
-    """Return photo points as they are measured; the inverse of ``transform``, exact to 1e-9 mm.
-
-    The standard deviations stay those of the photo points.
-    """
-    number = {photo: row for row, photo in enumerate(interior.photo_ids)}
-    rows = np.array([number.get(photo, -1) for photo in photo_points.photo_ids], np.intp)[photo_points.photo]
-    on_film = rows >= 0
-    xy = photo_points.xy.copy()
-    if interior.film is not None:
-        xy[on_film] = interior.film.deformed(rows[on_film], xy[on_film])
-    xy[on_film] = interior.photo_from_measured.take(rows[on_film]).inverse(xy[on_film][:, None, :])[:, 0]
-    return replace(photo_points, xy=xy)
-
-
 def _with_film(joined: InteriorOrientation, cameras: Mapping[str, Camera]) -> InteriorOrientation:
     """Add the deformation that the residuals of the marks show."""
     marks = [

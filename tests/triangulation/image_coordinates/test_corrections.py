@@ -477,23 +477,6 @@ def test_refraction_shift_is_the_textbook_form(radius: float, flying: float) -> 
     assert corrected[0, 0] == pytest.approx(radius - found, abs=1e-12)
 
 
-def test_heights_of_the_settings_go_before_those_of_the_caller() -> None:
-    image = np.array([[100.0, 100.0]])
-
-    def largest(settings: ImageCorrectionSettings) -> float:
-        found = corrections.refine(observed(image), {"1": PLAIN}, settings, flying_height=5000.0, ground_height=500.0)
-        return found.largest_um["refraction"]
-
-    radius = np.hypot(100.0, 100.0)
-    for settings, flying, ground in (
-        (ImageCorrectionSettings(refraction=True), 5000.0, 500.0),
-        (ImageCorrectionSettings(refraction=True, flying_height=4000.0), 4000.0, 500.0),
-        (ImageCorrectionSettings(refraction=True, flying_height=4000.0, ground_height=0.0), 4000.0, 0.0),
-    ):
-        expected = refraction_shift(radius, FOCAL, refraction_constant(flying, ground))
-        assert largest(settings) == pytest.approx(expected / MICROMETRE)
-
-
 def test_refraction_without_heights_or_below_the_ground_is_refused() -> None:
     image = np.array([[1.0, 1.0]])
     with pytest.raises(InputError, match="flying height and height of the ground are not known"):

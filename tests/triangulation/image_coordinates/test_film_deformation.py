@@ -69,21 +69,11 @@ def test_the_marks_come_to_their_calibrated_places() -> None:
     assert np.abs(interior.transform(fiducials, plain).xy - calibrated).max() > 5 * MICROMETRE
 
 
-@pytest.mark.parametrize("transform", ["conformal", "affine", "bilinear", "projective"])
-def test_the_whole_interior_orientation_has_its_inverse(transform: str) -> None:
-    cameras, fiducials, points, _ = surveyed(EIGHT)
-    found = interior.orient(fiducials, cameras, InteriorSettings(transform, "interpolate"))
-    photo_points = interior.transform(points, found)
-    assert np.abs(interior.measured(photo_points, found).xy - points.xy).max() < PICOMETRE
-
-
 @given(st.integers(0, 2**32 - 1))
-def test_the_spline_and_its_inverse(seed: int) -> None:
+def test_the_spline_goes_through_the_marks(seed: int) -> None:
     rng = np.random.default_rng(seed)
     marks = rng.uniform(-110, 110, (9, 2))
     film = Deformation.from_residuals([marks], [rng.normal(0, 0.02, (9, 2))])
-    xy, photo = rng.uniform(-115, 115, (30, 2)), np.zeros(30, np.intp)
-    assert np.abs(film.corrected(photo, film.deformed(photo, xy)) - xy).max() < PICOMETRE
     assert np.abs(film.corrected(np.zeros(9, np.intp), film.nodes[0]) - marks).max() < PICOMETRE
 
 

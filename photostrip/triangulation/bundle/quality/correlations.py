@@ -37,8 +37,8 @@ class Correlation:
     value: float
 
 
-def correlations(solution: BundleSolution, precision: Cofactors, limit: float = LIMIT) -> tuple[Correlation, ...]:
-    """List correlations above a limit: between common parameters, between these and photos, and within photos.
+def correlations(solution: BundleSolution, precision: Cofactors) -> tuple[Correlation, ...]:
+    """List correlations above ``LIMIT``: between common parameters, between these and photos, and within photos.
 
     In this order; each the largest first.
     """
@@ -54,19 +54,15 @@ def correlations(solution: BundleSolution, precision: Cofactors, limit: float = 
         return f"photo {problem.photo_name(photo)}: {ELEMENTS[number]}"
 
     shared = np.sqrt(np.diag(precision.common))
-    found = _named(precision.common[None] / np.outer(shared, shared), limit, lambda _, i, j: (names[i], names[j]))
-    found += _named(cross / (sigma[:, :, None] * shared), limit, lambda n, i, j: (element(n, i), names[j]), lower=False)
-    found += _named(
-        photos / (sigma[:, :, None] * sigma[:, None]), limit, lambda n, i, j: (element(n, i), element(n, j))
-    )
+    found = _named(precision.common[None] / np.outer(shared, shared), lambda _, i, j: (names[i], names[j]))
+    found += _named(cross / (sigma[:, :, None] * shared), lambda n, i, j: (element(n, i), names[j]), lower=False)
+    found += _named(photos / (sigma[:, :, None] * sigma[:, None]), lambda n, i, j: (element(n, i), element(n, j)))
     return tuple(found)
 
 
-def _named(
-    ratio: Floats, limit: float, name: Callable[[int, int, int], tuple[str, str]], *, lower: bool = True
-) -> list[Correlation]:
-    """Name the elements (n, i, j) above a limit, the largest first; of squares only the lower half."""
-    chosen = np.abs(ratio) > limit
+def _named(ratio: Floats, name: Callable[[int, int, int], tuple[str, str]], *, lower: bool = True) -> list[Correlation]:
+    """Name the elements (n, i, j) above the limit, the largest first; of squares only the lower half."""
+    chosen = np.abs(ratio) > LIMIT
     if lower:
         chosen &= np.tri(ratio.shape[1], k=-1, dtype=bool)
     places, values = np.argwhere(chosen), ratio[chosen]

@@ -62,13 +62,6 @@ class PhotoLinks:
         """Row of each link by its two photos."""
         return {(a, b): row for row, (a, b) in enumerate(self.photo.tolist())}
 
-    def toward(self, of: int, other: int) -> complex:
-        """Centre of another photo as it would lie on a photo; NaN without a link."""
-        row = self.index.get((min(of, other), max(of, other)))
-        if row is None:
-            return complex("nan")
-        return complex(self.bases[0 if of < other else 1][row])
-
 
 def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
     """Link every two photos of a strip that have at least two common points.
