@@ -1,8 +1,73 @@
-"""Analytical strip phototriangulation, from measured image coordinates to adjusted ground coordinates."""
+"""Analytical strip phototriangulation, from measured image coordinates to adjusted ground coordinates.
+
+What scripts and notebooks call; it is loaded when it is first asked for::
+
+    result = photostrip.run("project.yaml")
+    result.points["x"], result.points.units["x"]
+"""
+
+from typing import TYPE_CHECKING, Any
 
 from photostrip.threads import limit_threads
 
+if TYPE_CHECKING:
+    from photostrip.errors import GeometryError, InputError, PhotostripError
+    from photostrip.library.comparison import Comparison, compare
+    from photostrip.library.plan import Plan, plan
+    from photostrip.library.project import Check, Project, check, load, run
+    from photostrip.library.result import Result, read_result
+    from photostrip.library.simulation import Simulation, simulate
+    from photostrip.library.table import Table
+
 __version__ = "0.1.0"
+
+# The module in which each public name stands. A change here is a change for every script of a user.
+_HOMES = {
+    "errors": ("GeometryError", "InputError", "PhotostripError"),
+    "library.comparison": ("Comparison", "compare"),
+    "library.plan": ("Plan", "plan"),
+    "library.project": ("Check", "Project", "check", "load", "run"),
+    "library.result": ("Result", "read_result"),
+    "library.simulation": ("Simulation", "simulate"),
+    "library.table": ("Table",),
+}
+__all__ = [
+    "Check",
+    "Comparison",
+    "GeometryError",
+    "InputError",
+    "PhotostripError",
+    "Plan",
+    "Project",
+    "Result",
+    "Simulation",
+    "Table",
+    "check",
+    "compare",
+    "load",
+    "plan",
+    "read_result",
+    "run",
+    "simulate",
+]
 
 # Before anything can import numpy: the thread pools read these variables once, when they are loaded.
 limit_threads()
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 (any of the public names)
+    """Load a public name when it is first asked for."""
+    from importlib import import_module
+
+    for home, names in _HOMES.items():
+        if name in names:
+            found = getattr(import_module(f"photostrip.{home}"), name)
+            globals()[name] = found
+            return found
+    message = f"module 'photostrip' has no attribute {name!r}"
+    raise AttributeError(message)
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return sorted([*__all__, "__version__"])

@@ -5,7 +5,7 @@ What stands behind the three backticks says what a block is::
     console             lines "$ command", each followed by what it prints; "..." alone on a line stands for any lines
     console exit=2      the same for commands that must end with this code
     console no-run      shown, not run; the line above is a comment <!-- ... --> that says why
-    python              a program of its own; it must run
+    python              a program of its own; it must run. With file=NAME it is only written: a command below runs it
     yaml project        a project file; it and the tables it names must be valid
     ANY file=NAME       the block is written to NAME in the scratch folder before it is treated further
     sh                  shown only: make, pip, git, which belong to a fresh clone
@@ -182,7 +182,7 @@ def faults_of_page(page: Path, folder: Path, command: Path | None = None) -> lis
             scratch.write(name, block.lines)
         if block.runs:
             found += [fault for step in steps(block) for fault in _faults_of_step(block, step, scratch)]
-        elif block.kind == "python":
+        elif block.kind == "python" and not block.option("file"):
             outcome = scratch.run([sys.executable, str(scratch.write("block.py", block.lines))])
             if outcome.code:
                 found.append(f"{block.place}: {outcome.err}")

@@ -10,8 +10,9 @@ from tests.pages import pages, renewed
 
 
 def main() -> None:
-    argparse.ArgumentParser(prog="python -m tests.renew_docs", description=__doc__).parse_args()
-    for page in pages():
+    parser = argparse.ArgumentParser(prog="python -m tests.renew_docs", description=__doc__)
+    parser.add_argument("pages", nargs="*", type=Path, help="these pages; default: all")
+    for page in parser.parse_args().pages or pages():
         with tempfile.TemporaryDirectory() as folder:
             text = renewed(page, Path(folder))
         if text != page.read_text(encoding="utf-8"):

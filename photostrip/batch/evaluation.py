@@ -5,16 +5,18 @@ from __future__ import annotations
 import tempfile
 import traceback
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from photostrip.batch.outcomes import BROKEN, FAULTY, WEAK, failure, out_of_memory, outcome_of
 from photostrip.batch.parcel import Parcel, unpack_grids
 from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.formats.output.result_files import refined_csv, result_files
 from photostrip.formats.text.source import Source, digest, reading_from
-from photostrip.project.loading import Project, adjust_project, load_project
+from photostrip.library.project import loaded_from
 from photostrip.report.page.messages import result_findings
-from photostrip.result.document import document_of
+
+if TYPE_CHECKING:
+    from photostrip.project.loading import Project
 
 
 def evaluate(task: Task) -> Answer:
@@ -44,12 +46,11 @@ def _from_parcel(task: Task, parcel: Parcel) -> Answer:
 
 def _computed(task: Task, source: Source) -> Answer:
     with reading_from(source):
-        project = load_project(Path(task.project), task.overrides)
-        result = adjust_project(project)
-        document = document_of(result, project.remarks)
-        files = result_files(document, project.resolved, refined_csv(result))
-    outcome = outcome_of(document, result_findings(document))
-    return Answer(number=task.number, outcome=outcome, files=files, inputs=_inputs(project, source))
+        project = loaded_from(Path(task.project), task.overrides)
+        result = project.run()
+        files = result.files()
+    outcome = outcome_of(result.document, result_findings(result.document))
+    return Answer(number=task.number, outcome=outcome, files=files, inputs=_inputs(project.loaded, source))
 
 
 def _inputs(project: Project, source: Source) -> dict[str, str | None]:

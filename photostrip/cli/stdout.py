@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from photostrip.pipeline import Result
     from photostrip.report import SectionName
     from photostrip.report.page.parts import Section
 
@@ -126,23 +125,6 @@ def _report(document: Document, parts: Parts, width: int) -> tuple[str, tuple[Se
 
     sections = chosen_sections(document, quiet=parts.quiet, everything=parts.verbose, names=parts.names, width=width)
     return "" if parts.quiet or parts.names else title_of(document), sections
-
-
-def trace_text(result: Result, form: Format) -> str:
-    """Return the trace of a run: every stage and iteration."""
-    from photostrip.report.commands.trace import trace_sections, trace_title
-    from photostrip.report.page import layout, text
-    from photostrip.result.trace.trace import trace_of
-
-    document = trace_of(result)
-    if form is Format.JSON:
-        from photostrip.formats.output.result_json import to_json
-
-        return to_json(document)
-    title, sections = trace_title(document), trace_sections(document)
-    if form is Format.MD:
-        return text.to_markdown(title, sections)
-    return text.to_text(title, sections, layout.WIDEST)
 
 
 def form_of(path: Path, option: str = "--output") -> Format:

@@ -22,9 +22,14 @@ def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Float
     """
     if frame["kind"] == "geocentric":
         return difference_in_plan_and_height(frame, now - before, before)
-    order = [list(frame["axes"]).index(axis) for axis in GROUND_AXES]
-    parts = _in_metres(frame, now[:, order], before[:, order])
+    parts = east_north_up(frame, now, before)
     return np.hypot(parts[:, 0], parts[:, 1]), np.abs(parts[:, 2])
+
+
+def east_north_up(frame: Document, now: Floats, before: Floats) -> Floats:
+    """Return how far points (n, 3) lie east, north and up of where they were, metres; not of geocentric coordinates."""
+    order = [list(frame["axes"]).index(axis) for axis in GROUND_AXES]
+    return _in_metres(frame, now[:, order], before[:, order])
 
 
 def difference_in_plan_and_height(frame: Document, delta: Floats, at: Floats) -> tuple[Floats, Floats]:

@@ -72,6 +72,19 @@ def photos_csv(angles: Document) -> list[Column]:
     ]
 
 
+def flat_photo(photo: Document) -> Document:
+    """Return a photo with a key for each angle, each number of the matrix and each standard deviation."""
+    angles, sigma = photo["angles"], photo["sigma"] or {}
+    names = [f"{name}_{angles['unit']}" for name in angles["system"].split("-")]
+    return {
+        **photo,
+        **dict(zip(names, angles["values"] or (), strict=False)),
+        **dict(zip(MATRIX, photo["rotation"] or (), strict=False)),
+        **{f"sigma_{axis}": sigma.get(axis) for axis in "xyz"},
+        **{f"sigma_{name}": value for name, value in zip(names, sigma.get("angles") or (), strict=False)},
+    }
+
+
 def in_frame(listed: Iterable[Column], frame: Document) -> list[Column]:
     """Give the coordinates among columns the decimals of their frame."""
     decimals = dict(zip("xyz", coordinate_decimals(frame["kind"], frame["axes"]), strict=True))

@@ -170,7 +170,7 @@ def test_an_internal_error_is_told_with_its_place(tmp_path: Path, monkeypatch: p
         raise ZeroDivisionError("by zero")
 
     (task,) = tasks_of(tmp_path, ["good1"])
-    monkeypatch.setattr("photostrip.batch.evaluation.adjust_project", broken)
+    monkeypatch.setattr("photostrip.library.project.Project.run", broken)
     answer = evaluate(task)
     assert answer.outcome["status"] == "crashed"
     assert answer.outcome["exit_code"] == 70
@@ -202,7 +202,7 @@ def test_out_of_memory_in_the_work_is_told(tmp_path: Path, monkeypatch: pytest.M
     def greedy(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("photostrip.batch.evaluation.load_project", greedy)
+    monkeypatch.setattr("photostrip.batch.evaluation.loaded_from", greedy)
     assert evaluate(Task(0, str(tmp_path))).outcome["status"] == "memory"
 
 

@@ -13,9 +13,13 @@ from photostrip.cli.stdout import CompareFormat, Format, print_json, print_secti
 
 
 def compare(
-    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")],
+    result: Annotated[
+        Path,
+        typer.Argument(metavar="RESULT", help="A result.json, the folder that holds it, or a folder of such folders."),
+    ],
     baseline: Annotated[
-        Path, typer.Argument(metavar="BASELINE", help="A baseline or a result.json, or a folder that holds one.")
+        Path,
+        typer.Argument(metavar="BASELINE", help="A baseline, a result.json or a truth.json, or a folder of baselines."),
     ],
     tolerances: Annotated[
         Path | None, typer.Option("--tol", metavar="FILE", help="Tolerance profile (YAML); default: last digits only.")
@@ -28,41 +32,42 @@ def compare(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
-    """Compare a result with a baseline, within tolerances for each kind of quantity.
+    """Compare a result with a baseline, within tolerances for each kind of quantity; or with the truth it came from.
 
     Plan, height, rotations, sigma0, scale factors, precision, statistics and counts are compared as numbers; ids,
     choices, rejected measurements and findings as sets. The exit code is 1 when they differ, 2 when they cannot be
-    compared: other frames, another format, no result. With --update it is 0.
+    compared: other frames, another format, no result. With --update it is 0. Of two folders, every result is compared
+    with the baseline in the folder of the same name. With the truth.json of a simulation the true errors are shown,
+    beside the standard deviations, and the gross errors that were not found.
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.jobs import baseline as baseline_job
-    from photostrip.comparison import Tolerances, compare_results
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, faults_instead
-    from photostrip.formats.output.result_json import read_result
+    from photostrip.library.comparison import compare as compared
     from photostrip.project.tolerance_profile import load_tolerances
+    from photostrip.report.commands.comparisons import TRUTH
     from photostrip.visible import visible
 
-    file = result / "result.json" if result.is_dir() else result
-    place = baseline_job.place_of(baseline, update=update)
     with failures_as(Format.TEXT if form is CompareFormat.JUNIT else Format(form.value)):
-        allowed = Tolerances() if tolerances is None else load_tolerances(tolerances)[0]
-        document = read_result(str(file))
+        allowed = None if tolerances is None else load_tolerances(tolerances)[0]
         if update:
-            changes = visible(baseline_job.update(document, file, place, allowed))
+            changes = visible(baseline_job.update(result, baseline, allowed))
             sys.stderr.write("" if quiet else f"{changes}\n")
             return EXIT_DONE
-        found = compare_results(document, baseline_job.read(place), allowed, (str(file), str(place)))
-        with faults_instead(str(file), "compared"):
-            _print(found, place, form, width, quiet=quiet, verbose=verbose)
-    return EXIT_TOLERANCE if found["status"] == "different" else EXIT_DONE
+        with baseline_job.told_how_to_write(baseline):
+            found = compared(result, baseline, tolerances=allowed).document
+        if TRUTH in found and form in {CompareFormat.JUNIT, CompareFormat.GITHUB}:
+            message = "true errors have no tolerances that a test could keep: text, md or json"
+            raise typer.BadParameter(message, param_hint="--format")
+        with faults_instead(str(result), "compared"):
+            _print(found, form, width, quiet=quiet, verbose=verbose)
+    return EXIT_TOLERANCE if found.get("status") == "different" else EXIT_DONE
 
 
-def _print(
-    found: dict[str, Any], place: Path, form: CompareFormat, width: int | None, *, quiet: bool, verbose: bool
-) -> None:
+def _print(found: dict[str, Any], form: CompareFormat, width: int | None, *, quiet: bool, verbose: bool) -> None:
     from photostrip.formats.output.result_lines import line_finder
-    from photostrip.report.commands.compare import compare_sections
     from photostrip.report.commands.compare_findings import compare_cases, compare_findings
+    from photostrip.report.commands.comparisons import comparison_report
     from photostrip.report.page.junit import to_junit
     from photostrip.report.page.messages import annotated
 
@@ -70,11 +75,13 @@ def _print(
         case CompareFormat.JSON:
             print_json(found)
         case CompareFormat.JUNIT:
-            sys.stdout.write(to_junit(f"photostrip compare {found['name']}", compare_cases(found)))
+            sys.stdout.write(
+                to_junit(f"photostrip compare {found.get('name') or found['result']}", compare_cases(found))
+            )
         case CompareFormat.GITHUB:
-            lines = line_finder(place.read_text(encoding="utf-8"))
-            sys.stdout.write(annotated(compare_findings(found, lines)))
+            sys.stdout.write(
+                annotated(compare_findings(found, lambda file: line_finder(Path(file).read_text(encoding="utf-8"))))
+            )
         case CompareFormat.TEXT | CompareFormat.MD:
-            sections = compare_sections(found, quiet=quiet, everything=verbose)
-            title = "" if quiet else f"Comparison: {found['name']}"
+            title, sections = comparison_report(found, quiet=quiet, everything=verbose)
             print_sections(title, sections, width, markdown=form is CompareFormat.MD)

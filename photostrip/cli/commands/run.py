@@ -10,7 +10,7 @@ import typer
 
 from photostrip.cli.options import Assignments, Quiet, Shape, Strict, Width
 from photostrip.cli.section_option import Sections, Verbose, refuse_sections
-from photostrip.cli.stdout import Format, Parts, form_of, print_result, trace_text
+from photostrip.cli.stdout import Format, Parts, form_of, print_result
 
 
 def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
@@ -50,12 +50,11 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.stderr import Messages
-    from photostrip.formats.output.result_files import refined_csv, result_files
     from photostrip.formats.text.writing import make_rule, write_files, write_text
+    from photostrip.library.project import loaded_from
+    from photostrip.library.result import RESULT
     from photostrip.notes import counted
-    from photostrip.project.loading import adjust_project, load_project
     from photostrip.report.page.progress import progress
-    from photostrip.result.document import document_of
     from photostrip.result.verdict import exit_code
 
     _refuse_contradictions(output, depfile=depfile, trace=trace, methods=methods, html=html, strict=strict)
@@ -68,30 +67,29 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         return compare_methods(project, assignments, output, form, width, messages, html=html)
     with failures_as(form), progress(sys.stderr, quiet=quiet) as waiting:
         if html:
-            from photostrip.report.html import check_html, to_html
+            from photostrip.report.html import check_html
 
             check_html()
         waiting.at(f"reading {project}")
-        loaded = load_project(project, assignments)
+        read = loaded_from(project, assignments)
+        inputs = read.loaded.inputs
         messages.step(
-            f"read {counted(len(loaded.files), 'file')}, {counted(len(loaded.inputs.observations), 'image point')}"
+            f"read {counted(len(read.loaded.files), 'file')}, {counted(len(inputs.observations), 'image point')}"
         )
-        waiting.at(f"adjusting {counted(sum(len(strip.photos) for strip in loaded.inputs.strips), 'photo')}")
-        result = loaded.result(adjust_project(loaded))
-        messages.step(f"adjusted {counted(len(result.points.number), 'point')}")
-        document = document_of(result, loaded.remarks)
+        waiting.at(f"adjusting {counted(len(read.photos), 'photo')}")
+        result = read.run()
+        messages.step(f"adjusted {counted(len(result.document['points']), 'point')}")
         waiting.at("writing the result")
         if trace is not None:
-            write_text(trace, trace_text(result, form_of(trace, "--trace")))
+            write_text(trace, result.trace(form_of(trace, "--trace").value))
         if depfile is not None and output is not None:  # before the result: it must not be the newer of the two
-            write_text(depfile, make_rule(output / "result.json", loaded.files_read(result)))
+            write_text(depfile, make_rule(output / RESULT, read.files_read(result)))
         if output is not None:
-            pages = {"report.html": to_html(document, everything=verbose)} if html else {}
-            files = pages | result_files(document, loaded.resolved, refined_csv(result))
+            files = result.files(html=html, everything=verbose)
             write_files(output, files)
             messages.say(f"wrote {len(files)} files to {output}")
-    print_result(document, form, width, Parts(quiet, verbose, section or ()))
-    return exit_code(document["status"], strict=strict)
+    print_result(result.document, form, width, Parts(quiet, verbose, section or ()))
+    return exit_code(result.status, strict=strict)
 
 
 def _refuse_contradictions(

@@ -19,6 +19,9 @@ def schema(
     tolerances: Annotated[
         bool, typer.Option("--tolerances", help="The tolerance profile of `photostrip compare` instead.")
     ] = False,
+    result: Annotated[
+        bool, typer.Option("--result", help="What result.json may hold; written to FILE.md as a page of its keys.")
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; default: stdout.")
     ] = None,
@@ -35,7 +38,14 @@ def schema(
     from photostrip.project.schema.project_file import json_schema
     from photostrip.project.simulation import simulation_schema
 
-    if tolerances:
+    if result:
+        from photostrip.result.schema import result_page, result_schema
+
+        if output is not None and output.suffix == ".md":
+            write_text(output, result_page())
+            return
+        found = result_schema()
+    elif tolerances:
         from photostrip.project.tolerance_profile import tolerance_schema
 
         found = tolerance_schema()

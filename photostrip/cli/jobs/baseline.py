@@ -1,7 +1,8 @@
-"""The baseline of ``photostrip compare``: where it stands, and how it is written anew."""
+"""The baseline of ``photostrip compare``: written anew, or missing."""
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,40 +12,33 @@ from photostrip.comparison import Tolerances, baseline_of, compare_results
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.formats.text.writing import write_text
+from photostrip.library.comparison import place_of
 from photostrip.report.commands.compare import headline
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
-    from photostrip.report.page.parts import Document
 
-BASELINE = "baseline.json"
-
-
-def place_of(baseline: Path, *, update: bool) -> Path:
-    """Return the file of a baseline; in a folder it is baseline.json, or else, to be read, result.json."""
-    if not baseline.is_dir():
-        return baseline
-    whole = baseline / "result.json"
-    return whole if whole.exists() and not update and not (baseline / BASELINE).exists() else baseline / BASELINE
-
-
-def read(place: Path) -> Document:
-    """Read the baseline; where there is none, the fault says how it comes to be."""
+@contextmanager
+def told_how_to_write(baseline: Path) -> Iterator[None]:
+    """Where there is no baseline, let the fault say how it comes to be."""
+    place = str(place_of(baseline))
     try:
-        return read_result(str(place))
+        yield
     except InputError as error:
-        faults = [
+        raise InputError(
             replace(fault, fix=f"{fault.fix + '; ' if fault.fix else ''}--update writes it")
-            if fault.code == "file-missing"
+            if fault.code == "file-missing" and fault.file == place
             else fault
             for fault in error.faults
-        ]
-        raise InputError(faults) from None
+        ) from None
 
 
-def update(document: Document, file: Path, place: Path, allowed: Tolerances) -> str:
-    """Write a result, read from a file, as the baseline; return what changes by it."""
+def update(result: Path, baseline: Path, allowed: Tolerances | None) -> str:
+    """Write a result as the baseline; return what changes by it."""
+    file, place = place_of(result), place_of(baseline, update=True)
+    document = read_result(str(file))
     if place.exists() and file.samefile(place):
         message = f"{place} is the result itself: the baseline would take its place"
         raise typer.BadParameter(message, param_hint="--update")

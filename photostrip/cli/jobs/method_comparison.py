@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING
 from photostrip.cli.failures import failures_as
 from photostrip.cli.stdout import Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
-from photostrip.formats.output.result_files import refined_csv, result_files
 from photostrip.formats.text.writing import write_files, write_text
+from photostrip.library.project import loaded_from
 from photostrip.pipeline import AUTO, METHODS
-from photostrip.project.loading import adjust_project, load_project
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
-from photostrip.result.document import document_of
 from photostrip.result.methods import methods_document
 
 if TYPE_CHECKING:
@@ -45,22 +43,20 @@ def compare_methods(
     name = ""
     with failures_as(form), progress(sys.stderr, quiet=messages.quiet) as waiting:
         if html:
-            from photostrip.report.html import check_html, methods_html, to_html
+            from photostrip.report.html import check_html, methods_html
 
             check_html()
         for adjustment in (*METHODS, AUTO):
             waiting.at(f"adjusting: {adjustment}")
             try:
-                loaded = load_project(project, [*assignments, f"processing.adjustment={adjustment}"])
-                result = loaded.result(adjust_project(loaded))
+                result = loaded_from(project, [*assignments, f"processing.adjustment={adjustment}"]).run()
             except (GeometryError, InputError) as error:
                 found[adjustment] = error
                 continue
-            name = loaded.inputs.name
-            found[adjustment] = document = document_of(result, loaded.remarks)
+            name = result.name
+            found[adjustment] = result.document
             if output is not None and adjustment != AUTO:  # one of the others
-                pages = {"report.html": to_html(document, everything=messages.verbose)} if html else {}
-                write_files(output / adjustment, pages | result_files(document, loaded.resolved, refined_csv(result)))
+                write_files(output / adjustment, result.files(html=html, everything=messages.verbose))
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
         failures = [each for each in found.values() if not isinstance(each, dict)]
         if len(failures) == len(found):

@@ -33,7 +33,7 @@ def result_files(document: Document, resolved: str = "", refined: str = "") -> d
     unit = angles["unit"]
     files = {
         "points.csv": _table(tables.in_frame(tables.points_csv(unit), frame), _flat_points(document["points"], unit)),
-        "photos.csv": _table(tables.in_frame(tables.photos_csv(angles), frame), map(_flat_photo, photos)),
+        "photos.csv": _table(tables.in_frame(tables.photos_csv(angles), frame), map(tables.flat_photo, photos)),
         "residuals.csv": _grouped(tables.residuals_csv(), document["residuals"]),
         "parallaxes.csv": _grouped(tables.parallaxes_csv(), document["parallaxes"]),
         "rejected.csv": rejected_csv(document),
@@ -74,19 +74,6 @@ def _flat_points(points: Iterable[Document], unit: str) -> Iterable[Document]:
     key, per_degree = f"ellipse_azimuth_{unit}", PER_RADIAN[unit] / PER_RADIAN["deg"]
     known = ((point, point["ellipse_azimuth_deg"]) for point in points)
     return ({**point, key: None if azimuth is None else azimuth * per_degree} for point, azimuth in known)
-
-
-def _flat_photo(photo: Document) -> Document:
-    """Return a photo with a key for each angle, each number of the matrix and each standard deviation."""
-    angles, sigma = photo["angles"], photo["sigma"] or {}
-    names = [f"{name}_{angles['unit']}" for name in angles["system"].split("-")]
-    return {
-        **photo,
-        **dict(zip(names, angles["values"] or (), strict=False)),
-        **dict(zip(tables.MATRIX, photo["rotation"] or (), strict=False)),
-        **{f"sigma_{axis}": sigma.get(axis) for axis in "xyz"},
-        **{f"sigma_{name}": value for name, value in zip(names, sigma.get("angles") or (), strict=False)},
-    }
 
 
 def _checked_rays(residuals: Iterable[Document]) -> Iterator[Document]:

@@ -45,11 +45,11 @@ def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
     return text
 
 
-def read_result(file: str) -> Document:
-    """Read a result.json, or raise what keeps it from being one."""
+def parsed(file: str) -> Any:  # noqa: ANN401 (any JSON)
+    """Read a file of JSON, or raise what keeps it from being one."""
     text, _ = decode(file, read_bytes(file, LARGEST_RESULT))
     try:
-        document: Any = json.loads(text)
+        return json.loads(text)
     except json.JSONDecodeError as error:
         message = f"is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
         fix = "a result.json that was not written to its end? run the project again"
@@ -60,6 +60,23 @@ def read_result(file: str) -> Document:
         refuse(file, "result-json", "holds a number with thousands of digits", expected="a result.json of photostrip")
     except RecursionError:
         refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
+
+
+def read_document(file: str, key: str) -> Document:
+    """Read a document of another kind, which has this key, or else a result.json."""
+    document = parsed(file)
+    if isinstance(document, dict) and key in document:
+        return document
+    return _result(document, file)
+
+
+def read_result(file: str) -> Document:
+    """Read a result.json, or raise what keeps it from being one."""
+    return _result(parsed(file), file)
+
+
+def _result(document: Any, file: str) -> Document:  # noqa: ANN401 (any JSON)
+    """Check what was read."""
     if not isinstance(document, dict) or "photostrip_result" not in document:
         refuse(file, "result-kind", "has no key `photostrip_result`", expected="a result.json of photostrip")
     if document["photostrip_result"] != SCHEMA:

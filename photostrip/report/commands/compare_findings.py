@@ -14,16 +14,22 @@ if TYPE_CHECKING:
 
     from photostrip.report.page.parts import Document
 
+ALONE = {"missing": "there is a baseline and no result", "new": "there is a result and no baseline"}
 MOST = 50  # annotations of one comparison; a server shows no more
 
 
-def compare_findings(document: Document, line_of: Callable[[str, str], int]) -> list[Document]:
+def compare_findings(document: Document, lines_of: Callable[[str], Callable[[str, str], int]]) -> list[Document]:
     """Return what differs as findings, worst first, each at the line of the baseline in which the record stands.
 
-    ``line_of`` gives the line of a block and an id, 0 when it is not there. What is too much to show is counted in the
-    last finding.
+    ``lines_of`` gives for a baseline what finds the line of a block and an id, 0 when it is not there. What is too much
+    to show is counted in the last finding.
     """
-    found = list(_findings(document, line_of))
+    found = [each for one in document.get("results", [document]) for each in _findings(one, lines_of(one["baseline"]))]
+    found += [
+        EMPTY | {"severity": "error", "code": "different", "file": folder, "message": why}
+        for key, why in ALONE.items()
+        for folder in document.get(key, ())
+    ]
     if len(found) <= MOST:
         return found
     rest = f"and {len(found) - MOST} more differences; photostrip compare --verbose lists them"
@@ -63,7 +69,12 @@ def sentence(row: Document) -> str:
 
 
 def compare_cases(document: Document) -> Iterator[Case]:
-    """Return a comparison as test cases: one for each kind of quantity and each set."""
+    """Return a comparison as test cases: one for each kind of quantity and each set, of every result in folders."""
+    if "results" in document:
+        for one in document["results"]:
+            yield from (case._replace(name=f"{one['folder']}: {case.name}") for case in compare_cases(one))
+        yield from (Case(folder, error=why) for key, why in ALONE.items() for folder in document[key])
+        return
     for kind in document["kinds"]:
         name = NAMES[kind["kind"]]
         if kind["ignored"]:

@@ -1,0 +1,136 @@
+"""A result against a baseline, against the truth of its simulation, or a folder of results against a folder of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from photostrip.errors import Fault, InputError
+from photostrip.library.result import RESULT, Result
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from photostrip.comparison import Tolerances
+    from photostrip.result.numbers import Document
+
+BASELINE = "baseline.json"
+TRUTH = "photostrip_truth"  # the key by which truth.json is known
+
+
+class Comparison:
+    """What differs between a result and a baseline by more than is allowed; against the truth, the true errors."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        """What ``photostrip compare --format json`` prints."""
+
+    @property
+    def same(self) -> bool:
+        """Whether nothing differs by more than is allowed; against the truth nothing is allowed or forbidden."""
+        return bool(self.document.get("status", "same") == "same")
+
+    @property
+    def differences(self) -> list[Document]:
+        """What differs by more than is allowed, worst first; empty against the truth."""
+        return list(self.document.get("differences", ()))
+
+    def report(self, *, everything: bool = False) -> str:
+        """Return the comparison as text."""
+        from photostrip.report.commands.comparisons import comparison_report
+        from photostrip.report.page.text import to_text
+
+        return to_text(*comparison_report(self.document, everything=everything))
+
+    def __repr__(self) -> str:
+        """Say in a sentence what was found."""
+        from photostrip.report.commands.comparisons import comparison_headline
+
+        return f"<Comparison: {comparison_headline(self.document)}>"
+
+
+def compare(
+    result: Result | str | PathLike[str],
+    baseline: Result | str | PathLike[str] | Mapping[str, Any],
+    *,
+    tolerances: str | PathLike[str] | Tolerances | None = None,
+) -> Comparison:
+    """Compare a result with a baseline or another result, with the truth, or all results of a folder with their own.
+
+    result: a result, a result.json, the folder that holds one, or a folder with many such folders.
+    baseline: the same; ``baseline.json``; or ``truth.json``, also as a mapping.
+    tolerances: a tolerance profile (YAML); without one only the last digits may differ.
+    Raises InputError when they cannot be compared: other frames, another format, no result.
+    """
+    from photostrip.comparison import Tolerances, compare_results
+    from photostrip.comparison.truth import compare_with_truth
+
+    if tolerances is None or isinstance(tolerances, Tolerances):
+        allowed = tolerances or Tolerances()
+    else:
+        from photostrip.project.tolerance_profile import load_tolerances
+
+        allowed = load_tolerances(Path(tolerances))[0]
+    if not isinstance(result, Result) and not isinstance(baseline, Result | Mapping):
+        one, other = Path(result), Path(baseline)
+        if one.is_dir() and other.is_dir() and not (one / RESULT).exists():
+            return Comparison(_folders(one, other, allowed))
+    now, named = _opened(result)
+    before, other_name = _opened(baseline)
+    if TRUTH in before:
+        return Comparison(compare_with_truth(now, before, (named, other_name)))
+    return Comparison(compare_results(now, before, allowed, (named, other_name)))
+
+
+def place_of(baseline: Path, *, update: bool = False) -> Path:
+    """Return the file of a baseline; in a folder it is baseline.json, or else, to be read, result.json."""
+    if not baseline.is_dir():
+        return baseline
+    whole = baseline / RESULT
+    return whole if whole.exists() and not update and not (baseline / BASELINE).exists() else baseline / BASELINE
+
+
+def _opened(given: Result | str | PathLike[str] | Mapping[str, Any]) -> tuple[Document, str]:
+    """Return a document with what it is called in messages."""
+    from photostrip.formats.output.result_json import read_document
+
+    if isinstance(given, Result):
+        return given.document, given.name
+    if isinstance(given, Mapping):
+        return dict(given), "the truth"
+    file = str(place_of(Path(given)))
+    return read_document(file, TRUTH), file
+
+
+def _folders(results: Path, baselines: Path, allowed: Tolerances) -> Document:
+    """Compare every result below a folder with the baseline of the same name below another."""
+    from photostrip.comparison import compare_results
+    from photostrip.formats.output.result_json import read_result
+
+    now = {_name(file, results): file for file in sorted(results.rglob(RESULT))}
+    before = {_name(file, baselines): file for name in (RESULT, BASELINE) for file in sorted(baselines.rglob(name))}
+    if not now:
+        fix = "name the folder into which `photostrip batch -o` wrote"
+        raise InputError(Fault("holds no result.json, nor does a folder in it", "file-missing", str(results), fix=fix))
+    found = []
+    for name in sorted(now.keys() & before.keys()):
+        files = (str(now[name]), str(before[name]))
+        document, other = (read_result(file) for file in files)
+        found.append({"folder": name} | compare_results(document, other, allowed, files))
+    missing, new = sorted(before.keys() - now.keys()), sorted(now.keys() - before.keys())
+    same = found and not missing and not new and all(each["status"] == "same" for each in found)
+    return {
+        "photostrip_compare_folders": 1,
+        "result": str(results),
+        "baseline": str(baselines),
+        "status": "same" if same else "different",
+        "results": found,
+        "missing": missing,
+        "new": new,
+    }
+
+
+def _name(file: Path, above: Path) -> str:
+    """Return the folder of a file as seen from a folder above it, with slashes on every system."""
+    return file.parent.relative_to(above).as_posix()

@@ -1,0 +1,90 @@
+"""Expected accuracy, before any photo is taken or measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from photostrip.library.project import assignments_of, reading_from
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from os import PathLike
+
+    from photostrip.result.numbers import Document
+
+PlanKind = Literal["model", "strip", "camera", "displacement"]
+
+
+class Plan:
+    """What a plan lets expect."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        """What ``photostrip plan --format json`` prints."""
+
+    def report(self, form: Literal["text", "md"] = "text") -> str:
+        """Return the plan as text or Markdown."""
+        from photostrip.report.commands.plans.report import plan_report
+        from photostrip.report.page.text import to_markdown, to_text
+
+        return (to_markdown if form == "md" else to_text)(*plan_report(self.document))
+
+    def __repr__(self) -> str:
+        """Return the report: a plan is small."""
+        return self.report()
+
+
+def plan(
+    kind: PlanKind,
+    specification: str | PathLike[str] | Mapping[str, Any] | None = None,
+    **overrides: Any,  # noqa: ANN401 (values of a plan)
+) -> Plan:
+    """Compute a plan, as ``photostrip plan model``, ``strip``, ``camera`` or ``displacement`` does.
+
+    specification: a file, or its content as a mapping; without one the overrides say all.
+    overrides: keys with other values: ``plan("model", end_lap_percent=70, control={"layout": "six"})``.
+    Raises InputError with every fault of the plan.
+    """
+    from photostrip.project.in_memory import FILE, source_of
+
+    assignments = assignments_of(overrides)
+    if isinstance(specification, Mapping):
+        with reading_from(source_of(specification, {})):
+            return Plan(_document(kind, Path(FILE), assignments))
+    return Plan(_document(kind, None if specification is None else Path(specification), assignments))
+
+
+def _document(kind: str, path: Path | None, assignments: Sequence[str]) -> Document:
+    match kind:
+        case "model":
+            from photostrip.formats.output.plans.model import model_document
+            from photostrip.planning.model.plan import given_errors, plan_model
+            from photostrip.project.plans.model import load_model_plan
+
+            model = load_model_plan(path, assignments)
+            return model_document(model.name, model.camera, plan_model(model.spec), given_errors(model.spec), None)
+        case "strip":
+            from photostrip.formats.output.plans.strip import strip_document
+            from photostrip.project.plans.strip import load_strip_plan
+
+            strip = load_strip_plan(path, assignments)
+            return strip_document(strip.name, strip.computed())
+        case "camera":
+            from photostrip.errors import Fault, InputError
+            from photostrip.formats.output.plans.cameras import camera_document
+            from photostrip.project.plans.cameras import load_camera_plan
+
+            if path is None:
+                raise InputError(Fault("no cameras are given", "plan-cameras", fix="give a file or a mapping"))
+            cameras = load_camera_plan(path, assignments)
+            return camera_document(cameras.name, cameras.cameras, cameras.reference, cameras.survey)
+        case "displacement":
+            from photostrip.formats.output.plans.displacement import displacement_document
+            from photostrip.project.plans.displacement import load_displacement_plan
+
+            survey = load_displacement_plan(path, assignments)
+            return displacement_document(survey.name, survey.spec)
+    message = f"there is no plan {kind!r}: model, strip, camera or displacement"
+    raise ValueError(message)

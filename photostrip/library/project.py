@@ -1,0 +1,189 @@
+"""A project: read from its file, or made in memory; checked and run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from photostrip.library.result import Result
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from contextlib import AbstractContextManager
+    from os import PathLike
+
+    from photostrip.formats.text.source import Source
+    from photostrip.project.checks.check import Checked
+    from photostrip.project.loading import Project as Loaded
+
+_WORD = re.compile(r"[\w-]+")
+
+
+class Project:
+    """A project that was read without a fault, ready to run; made by ``photostrip.load``."""
+
+    def __init__(self, loaded: Loaded, assignments: Sequence[str] = (), source: Source | None = None) -> None:
+        self.loaded = loaded
+        """What the pipeline takes: ``inputs`` and ``settings``, with the places of all values in the files."""
+        self._assignments, self._source = assignments, source
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.loaded.inputs.name
+
+    @property
+    def photos(self) -> tuple[str, ...]:
+        """Photos in flight order, strip by strip."""
+        return tuple(photo for strip in self.loaded.inputs.flights for photo in strip.photos)
+
+    @property
+    def resolved(self) -> str:
+        """The project as YAML, with every default filled in."""
+        return self.loaded.resolved
+
+    def overridden(self, **overrides: Any) -> Project:  # noqa: ANN401 (values of a project file)
+        """Read the project again with other values of some keys (see ``load``)."""
+        return loaded_from(self.loaded.path, (*self._assignments, *assignments_of(overrides)), self._source)
+
+    def check(self) -> Check:
+        """Return all that can be said before anything is adjusted."""
+        return _checked(self.loaded.path, self._assignments, self._source)
+
+    def run(self) -> Result:
+        """Adjust it.
+
+        Raises InputError or GeometryError, with the findings that may be the cause.
+        """
+        from photostrip.project.loading import adjust_project
+        from photostrip.result.document import document_of
+
+        with reading_from(self._source):
+            computed = self.loaded.result(adjust_project(self.loaded))
+            document = document_of(computed, self.loaded.remarks)
+        return Result(document, computed=computed, resolved=self.loaded.resolved)
+
+    def files_read(self, result: Result) -> tuple[Path, ...]:
+        """Return every file that a run of it read, grids of geoids and datum shifts included."""
+        return self.loaded.files if result.computed is None else self.loaded.files_read(result.computed)
+
+    def __repr__(self) -> str:
+        """Say in a line what there is."""
+        inputs = self.loaded.inputs
+        measured = f"{len(inputs.observations)} image points" if inputs.models is None else "independent models"
+        return f"<Project {self.name}: {len(inputs.flights)} strips, {len(self.photos)} photos, {measured}>"
+
+
+class Check:
+    """What ``photostrip check`` finds: faults, findings and notes, each with its place and its cure."""
+
+    def __init__(self, checked: Checked) -> None:
+        self._checked = checked
+        self.faults, self.findings, self.notes = checked.faults, checked.findings, checked.notes
+        self.ok = not checked.wrong
+        """Whether nothing must be put right before the project is run."""
+        self.document = checked.document
+        """What was decoded: counts, rows of tables, frames, control; empty when the files could not be read."""
+
+    def __repr__(self) -> str:
+        """Return the messages, a line each."""
+        from photostrip.report.page.messages import finding_of, lines_of
+
+        found = [finding_of(each) for each in self._checked.everything]
+        return "\n".join([f"<Check {'ok' if self.ok else 'faulty'}>", *lines_of(found)])
+
+
+def load(
+    project: str | PathLike[str] | Mapping[str, Any],
+    *,
+    tables: Mapping[str, Any] | None = None,
+    **overrides: Any,  # noqa: ANN401 (values of a project file)
+) -> Project:
+    """Read a project and all its tables.
+
+    project: the project file; or its content as a mapping, with the tables in memory.
+    tables: with a mapping, its tables by the names that stand under ``file``: data frames, structured arrays, or
+        mappings of names of columns to values.
+    overrides: keys with other values than the file has: ``processing={"adjustment": "bundle"}``.
+    Raises InputError with every fault of every file.
+    """
+    path, source = _place_of(project, tables)
+    return loaded_from(path, assignments_of(overrides), source)
+
+
+def check(
+    project: Project | str | PathLike[str] | Mapping[str, Any],
+    *,
+    tables: Mapping[str, Any] | None = None,
+    **overrides: Any,  # noqa: ANN401 (values of a project file)
+) -> Check:
+    """Check a project without adjusting it; a faulty one raises nothing. Its arguments are those of ``load``."""
+    if isinstance(project, Project):
+        return (project.overridden(**overrides) if overrides else project).check()
+    path, source = _place_of(project, tables)
+    return _checked(path, assignments_of(overrides), source)
+
+
+def run(
+    project: Project | str | PathLike[str] | Mapping[str, Any],
+    *,
+    tables: Mapping[str, Any] | None = None,
+    **overrides: Any,  # noqa: ANN401 (values of a project file)
+) -> Result:
+    """Adjust a project. Its arguments are those of ``load``.
+
+    Raises InputError or GeometryError, with the findings that may be the cause.
+    """
+    if isinstance(project, Project):
+        return (project.overridden(**overrides) if overrides else project).run()
+    return load(project, tables=tables, **overrides).run()
+
+
+def _place_of(
+    project: str | PathLike[str] | Mapping[str, Any], tables: Mapping[str, Any] | None
+) -> tuple[Path, Source | None]:
+    """Return the path of a project, and what it is read from where it has no files."""
+    if not isinstance(project, Mapping):
+        return Path(project), None
+    from photostrip.project.in_memory import FILE, source_of
+
+    return Path(FILE), source_of({"photostrip": 1, **project}, tables or {})
+
+
+def assignments_of(overrides: Mapping[str, Any], above: str = "") -> list[str]:
+    """Return overrides as the command line gives them: ``processing.adjustment="bundle"``."""
+    from photostrip.project.in_memory import text_of
+
+    found = []
+    for key, value in overrides.items():
+        name = key if not above or _WORD.fullmatch(key) else f'"{key}"'
+        path = f"{above}.{name}" if above else name
+        found += assignments_of(value, path) if isinstance(value, Mapping) else [f"{path}={text_of(value)}"]
+    return found
+
+
+def loaded_from(path: Path, assignments: Sequence[str], source: Source | None = None) -> Project:
+    """Read a project from files, or from a source in memory."""
+    from photostrip.project.loading import load_project
+
+    with reading_from(source):
+        return Project(load_project(path, assignments), assignments, source)
+
+
+def _checked(path: Path, assignments: Sequence[str], source: Source | None) -> Check:
+    from photostrip.project.checks.check import check_project
+
+    with reading_from(source):
+        return Check(check_project(path, assignments))
+
+
+def reading_from(source: Source | None) -> AbstractContextManager[None]:
+    """Read from memory where the project has no files."""
+    if source is None:
+        return nullcontext()
+    from photostrip.project.in_memory import in_memory
+
+    return in_memory(source)

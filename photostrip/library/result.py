@@ -1,0 +1,231 @@
+"""A result: its tables, its verdict, its report, its files."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.library.table import Table
+from photostrip.notes import named
+from photostrip.result.tables import table_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from os import PathLike
+
+    from photostrip.arrays import Floats
+    from photostrip.pipeline import Result as Computed
+    from photostrip.result.numbers import Document
+
+ReportForm = Literal["text", "md", "html", "json"]
+RESULT = "result.json"
+
+
+class Result:
+    """What a run found: the content of result.json, with its lists as tables.
+
+    Lengths are metres, image coordinates micrometres, coordinates those of ``document["frame"]``; every column tells
+    its unit (``result.points.units``).
+    """
+
+    def __init__(self, document: Document, *, computed: Computed | None = None, resolved: str = "") -> None:
+        self.document = document
+        """The content of result.json: plain dictionaries, lists, texts and numbers."""
+        self.computed = computed
+        """Every stage of the run that found it, with numbers that are not rounded; None where it was read."""
+        self._resolved = resolved
+
+    @property
+    def name(self) -> str:
+        """Name of the project."""
+        return str(self.document["name"])
+
+    @property
+    def status(self) -> str:
+        """The verdict in one word: good, unverified, look or failed."""
+        return str(self.document["status"])
+
+    @property
+    def accuracy(self) -> str:
+        """How good the points are, in one sentence."""
+        return str(self.document["verdict"]["accuracy"])
+
+    @property
+    def summary(self) -> Document:
+        """Sigma0, scales, and the differences at control and check points."""
+        return dict(self.document["summary"])
+
+    @cached_property
+    def points(self) -> Table:
+        """Adjusted points: role, coordinates, standard deviations and covariances, rays."""
+        return self._table("points")
+
+    @cached_property
+    def photos(self) -> Table:
+        """Exterior orientation of the photos: perspective centre, angles, rotation by rows, standard deviations."""
+        return self._table("photos")
+
+    @cached_property
+    def pairs(self) -> Table:
+        """Relative orientation of the pairs, or the independent models: elements, parallaxes, scale."""
+        return self._table("pairs")
+
+    @cached_property
+    def strips(self) -> Table:
+        """The strips: counts, scale, sigma0, deformation."""
+        return self._table("strips")
+
+    @cached_property
+    def control(self) -> Table:
+        """Given points: adjusted minus given, standard deviations."""
+        return self._table("control")
+
+    @cached_property
+    def residuals(self) -> Table:
+        """Image residuals under the final orientations, a row for each ray."""
+        return self._table("residuals")
+
+    @cached_property
+    def parallaxes(self) -> Table:
+        """Residual y parallaxes, a row for each point of each pair."""
+        return self._table("parallaxes")
+
+    @cached_property
+    def rejected(self) -> Table:
+        """Measurements that were taken out, with the test and the reason."""
+        return self._table("rejected")
+
+    @cached_property
+    def findings(self) -> Table:
+        """What the data say against themselves."""
+        return self._table("findings")
+
+    @cached_property
+    def notes(self) -> Table:
+        """What the numbers need beside them to be read rightly."""
+        return self._table("notes")
+
+    def _table(self, name: str) -> Table:
+        return Table(name, table_of(self.document, name))
+
+    def covariance_of(self, ids: Sequence[str] | str) -> Floats:
+        """Return the covariances of points, in the order of the ids, along x, y, z of the frame.
+
+        Returns square metres, shape (n, 3, 3); shape (3, 3) for a single id. NaN where none was computed.
+        Raises InputError for a point that the result does not have.
+        """
+        names = [ids] if isinstance(ids, str) else list(ids)
+        points = self.points
+        rows = {name: row for row, name in enumerate(points["id"].tolist())}
+        if unknown := [name for name in names if name not in rows]:
+            message = f"the result has no {named('point', unknown)}"
+            raise InputError(Fault(message, "unknown-point", points=tuple(unknown)))
+        found = np.full((len(names), 3, 3), np.nan)
+        if "sigma_x" in points.columns and "cov_xy" in points.columns:
+            at = [rows[name] for name in names]
+            for k, axis in enumerate("xyz"):
+                found[:, k, k] = points[f"sigma_{axis}"][at] ** 2
+            for k, j, axes in ((0, 1, "xy"), (0, 2, "xz"), (1, 2, "yz")):
+                found[:, k, j] = found[:, j, k] = points[f"cov_{axes}"][at]
+        return found[0] if isinstance(ids, str) else found
+
+    def report(self, form: ReportForm = "text", *, sections: Sequence[str] = (), everything: bool = True) -> str:
+        """Return the accuracy report as text, Markdown, HTML or JSON.
+
+        sections: names of the sections that are wanted, as those of ``photostrip report --section``.
+        everything: False for the short report that the command prints by default.
+        Raises InputError when HTML is asked for and jinja2 is not installed.
+        """
+        from photostrip.errors import faults_instead
+        from photostrip.report import SectionName, chosen_sections, require_complete, title_of
+        from photostrip.report.page import layout, text
+
+        if form == "json":
+            from photostrip.formats.output.result_json import to_json
+
+            return to_json(self.document)
+        if unknown := sorted(set(sections) - set(SectionName)):
+            message = f"the report has no section {', '.join(unknown)}"
+            raise InputError(Fault(message, "section", expected=f"one of {', '.join(SectionName)}"))
+        require_complete(self.document, self.name)
+        with faults_instead(self.name, "reported"):
+            if form == "html":
+                from photostrip.report.html import check_html, to_html
+
+                check_html("report")
+                return to_html(self.document, everything=everything)
+            names = [SectionName(each) for each in sections]
+            chosen = chosen_sections(self.document, names=names, everything=everything, width=layout.USUAL)
+            title = "" if sections else title_of(self.document)
+            return text.to_markdown(title, chosen) if form == "md" else text.to_text(title, chosen, layout.USUAL)
+
+    def trace(self, form: str = "text") -> str:
+        """Return every iteration with the symbols of the formulas, as text, Markdown (``md``) or JSON.
+
+        Raises InputError for a saved result: it holds no iterations.
+        """
+        if self.computed is None:
+            raise InputError(Fault("a saved result holds no iterations", "result-saved", fix="run the project again"))
+        from photostrip.report.commands.trace import trace_sections, trace_title
+        from photostrip.report.page import layout, text
+        from photostrip.result.trace.trace import trace_of
+
+        document = trace_of(self.computed)
+        if form == "json":
+            from photostrip.formats.output.result_json import to_json
+
+            return to_json(document)
+        title, sections = trace_title(document), trace_sections(document)
+        return text.to_markdown(title, sections) if form == "md" else text.to_text(title, sections, layout.WIDEST)
+
+    def files(self, *, html: bool = False, everything: bool = False) -> dict[str, str]:
+        """Return the files of the result, content by name: result.json, the tables, with html the report as a page."""
+        from photostrip.formats.output.result_files import refined_csv, result_files
+
+        pages = {"report.html": self.report("html", everything=everything)} if html else {}
+        refined = refined_csv(self.computed) if self.computed is not None else ""
+        return pages | result_files(self.document, self._resolved, refined)
+
+    def write(self, folder: str | PathLike[str], *, html: bool = False) -> None:
+        """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none."""
+        from pathlib import Path
+
+        from photostrip.formats.text.writing import write_files
+
+        write_files(Path(folder), self.files(html=html))
+
+    def __repr__(self) -> str:
+        """Say the verdict in a line."""
+        return f"<Result {self.name}: {self.status.upper()}, {self.accuracy}>"
+
+    def _repr_html_(self) -> str:
+        """Return the verdict and the differences at given points for a notebook."""
+        rows = []
+        for role in ("control", "check"):
+            found = self.document["summary"].get(role) or {}
+            for part in ("plan", "height"):
+                each = found.get(part)
+                if each and each.get("count"):
+                    cells = (role, part, str(each["count"]), f"{each['rms']:.3f}", f"{each['max']:.3f}", each["worst"])
+                    rows.append("<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in cells) + "</tr>")
+        heads = "".join(f"<th>{head}</th>" for head in ("role", "in", "points", "rms m", "largest m", "at"))
+        table = f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>" if rows else ""
+        verdict = f"<p><b>{escape(self.name)}: {self.status.upper()}</b> {escape(self.accuracy)}</p>"
+        return verdict + table
+
+
+def read_result(path: str | PathLike[str]) -> Result:
+    """Read a saved result: a result.json, or the folder that holds it.
+
+    Raises InputError with every fault of the file.
+    """
+    from pathlib import Path
+
+    from photostrip.formats.output.result_json import read_result as read
+
+    file = Path(path)
+    return Result(read(str(file / RESULT if file.is_dir() else file)))

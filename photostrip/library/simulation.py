@@ -1,0 +1,75 @@
+"""Synthetic projects with known truth, in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from photostrip.library.project import Project, assignments_of, loaded_from, reading_from
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from photostrip.formats.text.source import Source
+
+KEY = "photostrip_simulation"  # number of the schema
+
+
+class Simulation:
+    """A simulated project: its files, and the truth that they were made from."""
+
+    def __init__(self, files: Mapping[str, str], summary: str) -> None:
+        self.files = dict(files)
+        """Content by name: project.yaml, its tables, truth.json."""
+        self._summary = summary
+
+    @property
+    def truth(self) -> dict[str, Any]:
+        """The content of truth.json: true coordinates, perspective centres, rotations; the errors that were put in."""
+        from photostrip.formats.output.result_json import parsed
+
+        with reading_from(self._source):
+            return dict(parsed("truth.json"))
+
+    @property
+    def project(self) -> Project:
+        """The project, ready to run, without files."""
+        return loaded_from(Path("project.yaml"), (), self._source)
+
+    @property
+    def _source(self) -> Source:
+        from photostrip.formats.text.source import Source
+
+        return Source({name: text.encode() for name, text in self.files.items()})
+
+    def write(self, folder: str | PathLike[str]) -> None:
+        """Write the files into a folder, as ``photostrip simulate -o`` does: all of them or none."""
+        from photostrip.formats.text.writing import write_files
+
+        write_files(Path(folder), self.files)
+
+    def __repr__(self) -> str:
+        """Say in a line what was simulated."""
+        return f"<Simulation: {self._summary}>"
+
+
+def simulate(
+    specification: str | PathLike[str] | Mapping[str, Any],
+    **overrides: Any,  # noqa: ANN401 (values of a specification)
+) -> Simulation:
+    """Simulate a project with known truth.
+
+    specification: a file, or its content as a mapping; ``{}`` takes every default.
+    overrides: keys with other values: ``flight={"photos": 20}, seed=3``.
+    Raises InputError with every fault of the specification.
+    """
+    from photostrip.formats.output.simulation import project_files, summary
+    from photostrip.project.in_memory import FILE, source_of
+    from photostrip.project.simulation import load_specification
+
+    source = source_of({KEY: 1} | dict(specification), {}) if isinstance(specification, Mapping) else None
+    path = Path(FILE) if isinstance(specification, Mapping) else Path(specification)
+    with reading_from(source):
+        found = load_specification(path, assignments_of(overrides)).simulate()
+    return Simulation(project_files(found), summary(found))

@@ -1,0 +1,122 @@
+"""A table with named columns: numpy arrays that know their units."""
+
+from __future__ import annotations
+
+from html import escape
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from photostrip.result.tables import ResultColumn
+
+SHOWN = 10  # rows in a notebook
+
+
+class Table:
+    """Columns of equal length by name: ``table["x"]`` is an array, ``len(table)`` the number of rows.
+
+    Numbers are arrays of float, NaN where there is no value; counts without gaps are int, flags bool; all else are
+    arrays of objects, None where there is none.
+    """
+
+    def __init__(self, name: str, columns: Sequence[ResultColumn]) -> None:
+        self.name = name
+        self.units: Mapping[str, str] = {each.name: each.quantity.unit for each in columns}
+        """The unit of each column: m, um, deg, ...; empty for ratios, counts and texts."""
+        self.meanings: Mapping[str, str] = {each.name: each.quantity.meaning for each in columns}
+        """What stands in each column."""
+        self._columns = {each.name: _array(each.values) for each in columns}
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of the columns."""
+        return tuple(self._columns)
+
+    def __getitem__(self, name: str) -> np.ndarray[Any, Any]:
+        """Return a column, shape (n,)."""
+        if name not in self._columns:
+            raise _unknown(self.name, name, self.columns)
+        return self._columns[name]
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(next(iter(self._columns.values()), ()))
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Return the rows, each a dictionary."""
+        for row in zip(*(column.tolist() for column in self._columns.values()), strict=True):
+            yield dict(zip(self._columns, row, strict=True))
+
+    def where(self, **values: object) -> Table:
+        """Return the rows that have these values: ``points.where(role="check")``."""
+        keep = np.ones(len(self), bool)
+        for name, value in values.items():
+            keep &= self[name] == value
+        part = Table(self.name, ())
+        part.units, part.meanings = self.units, self.meanings
+        part._columns = {name: column[keep] for name, column in self._columns.items()}
+        return part
+
+    def to_pandas(self) -> Any:  # noqa: ANN401 (a library that need not be there)
+        """Return a ``pandas.DataFrame``; its ``attrs["units"]`` are the units. Needs pandas."""
+        frame = import_module("pandas").DataFrame(self._columns)
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def to_arrow(self) -> Any:  # noqa: ANN401 (a library that need not be there)
+        """Return a ``pyarrow.Table``; unit and meaning are the metadata of its fields. Needs pyarrow."""
+        pa = import_module("pyarrow")
+        arrays = [pa.array(column, from_pandas=True) for column in self._columns.values()]
+        fields = [
+            pa.field(name, array.type, metadata={"unit": self.units[name], "meaning": self.meanings[name]})
+            for name, array in zip(self._columns, arrays, strict=True)
+        ]
+        return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+
+    def __repr__(self) -> str:
+        """Name the table, the number of its rows, and its columns with units."""
+        named = (f"{name} [{unit}]" if unit else name for name, unit in self.units.items())
+        return f"<{self.name}: {len(self)} rows; {', '.join(named)}>"
+
+    def _repr_html_(self) -> str:
+        """Return the first rows for a notebook."""
+        heads = "".join(
+            f'<th title="{escape(self.meanings[name])}">{escape(name)}{f"<br>{escape(unit)}" if unit else ""}</th>'
+            for name, unit in self.units.items()
+        )
+        rows = [
+            "<tr>" + "".join(f"<td>{escape(_shown(value))}</td>" for value in row.values()) + "</tr>"
+            for row, _ in zip(self, range(SHOWN), strict=False)
+        ]
+        more = f"<p>{len(self)} rows, the first {SHOWN} shown</p>" if len(self) > SHOWN else ""
+        return f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>{more}"
+
+
+def _unknown(table: str, name: str, known: Sequence[str]) -> KeyError:
+    from photostrip.formats.text.findings import suggestion
+
+    return KeyError(f"{table} has no column {name!r}; {suggestion(name, known) or 'it has ' + ', '.join(known)}")
+
+
+def _array(values: Sequence[Any]) -> np.ndarray[Any, Any]:
+    """Return a column as an array of the narrowest of bool, int, float and object."""
+    kinds = {type(value) for value in values if value is not None}
+    if kinds == {bool} and None not in values:
+        return np.array(values, bool)
+    if kinds == {int} and None not in values:
+        return np.array(values, np.int64)
+    if kinds and kinds <= {int, float}:
+        return np.array(values, float)  # None becomes NaN
+    found = np.empty(len(values), object)
+    found[:] = values
+    return found
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.10g}" if isinstance(value, float) else str(value)

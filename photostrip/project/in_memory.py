@@ -1,0 +1,84 @@
+"""A project without files: its blocks as a mapping, its tables as columns, read by the reader of files."""
+
+from __future__ import annotations
+
+import json
+from contextlib import contextmanager
+from dataclasses import replace
+from math import isnan
+from os import fspath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.formats.output.csv_text import to_csv
+from photostrip.formats.text.source import Source, reading_from
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+FILE = "project"  # what the mapping is called in messages
+
+
+def source_of(project: Mapping[str, Any], tables: Mapping[str, Any]) -> Source:
+    """Write a project and its tables as the files that they stand for; nothing touches the disk.
+
+    tables: by the name under which the project names them (``file:``): a data frame, a structured array, or a mapping
+        of names of columns to values. None and NaN are empty cells.
+    """
+    files = {name: _text(name, table).encode() for name, table in tables.items()}
+    return Source(files | {FILE: text_of(project).encode()})
+
+
+def text_of(value: Any) -> str:  # noqa: ANN401 (values of a project file)
+    """Return a value as a project file has it.
+
+    Raises InputError for what no project file can hold.
+    """
+    try:
+        return json.dumps(value, default=_plain, ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        message = f"holds a value that a project file cannot hold ({error})"
+        raise InputError(Fault(message, "type", FILE, expected="texts, numbers, lists, mappings")) from None
+
+
+@contextmanager
+def in_memory(source: Source) -> Iterator[None]:
+    """Read from memory; a fault of the mapping has its key, and no line, as it stands in no file."""
+    try:
+        with reading_from(source):
+            yield
+    except InputError as error:
+        placed = InputError(replace(fault, line=0, column=0) if fault.file == FILE else fault for fault in error.faults)
+        placed.findings = error.findings
+        raise placed from None
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 (what JSON does not know)
+    """Return a value of numpy or a path as a project file has it."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else fspath(value)
+
+
+def _text(name: str, table: Any) -> str:  # noqa: ANN401 (data frames of any library)
+    """Return a table as CSV."""
+    names = _names(table)
+    columns = [np.asarray(table[each]) for each in names]
+    lengths = {each: column.shape for each, column in zip(names, columns, strict=True)}
+    if not names or any(len(shape) != 1 for shape in lengths.values()) or len(set(lengths.values())) > 1:
+        found = ", ".join(f"{each} {shape}" for each, shape in lengths.items()) or "no columns"
+        raise InputError(Fault(f"has columns of different shapes: {found}", "table-shape", name, expected="(n,) each"))
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    return to_csv(map(str, names), ([_cell(value) for value in row] for row in rows))
+
+
+def _names(table: Any) -> list[Any]:  # noqa: ANN401 (data frames of any library)
+    """Return the names of the columns of a data frame, a structured array or a mapping."""
+    if isinstance(table, np.ndarray):
+        return list(table.dtype.names or ())
+    return list(table.columns if hasattr(table, "columns") else table)
+
+
+def _cell(value: object) -> object:
+    """Return nothing for what is not there."""
+    return None if value is None or (isinstance(value, float) and isnan(value)) else value

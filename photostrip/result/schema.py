@@ -1,0 +1,85 @@
+"""What result.json may hold, as JSON Schema and as a page, made from the description of its keys."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.result.description import Quantity, Table, described
+from photostrip.result.document import SCHEMA
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+URI = "https://json-schema.org/draft/2020-12/schema"
+TYPES = {"text": "string", "word": "string", "count": "integer", "flag": "boolean", "number": "number"}
+WORDS = {"text": "text", "word": "word", "count": "count", "flag": "true or false", "any": ""}
+
+
+def result_schema() -> dict[str, Any]:
+    """Return the JSON Schema of result.json.
+
+    Every key may be null, where there is no value, and may be missing, where a kind of project does not have it; the
+    three that are always there are required. A list of records is described by the keys of one.
+    """
+    blocks: dict[str, Any] = {}
+    found = _block(described(), "", blocks)
+    found["properties"]["photostrip_result"] = {"const": SCHEMA, "description": "number of the format"}
+    head = {"$schema": URI, "title": "photostrip result", "description": f"Content of result.json, format {SCHEMA}."}
+    return head | found | {"required": ["photostrip_result", "version", "status"], "$defs": blocks}
+
+
+def result_page() -> str:
+    """Return a page of Markdown with every key, its unit and its meaning."""
+    lines = ["| key | unit | what it is |", "|---|---|---|"]
+    lines += [f"| `{path}` | {_unit(each)} | {each.meaning} |" for path, each in _quantities(described(), "")]
+    return "\n".join(lines) + "\n"
+
+
+def _block(table: Table, above: str, blocks: dict[str, Any]) -> dict[str, Any]:
+    """Describe a block of keys; the blocks below it go into `blocks` by the keys that lead to them."""
+    found: dict[str, Any] = {}
+    for key, entry in table.items():
+        path = f"{above}.{key}" if above else key
+        if isinstance(entry, Quantity):
+            found[key] = _value(entry)
+        else:
+            blocks[path] = _block(entry, path, blocks)
+            one = {"$ref": f"#/$defs/{path}"}
+            found[key] = {"anyOf": [one, {"type": "array", "items": one}, {"type": "null"}]}
+    return {"type": "object", "properties": found}
+
+
+def _value(entry: Quantity) -> dict[str, Any]:
+    """Describe a value; its unit stands under a key of its own."""
+    found: dict[str, Any] = {"description": entry.meaning}
+    kind = "number" if entry.kind == "any" and entry.unit else entry.kind  # its decimals are those of its frame
+    if kind in TYPES:
+        one: dict[str, Any] = {"type": [TYPES[kind], "null"]}
+        # a matrix is a list of its rows
+        found |= (
+            {"type": ["array", "null"], "items": {"anyOf": [one, {"type": "array", "items": one}]}}
+            if entry.many
+            else one
+        )
+    if unit := _unit(entry):
+        found["x-unit"] = unit
+    if entry.decimals is not None:
+        found["x-decimals"] = entry.decimals
+    return found
+
+
+def _unit(entry: Quantity) -> str:
+    """Return the unit of a number, or what says it; of anything else its kind."""
+    if entry.unit_key:
+        return f"that of `{entry.unit_key}`"
+    of = {"frame": "that of the frame", "angle": "that of the angles"}
+    return of.get(entry.unit, entry.unit) or WORDS.get(entry.kind, "")
+
+
+def _quantities(table: Table, above: str) -> Iterator[tuple[str, Quantity]]:
+    for key, entry in table.items():
+        path = f"{above}.{key}" if above else key
+        if isinstance(entry, Quantity):
+            yield path, entry
+        else:
+            yield from _quantities(entry, path)

@@ -1,0 +1,77 @@
+"""Comparisons, simulations and plans in scripts."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import photostrip
+from photostrip.cli.main import main
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FOLDER = ROOT / "sample_data/simulated-20"
+
+
+def test_a_result_against_its_baseline() -> None:
+    result = photostrip.run(FOLDER / "project.yaml")
+    same = photostrip.compare(result, FOLDER / "baseline.json")
+    assert same.same
+    assert repr(same).startswith("<Comparison: SAME: ")
+    other = photostrip.compare(photostrip.run(FOLDER / "project.yaml", processing={"adjustment": "bundle"}), result)
+    assert not other.same
+    assert {each["kind"] for each in other.differences} >= {"plan", "height", "rotation"}
+    assert "DIFFERENT" in other.report()
+    loose = photostrip.compare(result, FOLDER / "baseline.json", tolerances=ROOT / "configs/tolerances/exact.yaml")
+    assert loose.same
+
+
+def test_a_simulation_needs_no_files(tmp_path: Path) -> None:
+    simulation = photostrip.simulate(
+        {}, flight={"photos": 6}, gross_errors=[{"kind": "control", "point": "G05", "axis": "z", "size_m": 3.0}]
+    )
+    result = simulation.project.run()
+    against = photostrip.compare(result, simulation.truth)
+    assert against.document["errors"]["planted"] == 1
+    assert "1 of 1 gross error found" in repr(against)
+    simulation.write(tmp_path)
+    assert photostrip.run(tmp_path / "project.yaml").document == result.document
+    assert photostrip.compare(result, tmp_path / "truth.json").document["points"] == against.document["points"]
+    with pytest.raises(photostrip.InputError, match=r"flight.photos"):
+        photostrip.simulate({}, flight={"photos": -1})
+
+
+@pytest.mark.parametrize(
+    ("kind", "overrides", "options"),
+    [
+        ("model", {"control": {"layout": "six"}}, ["--control", "six"]),
+        ("strip", {"models": 8}, ["--models", "8"]),
+        ("displacement", {"camera": "UMK 10/1318", "base": 30, "distances": [50]},
+         ["--camera", "UMK 10/1318", "--base", "30", "--distances", "50"]),
+    ],
+)  # fmt: skip
+def test_plans_are_those_of_the_command(
+    kind: photostrip.library.plan.PlanKind,
+    overrides: dict[str, Any],
+    options: list[str],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = photostrip.plan(kind, **overrides)
+    assert main(["plan", kind, *options, "--format", "json"]) == 0
+    assert json.loads(capsys.readouterr().out) == found.document
+    assert main(["plan", kind, *options, "--format", "md"]) == 0
+    assert capsys.readouterr().out == found.report("md")
+
+
+def test_a_plan_of_cameras_from_a_mapping() -> None:
+    cameras = {"wide": {"principal_distance": 152, "format": [230, 230], "image_sigma_um": 5}}
+    plan = {"cameras": {**cameras, "normal": {**cameras["wide"], "principal_distance": 300}}}
+    assert "wide" in repr(photostrip.plan("camera", {"photostrip_plan_cameras": 1, **plan}))
+    with pytest.raises(photostrip.InputError, match="no cameras are given"):
+        photostrip.plan("camera")
+    with pytest.raises(ValueError, match="there is no plan 'block'"):
+        photostrip.plan("block")  # type: ignore[arg-type]

@@ -1,0 +1,155 @@
+"""Projects in scripts: from files and from memory, with other values of some keys, with their faults."""
+
+from __future__ import annotations
+
+import csv
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import photostrip
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SAMPLE = ROOT / "sample_data/simulated-20/project.yaml"
+
+
+@pytest.fixture(scope="module")
+def simulation() -> photostrip.Simulation:
+    return photostrip.simulate({}, flight={"photos": 5}, seed=4)
+
+
+def columns(text: str) -> dict[str, list[Any]]:
+    """Give a CSV table as columns, numbers as numbers."""
+    head, *rows = csv.reader(text.splitlines())
+    numbers = {"x", "y", "z"}
+    return {
+        name: [(float(row[k]) if row[k] else None) if name in numbers else row[k] for row in rows]
+        for k, name in enumerate(head)
+    }
+
+
+def in_memory(simulation: photostrip.Simulation) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Give a simulated project as a mapping and its tables."""
+    project: dict[str, Any] = {
+        "name": "memory",
+        "cameras": {"film": {"principal_distance": np.float64(153.0), "format": np.array([230.0, 230.0])}},
+        "strips": [{"id": "A", "camera": "film", "photos": [each["id"] for each in simulation.truth["photos"]]}],
+        "observations": {"file": "images", "unit": "mm", "sigma": 0.005},
+        "control": [
+            {"file": "given", "crs": "EPSG:32633", "axes": ["east", "north", "up"], "sigma": [0.05, 0.05, 0.08]}
+        ],
+    }
+    tables = {
+        name: columns(simulation.files[f"{file}.csv"])
+        for name, file in (("images", "observations"), ("given", "control"))
+    }
+    return project, tables
+
+
+def test_a_project_says_what_it_holds() -> None:
+    project = photostrip.load(SAMPLE)
+    assert repr(project) == "<Project simulated-20: 1 strips, 20 photos, 469 image points>"
+    assert project.photos[:2] == ("1001", "1002")
+    assert "degree: auto" in project.resolved
+    assert project.files_read(photostrip.Result({}))[0] == SAMPLE
+
+
+def test_overrides_are_those_of_the_command(simulation: photostrip.Simulation) -> None:
+    project = simulation.project
+    plain = project.run()
+    changed = photostrip.run(project, processing={"adjustment": "polynomial", "polynomial": {"degree": 1}})
+    assert plain.document["adjustment"] == "covariance"
+    assert changed.document["polynomials"][0]["degree"] == 1
+    again = project.overridden(**{"processing.adjustment": "similarity"}).overridden(name="other")
+    assert (again.run().document["adjustment"], again.name) == ("similarity", "other")
+
+
+def test_a_name_with_a_dot_is_one_key(simulation: photostrip.Simulation) -> None:
+    project, tables = in_memory(simulation)
+    project["cameras"] = {"RC 30.1": project["cameras"]["film"]}
+    project["strips"][0]["camera"] = "RC 30.1"
+    found = photostrip.load(project, tables=tables, cameras={"RC 30.1": {"principal_distance": 152.9}})
+    assert found.loaded.inputs.strips[0].camera.principal_distance == 152.9
+
+
+def test_a_project_in_memory_is_that_of_the_files(simulation: photostrip.Simulation) -> None:
+    project, tables = in_memory(simulation)
+    found = photostrip.run(project, tables=tables)
+    by_files = photostrip.run(simulation.project)
+    assert len(found.points) == len(by_files.points) > 20
+    for axis in "xyz":
+        np.testing.assert_array_equal(found.points[axis], by_files.points[axis])
+    structured = np.array(
+        list(zip(*tables["images"].values(), strict=True)),
+        [("photo", "U8"), ("point", "U8"), ("x", float), ("y", float)],
+    )
+    again = photostrip.run(project, tables=tables | {"images": structured})
+    assert again.document == found.document
+
+
+def test_data_frames_are_tables(simulation: photostrip.Simulation) -> None:
+    pandas = pytest.importorskip("pandas")
+    project, tables = in_memory(simulation)
+    framed = {name: pandas.DataFrame(table) for name, table in tables.items()}
+    assert photostrip.run(project, tables=framed).document == photostrip.run(project, tables=tables).document
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            ("observations", "sigma", -1),
+            "project: observations.sigma: -1 is out of range; expected a number larger than 0",
+        ),
+        (("observations", "file", "pictures"), "project: observations.file: pictures does not exist"),
+        (("cameras", "film", object()), "PathLike"),
+        (("control", None, None), "project: control:"),
+        (("name", None, float("nan")), "a project file cannot hold"),
+    ],
+)
+def test_a_fault_names_its_key(simulation: photostrip.Simulation, change: tuple[str, Any, Any], message: str) -> None:
+    project, tables = in_memory(simulation)
+    block, key, value = change
+    if key is None:
+        project[block] = value
+    else:
+        project[block][key] = value
+    with pytest.raises(photostrip.InputError) as refused:
+        photostrip.load(project, tables=tables)
+    assert message in str(refused.value)
+    assert {fault.line for fault in refused.value.faults} == {0}
+
+
+def test_a_fault_of_a_table_names_its_row(simulation: photostrip.Simulation) -> None:
+    project, tables = in_memory(simulation)
+    tables["images"]["x"][3] = "north"
+    with pytest.raises(photostrip.InputError, match="images:5"):
+        photostrip.load(project, tables=tables)
+    tables["images"]["x"] = [1.0]
+    with pytest.raises(photostrip.InputError, match=r"columns of different shapes: photo \(\d+,\).*x \(1,\)"):
+        photostrip.load(project, tables=tables)
+    with pytest.raises(photostrip.InputError, match="no columns"):
+        photostrip.load(project, tables=tables | {"images": {}})
+
+
+def test_a_check_raises_nothing(tmp_path: Path) -> None:
+    good = photostrip.check(SAMPLE)
+    assert good.ok
+    assert good.document["counts"]["photos"] == 20
+    assert repr(good) == "<Check ok>"
+    bad = photostrip.check(tmp_path / "missing.yaml")
+    assert not bad.ok
+    assert "missing.yaml: does not exist" in repr(bad)
+    assert photostrip.check(photostrip.load(SAMPLE), processing={"adjustment": "bundle"}).ok
+
+
+def test_a_refused_adjustment_carries_its_findings(simulation: photostrip.Simulation) -> None:
+    project, tables = in_memory(simulation)
+    tables["given"]["x"] = [-value for value in tables["given"]["x"]]
+    with pytest.raises((photostrip.InputError, photostrip.GeometryError)) as refused:
+        photostrip.run(project, tables=tables)
+    assert [each.code for each in refused.value.findings] != []

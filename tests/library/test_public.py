@@ -1,0 +1,71 @@
+"""The public names of the package: which there are, and that asking for them is what loads anything."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+
+import photostrip
+from tests.loops import nonempty
+from tests.test_startup import HEAVY, loaded_after
+
+# What scripts of users rely on. A change here needs a line in CHANGELOG.md that says what to do instead.
+PARAMETERS = {
+    "check": ["project", "tables", "overrides"],
+    "compare": ["result", "baseline", "tolerances"],
+    "load": ["project", "tables", "overrides"],
+    "plan": ["kind", "specification", "overrides"],
+    "read_result": ["path"],
+    "run": ["project", "tables", "overrides"],
+    "simulate": ["specification", "overrides"],
+}
+MEMBERS = {
+    "Check": ["document", "faults", "findings", "notes", "ok"],
+    "Comparison": ["differences", "document", "report", "same"],
+    "Plan": ["document", "report"],
+    "Project": ["check", "files_read", "loaded", "name", "overridden", "photos", "resolved", "run"],
+    "Result": [
+        "accuracy", "computed", "control", "covariance_of", "document", "files", "findings", "name", "notes", "pairs",
+        "parallaxes", "photos", "points", "rejected", "report", "residuals", "status", "strips", "summary", "trace",
+        "write",
+    ],
+    "Simulation": ["files", "project", "truth", "write"],
+    "Table": ["columns", "meanings", "name", "to_arrow", "to_pandas", "units", "where"],
+}  # fmt: skip
+ERRORS = ["GeometryError", "InputError", "PhotostripError"]
+
+
+def test_the_public_names_are_these() -> None:
+    assert photostrip.__all__ == sorted([*PARAMETERS, *MEMBERS, *ERRORS])
+    assert dir(photostrip) == sorted([*photostrip.__all__, "__version__"])
+
+
+@pytest.mark.parametrize("name", sorted(PARAMETERS))
+def test_the_parameters_of_a_function_are_these(name: str) -> None:
+    function = getattr(photostrip, name)
+    assert list(inspect.signature(function).parameters) == PARAMETERS[name]
+    assert "Raises" in function.__doc__ or name == "check"
+
+
+@pytest.mark.parametrize("name", sorted(MEMBERS))
+def test_the_members_of_a_class_are_these_and_explained(name: str) -> None:
+    found = getattr(photostrip, name)
+    source = inspect.getsource(found)
+    public = [member for member in vars(found) if not member.startswith("_")]
+    assert [
+        member for member in nonempty(MEMBERS[name]) if member not in public and f"self.{member}" not in source
+    ] == []
+    assert [member for member in public if member not in MEMBERS[name]] == []
+    assert [member for member in public if not inspect.getdoc(vars(found)[member])] == []
+
+
+def test_an_unknown_name_is_refused_as_python_does() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'adjust'"):
+        _ = photostrip.adjust
+
+
+@pytest.mark.slow
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    assert loaded_after("import photostrip; dir(photostrip)", HEAVY) == set()
+    assert loaded_after("import photostrip; photostrip.run", HEAVY) <= {"numpy"}

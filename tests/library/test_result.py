@@ -1,0 +1,179 @@
+"""Results in scripts: tables with units, covariances, reports and files as the command writes them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import photostrip
+from photostrip.cli.main import main
+from photostrip.result.tables import BLOCKS
+from tests.loops import nonempty
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SAMPLE = ROOT / "sample_data/simulated-20/project.yaml"
+
+
+@pytest.fixture(scope="module")
+def result() -> photostrip.Result:
+    return photostrip.run(SAMPLE, output={"angles": {"system": "omega-phi-kappa", "unit": "gon"}})
+
+
+@pytest.fixture(scope="module")
+def bundle() -> photostrip.Result:
+    return photostrip.run(SAMPLE, processing={"adjustment": "bundle"})
+
+
+def test_a_result_says_its_verdict(result: photostrip.Result) -> None:
+    assert (result.name, result.status) == ("simulated-20", "good")
+    assert repr(result).startswith("<Result simulated-20: GOOD, rms 0.106 m in plan")
+    assert result.summary["check"]["plan"]["count"] == 30
+    page = result._repr_html_()
+    assert "<td>check</td><td>height</td><td>30</td><td>0.138</td>" in page
+
+
+@pytest.mark.parametrize("name", ["points", "photos", "residuals", "parallaxes", "rejected"])
+def test_tables_are_those_of_the_files(result: photostrip.Result, name: str) -> None:
+    head, *rows = csv.reader(result.files()[f"{name}.csv"].splitlines())
+    table = getattr(result, name)
+    assert len(table) == len(rows) > 0
+    renamed = {"point": "id", "photo": "id"} if name in {"points", "photos"} else {}
+    both = [
+        (k, renamed.get(column, column))
+        for k, column in enumerate(head)
+        if renamed.get(column, column) in table.columns
+    ]
+    assert len(both) >= len(head) - 1  # an azimuth in gon is a column of points.csv alone
+    for k, column in nonempty(both):
+        for cell, value in zip((row[k] for row in rows), table[column].tolist(), strict=True):
+            if isinstance(value, float):
+                assert float(cell or "nan") == pytest.approx(value, abs=0.006, nan_ok=True)
+
+
+def test_columns_know_their_unit_and_kind(result: photostrip.Result) -> None:
+    units = result.points.units
+    assert (units["x"], units["sigma_z"], units["cov_xy"], units["image_rms_um"]) == ("m", "m", "m^2", "um")
+    assert (result.photos.units["omega_gon"], result.photos.units["z"]) == ("gon", "m")
+    assert result.pairs.units["sigmas_kappa1"] == "deg"
+    assert result.points.meanings["rays"] == "photos whose ray was used"
+    kinds = {name: result.points[name].dtype.kind for name in ("id", "x", "rays")}
+    assert kinds == {"id": "O", "x": "f", "rays": "i"}
+    assert result.residuals["used"].dtype == bool
+
+
+def test_every_column_of_every_table_has_a_meaning(result: photostrip.Result, bundle: photostrip.Result) -> None:
+    for name in nonempty(sorted(set(BLOCKS) - {"junctions", "ties", "link_residuals"})):
+        for found in (result, bundle):
+            table = getattr(found, name)
+            assert [column for column in table.columns if not table.meanings[column]] == [], name
+
+
+def test_geographic_coordinates_are_in_degrees() -> None:
+    found = photostrip.run(SAMPLE, output={"crs": "EPSG:4326", "axes": ["north", "east", "up"]})
+    assert [found.points.units[axis] for axis in "xyz"] == ["deg", "deg", "m"]
+
+
+def test_some_rows_of_a_table(result: photostrip.Result) -> None:
+    checks = result.points.where(role="check")
+    assert (len(checks), set(checks["role"])) == (30, {"check"})
+    assert next(iter(checks))["id"] == checks["id"][0]
+    assert len(result.residuals.where(photo="1001", used=True)) == 16
+    assert len(result.points.where(role="none")) == 0
+    with pytest.raises(KeyError, match="points has no column 'sigma_zz'; did you mean"):
+        _ = result.points["sigma_zz"]
+
+
+def test_a_table_shows_itself(result: photostrip.Result) -> None:
+    assert repr(result.residuals) == "<residuals: 469 rows; strip, photo, point, vx_um [um], vy_um [um], used>"
+    page = result.residuals._repr_html_()
+    assert page.count("<tr>") == 11
+    assert "469 rows, the first 10 shown" in page
+    assert "vx_um<br>um" in page
+
+
+def test_a_hostile_id_is_no_markup(result: photostrip.Result) -> None:
+    document = json.loads(json.dumps(result.document))
+    document["points"][0]["id"] = document["name"] = "<script>"
+    edited = photostrip.Result(document)
+    assert "<script>" not in edited.points._repr_html_() + edited._repr_html_()
+
+
+def test_tables_become_data_frames(result: photostrip.Result) -> None:
+    pytest.importorskip("pandas")
+    frame = result.points.to_pandas()
+    assert list(frame.columns) == list(result.points.columns)
+    assert frame.attrs["units"]["x"] == "m"
+    np.testing.assert_array_equal(frame["x"].to_numpy(), result.points["x"])
+
+
+def test_tables_become_arrow_tables(result: photostrip.Result) -> None:
+    pytest.importorskip("pyarrow")
+    table = result.points.to_arrow()
+    assert table.num_rows == len(result.points)
+    assert table.schema.field("x").metadata[b"unit"] == b"m"
+    assert table.column("rays").to_pylist() == result.points["rays"].tolist()
+
+
+def test_covariances_are_those_of_the_table(result: photostrip.Result) -> None:
+    ids = ["K07", "1001-4"]
+    found = result.covariance_of(ids)
+    assert found.shape == (2, 3, 3)
+    np.testing.assert_array_equal(found, found.transpose(0, 2, 1))
+    sigmas = [[row[f"sigma_{axis}"] for axis in "xyz"] for name in ids for row in result.points.where(id=name)]
+    np.testing.assert_allclose(np.sqrt(found.diagonal(axis1=1, axis2=2)), sigmas)
+    np.testing.assert_array_equal(result.covariance_of("1001-4"), found[1])
+    assert (np.linalg.eigvalsh(found) > 0).all()
+    with pytest.raises(photostrip.InputError, match="the result has no point X1"):
+        result.covariance_of(["K07", "X1"])
+
+
+def test_without_precision_covariances_are_not_known() -> None:
+    found = photostrip.run(SAMPLE, processing={"precision": False, "adjustment": "polynomial"})
+    assert np.isnan(found.covariance_of("K07")).all()
+
+
+def test_reports_are_those_of_the_command(
+    result: photostrip.Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result.write(tmp_path)
+    assert main(["report", str(tmp_path), "--verbose"]) == 0
+    assert capsys.readouterr().out == result.report()
+    assert result.report("md").startswith("# ")
+    assert json.loads(result.report("json")) == result.document
+    assert result.report("html").startswith("<!DOCTYPE html>")
+    assert "pairs" not in result.report(sections=["verdict"])
+    with pytest.raises(photostrip.InputError, match="the report has no section accuracies; expected one of verdict"):
+        result.report(sections=["accuracies"])
+
+
+def test_files_are_those_of_the_command(tmp_path: Path) -> None:
+    photostrip.run(SAMPLE).write(tmp_path / "library", html=True)
+    assert main(["run", str(SAMPLE), "-o", str(tmp_path / "command"), "--html", "-q"]) == 0
+    names = sorted(path.name for path in (tmp_path / "command").iterdir())
+    assert "result.json" in names
+    for name in nonempty(names):
+        assert (tmp_path / "library" / name).read_bytes() == (tmp_path / "command" / name).read_bytes(), name
+
+
+def test_a_saved_result_is_read_again(result: photostrip.Result, tmp_path: Path) -> None:
+    result.write(tmp_path)
+    for path in (tmp_path, tmp_path / "result.json"):
+        found = photostrip.read_result(path)
+        assert found.document == result.document
+        assert found.computed is None
+    with pytest.raises(photostrip.InputError, match="a saved result holds no iterations; run the project again"):
+        found.trace()
+    with pytest.raises(photostrip.InputError, match="does not exist"):
+        photostrip.read_result(tmp_path / "none.json")
+
+
+def test_the_trace_is_that_of_the_command(tmp_path: Path) -> None:
+    assert main(["run", str(SAMPLE), "-q", "--trace", str(tmp_path / "trace.md")]) == 0
+    assert photostrip.run(SAMPLE).trace("md") == (tmp_path / "trace.md").read_text(encoding="utf-8")
