@@ -14,6 +14,7 @@ them: each is printed, or refused with the name of its file, and no control char
 
 from __future__ import annotations
 
+import argparse
 import resource
 import sys
 import tempfile
@@ -35,9 +36,8 @@ MEMORY_MB = 600  # of the process, with all cases one after the other
 SHOWN = 10
 
 
-def edited_results(arguments: list[str]) -> int:
+def edited_results(number: int, seed: int) -> int:
     """Give edited results to ``report`` and ``compare``, and print how many ended as they must not."""
-    number, seed = (int(each) for each in (*arguments, *(str(each) for each in (RESULTS, SEED)[len(arguments) :])))
     begin = time.perf_counter()
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as place:
@@ -51,13 +51,22 @@ def edited_results(arguments: list[str]) -> int:
     return 1 if wrong else 0
 
 
-def main(arguments: list[str]) -> int:
+def main() -> int:
+    """Read what is asked."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("what", nargs="*", metavar="[blocks|results] CASES SEED", help="projects of strips where "
+                        f"neither is named; {CASES} cases ({RESULTS} results), seed {SEED}")  # fmt: skip
+    what = parser.parse_args().what
+    kind = what.pop(0) if what[:1] in (["blocks"], ["results"]) else ""
+    if len(what) > 2 or not all(each.isdecimal() for each in what):
+        parser.error("numbers are wanted: cases and seed")
+    numbers = [int(each) for each in what]
+    number, seed = [*numbers, *(RESULTS if kind == "results" else CASES, SEED)[len(numbers) :]]
+    return edited_results(number, seed) if kind == "results" else damaged_projects(number, seed, of_blocks=bool(kind))
+
+
+def damaged_projects(number: int, seed: int, *, of_blocks: bool) -> int:
     """Try the cases and print the table."""
-    if arguments[:1] == ["results"]:
-        return edited_results(arguments[1:])
-    of_blocks = arguments[:1] == ["blocks"]
-    arguments = arguments[of_blocks:]
-    number, seed = (int(each) for each in (*arguments, *(str(each) for each in (CASES, SEED)[len(arguments) :])))
     codes: Counter[tuple[str, int]] = Counter()
     seconds: list[float] = []
     wrong: list[str] = []
@@ -88,4 +97,4 @@ def main(arguments: list[str]) -> int:
 
 if __name__ == "__main__":
     warnings.simplefilter("error")  # a warning on the user's terminal would be one more surprise
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

@@ -76,9 +76,7 @@ class Project:
         return self._passes(before), self._passes(after)
 
     def _passes(self, findings: Sequence[Finding]) -> bool:
-        named: dict[str, set[str]] = {}
-        for each in findings:
-            named.setdefault(each.code, set()).update(each.names)
+        named = plausibility.by_code(findings)
         if self.mistake is None:
             return not set(named) - self.allowed
         return plausibility.is_found(named, self.mistake, self.ids)

@@ -1,21 +1,23 @@
 """How often the gate finds a planted mistake, and how often it finds one where there is none.
 
-Run it as ``python benchmarks/plausibility.py [strips] [strips without a mistake] [their first seed] [words]``; words
-choose among the mistakes, ``-v`` names every failure. Short simulated strips of all kinds
+Short simulated strips of all kinds
 (film and digital cameras, 4 to 8 photos, end laps of 58 to 80 %, any azimuth and turn of the photos, flat and hilly
 ground, projected, geographic, geocentric and local frames, few and many control points in several layouts, measured
 well and badly) are examined as they are, and with one mistake each. A mistake counts where its effect is larger than
 three times what noise does; what that is stands beside each kind.
+
+Usage: python benchmarks/plausibility.py [STRIPS] [SOUND] [FIRST SEED OF THE SOUND] [WORD ...] [--first SEED] [-v]
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,15 +29,29 @@ from photostrip.geometry.rotation import angles, from_angles
 from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.pipeline.plausibility import gate
-from photostrip.simulation import DIGITAL, FILM, Control, Film, Flight, GrossError, Ground, Image, Points, Spec, Terrain
+from photostrip.simulation import (
+    DIGITAL,
+    FILM,
+    Control,
+    Film,
+    Flight,
+    GrossError,
+    Ground,
+    Image,
+    Models,
+    Points,
+    Spec,
+    Terrain,
+)
 from photostrip.simulation.simulation import simulate
 from photostrip.triangulation.plausibility import KINDS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
+    from photostrip.notes import Finding
     from photostrip.pipeline import Inputs, Settings
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.simulation.simulation import Simulation
@@ -43,6 +59,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 FOOT = 0.3048
+FIRST_SEED = 100_000  # before the planted mistakes
 GROSS_SHARE = 0.2  # of the strips without a mistake have two gross errors of image coordinates, which are none of these
 THIRD, HALF, LINE = 0.3, 0.55, 0.03  # of the length of the strip; of its half breadth
 EVEN = 0.5
@@ -87,8 +104,11 @@ class Case:
     @property
     def noise(self) -> tuple[float, float]:
         """Standard deviation of a point of one model in plan and height with that of the control, metres."""
-        plan = self.spec.image.sigma_um * 1e-6 * self.spec.scale
-        height = plan * np.sqrt(2.0) * self.spec.flying_height / self.spec.base
+        if self.spec.models is not None:
+            plan, height = (self.spec.models.sigma_um[axis] * 1e-6 * self.spec.scale for axis in (0, 2))
+        else:
+            plan = self.spec.image.sigma_um * 1e-6 * self.spec.scale
+            height = plan * np.sqrt(2.0) * self.spec.flying_height / self.spec.base
         return float(np.hypot(plan, self.spec.control.sigma[0])), float(np.hypot(height, self.spec.control.sigma[2]))
 
 
@@ -124,6 +144,22 @@ def block(seed: int) -> Case:
             continue
         return Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
     raise SystemExit(f"no block can be made of seed {seed}")
+
+
+def of_models(seed: int) -> Case:
+    """Simulate a strip of 6 to 40 independent models, without a mistake."""
+    rng = np.random.default_rng([10, seed])
+    for attempt in range(20):
+        spec = drawn(rng, seed * 20 + attempt)
+        flight = replace(spec.flight, photos=int(rng.integers(7, 42)))
+        control = replace(spec.control, layout="bands", every=int(rng.integers(3, 16)), use={"xyz": 1.0})
+        spec = replace(spec, flight=flight, control=control, models=Models(), gross_errors=())
+        try:
+            simulation = simulate(spec)
+        except InputError:
+            continue
+        return Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
+    raise SystemExit(f"no models can be made of seed {seed}")
 
 
 def holds_both_ends(case: Case) -> bool:
@@ -593,7 +629,9 @@ def slip_of_a_digit(case: Case, *, check: bool) -> Planted | None:
     control = case.inputs.control
     if kind_of(case) in {"geocentric", "geographic"} or not enough(case, 8):
         return None
-    seen = np.isin(control.ids, case.inputs.observations.point_ids) & control.use.all(axis=1) & (control.check == check)
+    models = case.inputs.models
+    measured = case.inputs.observations.point_ids if models is None else models.points.point_ids
+    seen = np.isin(control.ids, measured) & control.use.all(axis=1) & (control.check == check)
     if not seen.any():
         return None
     row, axis = int(case.rng.choice(np.flatnonzero(seen))), int(case.rng.integers(3))
@@ -887,6 +925,7 @@ MISTAKES = (
     Mistake("heights in feet, plan in metres", heights_in_feet, ("P405",)),
     Mistake("slip of a digit, control", lambda case: slip_of_a_digit(case, check=False), ("P406",)),
     Mistake("slip of a digit, check point", lambda case: slip_of_a_digit(case, check=True), ("P406",)),
+    Mistake("slip of a digit, models", lambda case: slip_of_a_digit(case, check=False), ("P406",), of_models),
     Mistake("two control points exchanged", exchanged, ("P408",)),
     Mistake("control at one end", at_one_end, ("P501",)),
     Mistake("control on one line", on_one_line, ("P502",)),
@@ -896,23 +935,34 @@ MISTAKES = (
 )
 
 
-def told(inputs: Inputs, settings: Settings) -> tuple[dict[str, set[str]], dict[str, set[str]]]:
-    """Give codes with the ids that they name: what `check` tells, and what `run` tells."""
+class Told(NamedTuple):
+    """What `check` and `run` tell: codes with the ids that they name."""
+
+    before: dict[str, set[str]]
+    after: dict[str, set[str]]
+    refusal: str  # why there is no result; nothing where there is one
+
+
+def told(inputs: Inputs, settings: Settings) -> Told:
+    """Say what `check` tells, and what `run` tells."""
+    refusal = ""
     try:
         findings = triangulate(inputs, settings).findings
     except PhotostripError as error:
-        findings = error.findings
+        findings, refusal = error.findings, str(error)
     try:
         before = gate.of_inputs(inputs, settings)
     except PhotostripError:
         before = ()
-    both = []
-    for each in (before, findings):
-        named: dict[str, set[str]] = {}
-        for finding in each:
-            named.setdefault(finding.code, set()).update(finding.names)
-        both.append(named)
-    return both[0], both[1]
+    return Told(by_code(before), by_code(findings), refusal)
+
+
+def by_code(findings: Iterable[Finding]) -> dict[str, set[str]]:
+    """Give the codes of findings with the ids that they name."""
+    named: dict[str, set[str]] = {}
+    for each in findings:
+        named.setdefault(each.code, set()).update(each.names)
+    return named
 
 
 def is_found(named: dict[str, set[str]], mistake: Mistake, ids: frozenset[str]) -> bool:
@@ -920,53 +970,58 @@ def is_found(named: dict[str, set[str]], mistake: Mistake, ids: frozenset[str]) 
     return any(code in named and (not ids or ids & named[code]) for code in mistake.codes)
 
 
-def false_alarms(strips: int, first: int) -> int:
+def false_alarms(strips: int, first: int, *, verbose: bool) -> None:
     """Examine strips without a mistake and print what was told."""
     alarms: Counter[str] = Counter()
     wrong = 0
     for seed in range(first, first + strips):
         case = sound(seed)
-        before, after = told(case.inputs, case.settings)
-        named = before | after
+        found = told(case.inputs, case.settings)
+        named = found.before | found.after
         wrong += bool(named)
         alarms.update(list(named))
-        if named and "-v" in sys.argv:
+        if named and verbose:
             print("  alarm", seed, named, case.spec)
     print(f"{strips} strips without a mistake: {wrong} with a finding, {100 * wrong / strips:.2f} %")
     for code, count in sorted(alarms.items()):
         print(f"  {code} {KINDS[code].title}: {count}")
-    return wrong
 
 
 def main() -> None:
     """Print both tables."""
-    numbers = [int(each) for each in sys.argv[1:] if each.isdecimal()]
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    what = "strips of each mistake (100), strips without one (1000) and their first seed (0), words of mistakes' names"
+    parser.add_argument("what", nargs="*", metavar="STRIPS SOUND SEED WORD", help=what)
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="seed before that of the first planted mistake")
+    parser.add_argument("-v", action="store_true", dest="verbose", help="name every failure")
+    asked = parser.parse_args()
+    numbers = [int(each) for each in asked.what if each.isdecimal()]
     strips, without, first = (numbers + [100, 1000, 0][len(numbers) :])[:3]
-    only = [each for each in sys.argv[1:] if not each.isdecimal() and each != "-v"]
+    words = [each for each in asked.what if not each.isdecimal()]
     if without:
-        false_alarms(without, first)
+        false_alarms(without, first, verbose=asked.verbose)
     print(f"{'mistake':<44} {'code':<10} {'strips':>6} {'check':>7} {'run':>7}")
     for mistake in MISTAKES:
-        if not only or any(each in mistake.name for each in only):
-            row(mistake, strips)
+        if not words or any(each in mistake.name for each in words):
+            row(mistake, strips, asked.first, verbose=asked.verbose)
 
 
-def row(mistake: Mistake, strips: int) -> None:
+def row(mistake: Mistake, strips: int, first: int, *, verbose: bool) -> None:
     """Plant one mistake in many strips and print how often it was found."""
-    done, by_check, by_run, seed = 0, 0, 0, 100_000
-    while done < strips and seed < 100_000 + 12 * strips:
+    done, by_check, by_run, seed = 0, 0, 0, first
+    while done < strips and seed < first + 12 * strips:
         seed += 1
         case = mistake.make(seed)
         planted = mistake.plant(case)
         if planted is None:
             continue
         inputs, ids = planted
-        before, after = told(inputs, mistake.settings(case))
+        found = told(inputs, mistake.settings(case))
         done += 1
-        by_check += is_found(before, mistake, ids)
-        by_run += is_found(after, mistake, ids)
-        if not is_found(after, mistake, ids) and "-v" in sys.argv:
-            print("  missed", seed, sorted(ids), after, case.spec)
+        by_check += is_found(found.before, mistake, ids)
+        by_run += is_found(found.after, mistake, ids)
+        if not is_found(found.after, mistake, ids) and verbose:
+            print("  missed", seed, sorted(ids), found.after, case.spec)
     share = [f"{100 * each / max(done, 1):.1f} %" for each in (by_check, by_run)]
     print(f"{mistake.name:<44} {'/'.join(mistake.codes):<10} {done:>6} {share[0]:>7} {share[1]:>7}", flush=True)
 

@@ -6,6 +6,7 @@ three gross errors of forty standard deviations in y.
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 import tempfile
@@ -121,9 +122,11 @@ def bare(project: str, preset: str) -> str:
     return "\n".join([*kept, f"extends: {CONFIGS / preset}.yaml"]) + "\n"
 
 
-def main(arguments: list[str]) -> int:
+def main() -> None:
     """Print the table."""
-    seeds = int(arguments[0]) if arguments else SEEDS
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("seeds", type=int, nargs="?", default=SEEDS, help=f"strips of each preset (default {SEEDS})")
+    seeds = parser.parse_args().seeds
     print("preset          screening        gross errors  found  good points lost  sigma0  check plan")
     for preset in KINDS:
         for screening in ("of the preset", "auto", "parallax+grubbs", "tau"):
@@ -133,8 +136,7 @@ def main(arguments: list[str]) -> int:
             sigma0, check = (sum(getattr(row, name) for row in rows) / seeds for name in ("sigma0", "check_um"))
             print(f"{preset:<14}  {screening:<15}  {wrong:12d}  {found:5d}  {lost:16d}  {sigma0:6.2f}  {check:10.1f}")
     print("sigma0 and check plan (rms, at photo scale) in units of the standard deviation of an image coordinate")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main()

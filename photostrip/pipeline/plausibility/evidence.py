@@ -193,22 +193,30 @@ def _rays(formed: EvidenceStrip, observations: PhotoPoints, name: str) -> Rays:
     )
 
 
-def stretches(rows: Numbers, on_strip: StripPoints) -> Iterator[tuple[Numbers, StripPoints]]:
+def stretches(
+    rows: Numbers,
+    on_strip: StripPoints,
+    *,
+    longest: int = LONG_STRIP,
+    photos: int = STRETCH_PHOTOS,
+    most: int = STRETCHES,
+) -> Iterator[tuple[Numbers, StripPoints]]:
     """Cut a long strip into stretches that no low polynomial need bend far.
 
-    A strip of up to 40 photos is one stretch; of a longer one four of 30 photos, evenly spread, are given: the rows of
-    the given points (some of `rows`, which belong to `on_strip`) with the same points in the strip.
+    longest: photos of a strip that is one stretch; of a longer one stretches of `photos` photos, evenly spread and
+        `most` at most, are given: the rows of the given points (some of `rows`, which belong to `on_strip`) with the
+        same points in the strip.
     """
-    photos = len(on_strip.centers)
-    if photos <= LONG_STRIP:
+    length = len(on_strip.centers)
+    if length <= longest:
         yield rows, on_strip
         return
     up = on_strip.axes.mean(axis=0)
     points, centers = (each - np.outer(each @ up, up) for each in (on_strip.xyz, on_strip.centers))
     near = _nearest(points, centers)
-    count = min(STRETCHES, photos // STRETCH_PHOTOS)
-    for start in np.unique(np.linspace(0, photos - STRETCH_PHOTOS, count).astype(np.intp)).tolist():
-        part = slice(start, start + STRETCH_PHOTOS)
+    count = min(most, length // photos)
+    for start in np.unique(np.linspace(0, length - photos, count).astype(np.intp)).tolist():
+        part = slice(start, start + photos)
         inside = (near >= part.start) & (near < part.stop)
         axes, centers = on_strip.axes[part], on_strip.centers[part]
         yield rows[inside], replace(on_strip, xyz=on_strip.xyz[inside], axes=axes, centers=centers)

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import Result, StripResult
     from photostrip.points import PhotoPoints
 
+STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give
 OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
 
 
@@ -66,8 +67,11 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     if inputs.models is not None:
         of_models = _of_models(inputs, inputs.models, settings, directory)
         given = _given_control(inputs, directory)
-        confirmed = of_models if given is None else slips.confirmed(of_models, slips.predict(result), given)
-        return accepted(confirmed, settings.accept)
+        if given is not None and result.precision is not None:
+            predicted = slips.predict(result)
+            of_models = [each for each in of_models if each.code != slips.CODE]
+            of_models += slips.of_models(result, inputs.models, predicted, given)
+        return accepted(of_models, settings.accept)
     points = result.refined.observations
     photo = PhotoCoordinates(result.measured, result.interior)
     images = replace(of_images(inputs, settings, photo), observations=points)
@@ -171,7 +175,10 @@ def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, direc
         return []
     findings = [*control.findings]
     for held in model_evidence.model_strips(models, control.points, settings):
-        findings += control.compared(held.rows, held.on_strip).findings
+        for part in evidence.stretches(
+            held.rows, held.on_strip, longest=STRETCH_MODELS, photos=STRETCH_MODELS, most=len(held.photos)
+        ):
+            findings += control.compared(*part).findings
         findings += flight.find_odd_centers(held.centers, held.depth, model_evidence.UP, held.photos, held.strip.id)
         findings += control_layout.weak_layout_of_models(held, control)
     return [finding for finding in findings if finding.code not in OF_CAMERAS]

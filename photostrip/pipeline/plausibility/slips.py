@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats
     from photostrip.notes import Finding
+    from photostrip.pipeline.inputs import MeasuredModels
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.plausibility.given_control import GivenControl
     from photostrip.pipeline.results import Result
@@ -47,6 +48,19 @@ class Predicted:
         """Given points (c,) whose coordinates `use` (c, 3) the adjustment predicts, or tested and kept."""
         near = np.abs(self.off) <= LIMIT * self.sigma
         return np.asarray((self.sound | near | ~use).all(axis=1))
+
+    def spread(self, row: int, axis: int) -> float:
+        """Give the standard deviation of a difference, larger where the others are predicted worse than by theirs."""
+        columns = [2] if axis == control_slips.HEIGHT else [0, 1]
+        ratio = np.abs(np.delete(self.off, row, axis=0) / np.delete(self.sigma, row, axis=0))[:, columns]
+        known = ratio[np.isfinite(ratio)]
+        excess = max(SIGMA_FROM_MEDIAN * float(np.median(known)), 1.0) if len(known) >= LEAST_OTHERS else 1.0
+        return float(self.sigma[row, axis]) * excess
+
+    def stands_out(self, row: int, axis: int) -> bool:
+        """Whether a coordinate that took no part is off by more than chance."""
+        off = float(np.abs(self.off[row, axis]))
+        return bool(not self.sound[row, axis] and off > LIMIT * self.spread(row, axis))
 
 
 def fits_measurements(result: Result) -> bool:
@@ -102,29 +116,37 @@ def _screened(result: Result) -> bool:
     return (settings.links if result.model_strips else settings.relative).screening != "none"
 
 
+def of_models(result: Result, models: MeasuredModels, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
+    """Give the slips of given points that stand out against the adjustment of models, in one coordinate.
+
+    The strip bends more than the gate could take out: it is not asked.
+    """
+    for strip in result.model_strips:
+        held = rows_of_given(control.points.ids, strip.formed.point, models.points.point_ids) >= 0
+        for row in np.flatnonzero(held).tolist():
+            odd = [axis for axis in range(3) if predicted.stands_out(row, axis)]
+            if len(odd) == 1 and (slip := _slip(row, odd[0], strip.strip.id, predicted, control)) is not None:
+                yield slip
+
+
 def _confirmed(finding: Finding, row: int, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
     """Test a slip by a prediction; it stands as it is where the adjustment has none."""
     axis = AXES.index(str(finding.evidence["axis"]))
-    off, sigma = float(predicted.off[row, axis]), float(predicted.sigma[row, axis])
     if predicted.sound[row, axis]:
         return
-    if not np.isfinite(off * sigma):
+    if not np.isfinite(predicted.off[row, axis] * predicted.sigma[row, axis]):
         yield finding
         return
-    given = given_points.level(control.points.take([row]), control.frames, as_written=control.as_written)
-    if given is None:
-        yield finding
-        return
-    spread = sigma * _excess(predicted, row, axis)
-    found = control_slips.slip_in(given, 0, axis, off, (spread, LIMIT * spread), finding.strips[0])
+    found = _slip(row, axis, finding.strips[0], predicted, control)
     if found is not None:
         doubt = control_slips.DOUBT if control_slips.DOUBT in finding.message else ""
         yield replace(found, message=f"{found.message}{doubt}")
 
 
-def _excess(predicted: Predicted, row: int, axis: int) -> float:
-    """How many times worse than their standard deviations the other coordinates are predicted, in plan or in height."""
-    columns = [2] if axis == control_slips.HEIGHT else [0, 1]
-    ratio = np.abs(np.delete(predicted.off, row, axis=0) / np.delete(predicted.sigma, row, axis=0))[:, columns]
-    known = ratio[np.isfinite(ratio)]
-    return max(SIGMA_FROM_MEDIAN * float(np.median(known)), 1.0) if len(known) >= LEAST_OTHERS else 1.0
+def _slip(row: int, axis: int, strip: str, predicted: Predicted, control: GivenControl) -> Finding | None:
+    """Name the slip that explains by how much a coordinate is off; None when none does."""
+    given = given_points.level(control.points.take([row]), control.frames, as_written=control.as_written)
+    if given is None:
+        return None
+    spread = predicted.spread(row, axis)
+    return control_slips.slip_in(given, 0, axis, float(predicted.off[row, axis]), (spread, LIMIT * spread), strip)

@@ -12,7 +12,7 @@ from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.plausibility.given_control import GivenControl
-from photostrip.simulation import FILM, Control, Flight, Gnss, Ground, Image, Points, Spec, Terrain, simulate
+from photostrip.simulation import FILM, Control, Flight, Gnss, Ground, Image, Models, Points, Spec, Terrain, simulate
 from tests.pipeline.blocks import orientations, positions, with_control
 
 if TYPE_CHECKING:
@@ -48,6 +48,25 @@ def test_the_bend_of_a_long_strip_is_no_stretch_of_its_heights(photos: int, came
     )
     made = simulate(spec)
     assert told(inputs_of(made), settings_of(made)) == []
+
+
+def test_the_bend_of_a_long_strip_of_models_is_no_slip() -> None:
+    spec = Spec(seed=1, flight=Flight(photos=50), control=Control(every=8, per_band=3), models=Models())
+    inputs = inputs_of(simulate(spec))
+    assert told(inputs, Settings()) == []
+
+
+@pytest.mark.parametrize(("name", "off"), [("G05", -20.0), ("K02", 20.0)])
+def test_a_slip_stands_out_against_the_adjustment_of_models(name: str, off: float) -> None:
+    """In a strip that bends by metres: one digit of a control point, and of a check point."""
+    spec = Spec(seed=1, flight=Flight(photos=50), control=Control(every=8, per_band=3), models=Models())
+    inputs = inputs_of(simulate(spec))
+    row = inputs.control.ids.index(name)
+    step = np.outer(np.arange(len(inputs.control)) == row, [off, 0.0, 0.0])
+    wrong = replace(inputs, control=replace(inputs.control, enu=inputs.control.enu + step))
+    (finding,) = triangulate(wrong, Settings()).findings
+    assert (finding.code, finding.points, finding.evidence["axis"]) == ("P406", (name,), "east")
+    assert abs(float(finding.evidence["would_fit"]) - inputs.control.enu[row, 0]) < 1e-6
 
 
 @pytest.mark.slow
