@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,13 +24,22 @@ import numpy as np  # noqa: E402
 
 from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.pipeline.strips.screened_formation import form_screened  # noqa: E402
+from photostrip.planning.screening import (  # noqa: E402
+    PairLayout,
+    ScreeningSpec,
+    rejected,
+    screened,
+    screening_experiment,
+    spoiled,
+    standard_pairs,
+)
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Flight, GrossError, Points, Spec  # noqa: E402
 from photostrip.statistics import chi2_quantile  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
-from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs  # noqa: E402
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes  # noqa: E402
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings  # noqa: E402
 from photostrip.triangulation.strip_formation.strip import form_from_pairs  # noqa: E402
@@ -41,15 +50,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Inputs
+    from photostrip.planning.screening import MethodOutcome
+    from photostrip.triangulation.relative_orientation.pairs import Pairs
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
-FOCAL, SIDE, SCATTER = 100.0, 65.0, 6.0  # mm: principal distance, a = b of the standard positions, their scatter
-SIGMA_Q = 0.01  # mm, of a y parallax
-MODELS, COUNTS, SECOND = 34, (2, 2, 3, 3, 3, 3), 10  # models, points of the zones 1-6, models with a second error
-SIZES = (0.1, 0.2, 0.3, 0.4, 0.5)  # mm
-SOURCE_LIKE = RelativeSettings(screening="parallax+grubbs", grubbs_alpha=0.05, parallax_limit=0.20)
+PUBLISHED = ScreeningSpec()
+MODELS, COUNTS, SIGMA_Q = PUBLISHED.models, PUBLISHED.layout.counts, PUBLISHED.layout.parallax_sigma
+SOURCE_LIKE = PUBLISHED.settings("parallax+grubbs")
 GROWTH = (300, 1000, 3000)  # photos
 REPEATED = 15  # measurements of a time
 REFERENCE = "reference R3            51.9     41.7      6.4      1.1"
@@ -58,117 +67,15 @@ POWER_BOUND = (
 )
 
 
-def standard_pairs(rng: np.random.Generator, models: int, counts: Sequence[int] = COUNTS) -> Pairs:
-    """Pairs of the published design: six standard zones, tilts of 2 degrees, relief of a tenth of the height."""
-    centers = np.array([[0, 0], [SIDE, 0], [0, SIDE], [SIDE, SIDE], [0, -SIDE], [SIDE, -SIDE]])
-    n = sum(counts)
-    nadir = np.repeat(centers, counts, axis=0) + rng.uniform(-SCATTER, SCATTER, (models, n, 2))
-    depth = 1 + rng.uniform(-0.1, 0.1, (models, n))
-    ground = np.concatenate([nadir * depth[..., None], -FOCAL * depth[..., None]], axis=2)
-    sides = []
-    for base in (0.0, SIDE):
-        turn = _rotations(np.radians(rng.uniform(-2, 2, (models, 3))))
-        ray = np.einsum("pni,pij->pnj", ground - np.array([base, 0.0, 0.0]), turn)
-        sides.append((-FOCAL * ray[..., :2] / ray[..., 2:]).reshape(-1, 2))
-    sides[0][:, 1] += rng.normal(0, SIGMA_Q, models * n)
-    number = np.repeat(np.arange(models), n)
-    rows = np.arange(models * n)
-    return Pairs(
-        starts=np.arange(models) * n,
-        pair=number,
-        left=sides[0],
-        right=sides[1],
-        weight=np.ones(models * n),
-        focal=FOCAL,
-        point=rows,
-        rows=np.column_stack([rows, rows]),
-    )
-
-
-def _rotations(angles: Floats) -> Floats:
-    """Rotations from small angles about x, y and z."""
-    result = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
-    for axis in range(3):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        turn = np.tile(np.eye(3), (len(angles), 1, 1))
-        turn[:, i, i] = turn[:, j, j] = np.cos(angles[:, axis])
-        turn[:, i, j], turn[:, j, i] = -np.sin(angles[:, axis]), np.sin(angles[:, axis])
-        result = result @ turn
-    return result
-
-
-def spoiled(pairs: Pairs, errors: Floats) -> Pairs:
-    """Give pairs with errors added to the y parallaxes."""
-    left = pairs.left.copy()
-    left[:, 1] += errors
-    return replace(pairs, left=left)
-
-
-def screened(pairs: Pairs, settings: RelativeSettings, of_strip: int) -> list[screening.ScreenedPairs]:
-    """Orient and screen pairs, so many of them as one strip; photos have no names here."""
-    strips = [np.arange(of_strip) + of_strip * number for number in range(pairs.size // of_strip)]
-    oriented, converged = orient_unchecked(pairs)
-    sigma = SIGMA_Q / np.sqrt(2.0)
-    return [screening.screen_pairs(oriented.take(rows), settings, sigma, converged[rows]) for rows in strips]
-
-
-def rejected(results: Sequence[screening.ScreenedPairs]) -> Flags:
-    """Points that strips have lost, shape (strips, points)."""
-    return np.array([~result.orientation.used for result in results])
-
-
-# ------------------------------------------------------------------------------------- the published experiment
-
-
-@dataclass(frozen=True)
-class Rates:
-    """Shares of the injected errors in per cent, and good points lost for every 44 errors."""
-
-    parallax: float
-    second: float
-    missed: float
-    lost: float
-
-    def __str__(self) -> str:
-        """Give one row of the table."""
-        return f"{self.parallax:9.1f}{self.second:9.1f}{self.missed:9.1f}{self.lost:9.2f}"
-
-
-def experiment_errors(rng: np.random.Generator, repetitions: int) -> Floats:
-    """Errors of one repetition after the other: one a model and a second one in ten models."""
-    n = sum(COUNTS)
-    errors = np.zeros((repetitions * MODELS, n))
-    for repetition in range(repetitions):
-        twice = set(rng.permutation(MODELS)[:SECOND].tolist())
-        for model in range(MODELS):
-            rows = rng.permutation(n)[: 1 + (model in twice)]
-            errors[repetition * MODELS + model, rows] = rng.choice(SIZES, len(rows)) * rng.choice([-1, 1], len(rows))
-    return errors.ravel()
-
-
-def rates(results: Sequence[screening.ScreenedPairs], errors: Floats) -> Rates:
-    """Count what was found, by stage, and what was lost."""
-    first = np.zeros((len(results), errors.shape[1]), bool)
-    for number, result in enumerate(results):
-        first[number, [r.row for r in result.rejections if r.test == "parallax"]] = True
-    wrong, out = errors != 0, rejected(results)
-    total = float(wrong.sum())
-    at_first, later, missed = (
-        100 * float(part.sum()) / total for part in (wrong & first, wrong & out & ~first, wrong & ~out)
-    )
-    return Rates(at_first, later, missed, 44 * float((out & ~wrong).sum()) / total)
-
-
-def published_experiment(repetitions: int, seed: int = 1) -> dict[str, Rates]:
+def published_experiment(repetitions: int) -> dict[str, MethodOutcome]:
     """Repeat the published experiment with every method, each repetition of 34 models as one strip."""
-    rng = np.random.default_rng(seed)
-    pairs = standard_pairs(rng, repetitions * MODELS)
-    errors = experiment_errors(rng, repetitions)
-    given = spoiled(pairs, errors)
-    methods = {"parallax+grubbs": SOURCE_LIKE}
-    methods |= {name: RelativeSettings(screening=name) for name in ("tau", "robust", "deletion", "auto")}
-    found = {name: screened(given, settings, MODELS) for name, settings in methods.items()}
-    return {name: rates(results, errors.reshape(repetitions, -1)) for name, results in found.items()}
+    found = screening_experiment(ScreeningSpec(repetitions=repetitions))
+    return {each.method: each for each in found.methods}
+
+
+def searched(pairs: Pairs, settings: RelativeSettings, of_strip: int) -> list[screening.ScreenedPairs]:
+    """Orient and search pairs, so many of them as one strip."""
+    return screened(pairs, settings, of_strip, SIGMA_Q)
 
 
 # ------------------------------------------------------------------------------------------------ masked errors
@@ -214,14 +121,14 @@ def masked_errors(models: int, seed: int = 2) -> list[str]:
     ):
         counts = [3] * 6
         counts[zone - 1] = points
-        pairs = standard_pairs(rng, models, counts)
+        pairs = standard_pairs(rng, models, PairLayout(counts=tuple(counts)))
         errors = np.zeros((models, sum(counts)))
         errors[:, sum(counts[: zone - 1]) :][:, :2] = sizes
         can = decidable(pairs, errors.ravel())
         row = f"{zone:4d}{points:8d}   {sizes[0]:+.1f} {sizes[1]:+.1f}{100 * can.mean():11.1f}"
         for method in ("parallax+grubbs", "tau", "auto"):
             settings = SOURCE_LIKE if method == "parallax+grubbs" else RelativeSettings(screening=method)
-            out = rejected(screened(spoiled(pairs, errors.ravel()), settings, 1))
+            out = rejected(searched(spoiled(pairs, errors.ravel()), settings, 1))
             both = (out & (errors != 0)).sum(axis=1) == 2
             row += f"{100 * both[can].mean() if can.any() else float('nan'):12.1f}"
         lost = (out & (errors == 0)).sum(axis=1).mean()
@@ -240,12 +147,12 @@ def many_errors(models: int, seed: int = 3) -> list[str]:
         n = sum(counts)
         for share in (0.1, 0.2, 0.3):
             for low, high in ((0.05, 0.5), (0.5, 50.0)):
-                pairs = standard_pairs(rng, models, counts)
+                pairs = standard_pairs(rng, models, PairLayout(counts=tuple(counts)))
                 order = rng.permuted(np.tile(np.arange(n), (models, 1)), axis=1)
                 wrong = order < round(share * n)
                 sizes = np.exp(rng.uniform(np.log(low), np.log(high), wrong.shape)) * rng.choice([-1, 1], wrong.shape)
                 errors = np.where(wrong, sizes, 0.0)
-                results = screened(spoiled(pairs, errors.ravel()), RelativeSettings(), 1)
+                results = searched(spoiled(pairs, errors.ravel()), RelativeSettings(), 1)
                 out = rejected(results)
                 found = 100 * (out & wrong).sum() / wrong.sum()
                 lost = 100 * (out & ~wrong).sum() / (~wrong).sum()
@@ -259,10 +166,10 @@ def many_errors(models: int, seed: int = 3) -> list[str]:
 def clean_pairs(strips: int, seed: int = 4) -> list[str]:
     """Count false alarms in strips without gross errors."""
     rng = np.random.default_rng(seed)
-    pairs = standard_pairs(rng, MODELS * strips)
+    pairs = standard_pairs(rng, MODELS * strips, PairLayout())
     lines = []
     for name in ("parallax+grubbs", "tau", "robust", "deletion", "auto"):
-        out = rejected(screened(pairs, RelativeSettings(screening=name), MODELS))
+        out = rejected(searched(pairs, RelativeSettings(screening=name), MODELS))
         touched = out.any(axis=1).mean(), out.reshape(pairs.size, -1).any(axis=1).mean(), out.mean()
         lines.append(f"{name:16s}" + "".join(f"{100 * share:16.3f}" for share in touched))
     return lines
@@ -273,7 +180,7 @@ def times(pairs_of_strip: int = 999, points: int = 30, seed: int = 5) -> list[st
     rng = np.random.default_rng(seed)
     lines = []
     for share in (0.0, 0.05):
-        pairs = standard_pairs(rng, pairs_of_strip, (points // 6,) * 6)
+        pairs = standard_pairs(rng, pairs_of_strip, PairLayout(counts=(points // 6,) * 6))
         m = len(pairs.pair)
         wrong = rng.random(m) < 2 * share  # each point stands on two photos
         errors = np.where(wrong, np.exp(rng.uniform(np.log(5 * SIGMA_Q / np.sqrt(2)), np.log(50), m)), 0.0)
@@ -358,7 +265,8 @@ def print_all(repetitions: int) -> None:
     print(f"Published experiment, 34 models x 16 points, 44 errors of 0.1-0.5 mm, {repetitions} repetitions")
     print("method          parallax %   later % missed % good lost per 44 errors")
     for name, row in published_experiment(repetitions).items():
-        print(f"{name:19s}{row}")
+        shares = "".join(f"{100 * share:9.1f}" for share in (row.parallax, row.later, row.missed))
+        print(f"{name:19s}{shares}{44 * row.lost:9.2f}")
     print(REFERENCE)
     print("\nTwo errors in one zone of a single pair, three points in every other: both found, % of the decidable")
     print(f"(decidable: without noise every other set of up to two points leaves a sum of squares of {POWER_BOUND:g};")

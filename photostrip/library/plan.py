@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from photostrip.result.numbers import Document
 
-PlanKind = Literal["model", "strip", "camera", "displacement"]
+PlanKind = Literal["model", "strip", "camera", "displacement", "screening"]
 
 
 class Plan:
@@ -41,7 +41,7 @@ def plan(
     specification: str | PathLike[str] | Mapping[str, Any] | None = None,
     **overrides: Any,  # noqa: ANN401 (values of a plan)
 ) -> Plan:
-    """Compute a plan, as ``photostrip plan model``, ``strip``, ``camera`` or ``displacement`` does.
+    """Compute a plan, as ``photostrip plan model``, ``strip``, ``camera``, ``displacement`` or ``screening`` does.
 
     specification: a file, or its content as a mapping; without one the overrides say all.
     overrides: keys with other values: ``plan("model", end_lap_percent=70, control={"layout": "six"})``.
@@ -86,5 +86,12 @@ def _document(kind: str, path: Path | None, assignments: Sequence[str]) -> Docum
 
             survey = load_displacement_plan(path, assignments)
             return displacement_document(survey.name, survey.spec)
-    message = f"there is no plan {kind!r}: model, strip, camera or displacement"
+        case "screening":
+            from photostrip.formats.output.plans.screening import screening_document
+            from photostrip.planning.screening import screening_experiment
+            from photostrip.project.plans.screening import load_screening_plan
+
+            experiment = load_screening_plan(path, assignments)
+            return screening_document(experiment.name, screening_experiment(experiment.spec))
+    message = f"there is no plan {kind!r}: model, strip, camera, displacement or screening"
     raise ValueError(message)

@@ -52,6 +52,7 @@ def test_a_simulation_needs_no_files(tmp_path: Path) -> None:
         ("strip", {"models": 8}, ["--models", "8"]),
         ("displacement", {"camera": "UMK 10/1318", "base": 30, "distances": [50]},
          ["--camera", "UMK 10/1318", "--base", "30", "--distances", "50"]),
+        ("screening", {"repetitions": 1, "methods": ["auto"]}, ["--repetitions", "1", "--methods", "auto"]),
     ],
 )  # fmt: skip
 def test_plans_are_those_of_the_command(

@@ -13,7 +13,7 @@ def schema(
         bool, typer.Option("--simulation", help="The specification of `photostrip simulate` instead.")
     ] = False,
     plan: Annotated[
-        Literal["model", "strip", "camera", "displacement"] | None,
+        Literal["model", "strip", "camera", "displacement", "screening"] | None,
         typer.Option("--plan", help="The file of this command of `photostrip plan` instead."),
     ] = None,
     tolerances: Annotated[

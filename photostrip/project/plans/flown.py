@@ -31,6 +31,7 @@ NUMBER_KEYS = {
     "photostrip_plan_strip",
     "photostrip_plan_cameras",
     "photostrip_plan_displacement",
+    "photostrip_plan_screening",
 }
 OVERLAP = Range(1.0, 99.0, "%")
 IMAGE_SIGMA_UM = Range(1e-3, 1e4, "µm")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from photostrip.project.plans.cameras import CameraPlanFile
 from photostrip.project.plans.displacement import DisplacementPlanFile
 from photostrip.project.plans.model import ModelPlanFile
+from photostrip.project.plans.screening import ScreeningPlanFile
 from photostrip.project.plans.strip import StripPlanFile
 from photostrip.project.schema.for_editors import described
 
@@ -18,9 +19,10 @@ KINDS: dict[str, type[Section]] = {
     "strip": StripPlanFile,
     "camera": CameraPlanFile,
     "displacement": DisplacementPlanFile,
+    "screening": ScreeningPlanFile,
 }
 
 
 def plan_schema(kind: str) -> dict[str, Any]:
-    """Return the JSON Schema of the file of ``photostrip plan model``, ``strip``, ``camera`` or ``displacement``."""
+    """Return the JSON Schema of the file of one of the commands of ``photostrip plan``."""
     return described(KINDS[kind], f"photostrip plan {kind}")

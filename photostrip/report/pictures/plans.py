@@ -148,6 +148,24 @@ def _displacement(document: Document) -> Figure:
     return figure
 
 
+def _screening(document: Document) -> Figure:
+    layout = document["layout"]
+    title = f"{document['name']}: {sum(layout['zone_points'])} points, {layout['parallax_sigma_um']:g} µm"
+    figure = new_figure(10, 4.5, title)
+    for place, (key, label) in enumerate((("size_um", "error of the y parallax, µm"), ("zone", "zone")), 1):
+        axes = figure.add_subplot(1, 2, place, xlabel=label, ylabel="errors found, %", ylim=(0, 105))
+        for number, method in enumerate(each["method"] for each in document["methods"]):
+            rows = [row for row in document["detection"] if row["method"] == method and row["errors"]]
+            values = sorted({row[key] for row in rows})
+            shares = []
+            for value in values:
+                those = [row for row in rows if row[key] == value]
+                shares.append(100 * sum(row["found"] for row in those) / sum(row["errors"] for row in those))
+            axes.plot(values, shares, "o-", color=SERIES[number % len(SERIES)], label=method)
+        axes.legend(fontsize=SMALL_TEXT)
+    return figure
+
+
 DRAWINGS: dict[str, Callable[[Document], Figure]] = {
     "model": _model,
     "strip": strip_figure,
@@ -155,4 +173,5 @@ DRAWINGS: dict[str, Callable[[Document], Figure]] = {
     "source-table": _cameras,
     "model-source-table": _example,
     "displacement": _displacement,
+    "screening": _screening,
 }

@@ -442,7 +442,7 @@ def test_pictures_of_strips_are_the_same_every_time(capsys: pytest.CaptureFixtur
         assert found[0] == found[1]
 
 
-@pytest.mark.parametrize("kind", ["model", "strip", "camera", "displacement"])
+@pytest.mark.parametrize("kind", ["model", "strip", "camera", "displacement", "screening"])
 def test_schemas_of_plans_know_every_key(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     schema = json.loads(answer(capsys, "schema", "--plan", kind))
     assert schema["title"] == f"photostrip plan {kind}"
@@ -497,3 +497,48 @@ def test_a_wrong_survey_is_refused(
 ) -> None:
     assert main(["plan", "displacement", *arguments]) == 2
     assert message in " ".join(capsys.readouterr().err.split())
+
+
+# ------------------------------------------------------------------------------------------------------- screening
+
+
+def test_screening_from_options_and_from_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    options = ["--zone-points", "3,3,3,3,3,3", "--sizes-um", "50,100", "--methods", "tau,auto", "--repetitions", "1"]
+    from_options = answer(capsys, "plan", "screening", *options, "--format", "json")
+    file = tmp_path / "s.yaml"
+    file.write_text(
+        "photostrip_plan_screening: 1\nzone_points: [3, 3, 3, 3, 3, 3]\nerror_sizes_um: [50, 100]\n"
+        "methods: [tau, auto]\nrepetitions: 1\n"
+    )
+    assert answer(capsys, "plan", "screening", str(file), "--format", "json") == from_options
+    document = json.loads(from_options)
+    assert [each["method"] for each in document["methods"]] == ["tau", "auto"]
+    rows = list(csv.DictReader(io.StringIO(answer(capsys, "plan", "screening", str(file), "--format", "csv"))))
+    assert len(rows) == 2 * 6 * 2
+    assert sum(int(row["errors"]) for row in rows) == 2 * 44
+    effects = {(row["zone"], row["size_um"]): row["largest_arcmin"] for row in document["effects"]}
+    assert effects[1, 100.0] == pytest.approx(2 * effects[1, 50.0], abs=0.02)
+    text = answer(capsys, "plan", "screening", str(file))
+    assert "What one undetected error does to the elements, minutes of arc" in text
+    target = tmp_path / "s.svg"
+    assert answer(capsys, "plan", "screening", str(file), "-q", "-o", str(target)) == ""
+    assert "parallax, µm" in target.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--zone-points", "3,3,3"], 2, "--zone-points"),
+        (["--zone-points", "1,1,1,1,1,0"], 2, "5 points orient a pair and check nothing"),
+        (["--zone-points", "9,9,0,0,0,0", "--set", "zone_reach=0", "--set", "tilt=0"], 3, "do not orient a pair"),
+        (["--methods", "auto,grubs"], 2, "`grubs` is not known"),
+        (["--sizes-um", "0"], 2, "out of range"),
+        (["--base", "0.1"], 2, "--base: 0.1 is out of range"),
+        (["--set", "second_errors=40"], 2, "do not go into 34 pairs"),
+    ],
+)
+def test_a_wrong_experiment_is_refused(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, words: str
+) -> None:
+    assert main(["plan", "screening", "--repetitions", "1", *arguments]) == code
+    assert words in capsys.readouterr().err

@@ -9,6 +9,7 @@ import typer
 from photostrip.cli.commands.plan.camera import camera
 from photostrip.cli.commands.plan.displacement import displacement
 from photostrip.cli.commands.plan.model import model
+from photostrip.cli.commands.plan.screening import screening
 from photostrip.cli.commands.plan.strip import strip
 from photostrip.cli.option_groups import with_groups
 
@@ -25,6 +26,7 @@ COMMANDS: dict[Callable[..., None], tuple[str, ...]] = {  # examples
     ),
     strip: ("--models 15 --control bands=3 --control every=5", "strip.yaml -o strip.svg"),
     camera: ("cameras.yaml", "cameras.yaml --set height_sigma=0.2 --set relief=400", "--source-table"),
+    screening: ("--repetitions 50", "--zone-points 3,3,3,3,3,3 --sizes-um 20,40,80 --methods auto"),
     displacement: ("--camera 'UMK 10/1318' --base 30 --distances 50,100,200", "--stations 1 --distances 80"),
 }
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 TABLES = {
     "displacement": "points",
+    "screening": "detection",
     "model": "points",
     "model-source-table": "rows",
     "cameras": "cameras",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from photostrip.report.commands.plans.cameras import camera_sections, source_table_sections
 from photostrip.report.commands.plans.displacement import displacement_sections
 from photostrip.report.commands.plans.model import model_sections, source_example_sections
+from photostrip.report.commands.plans.screening import screening_sections
 from photostrip.report.commands.plans.strip import strip_sections
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ BUILDERS = {
     "model-source-table": ("Accuracy of a model: the worked example of the source", source_example_sections),
     "strip": ("Expected accuracy of a strip", strip_sections),
     "cameras": ("Efficiency of cameras", camera_sections),
+    "screening": ("Gross errors in relative orientation: what is found, and what is not", screening_sections),
     "displacement": ("Expected accuracy of displacements", displacement_sections),
     "source-table": ("Efficiency of cameras: the table of the source", source_table_sections),
 }
