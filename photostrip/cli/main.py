@@ -10,6 +10,7 @@ import atexit
 import gc
 import os
 import sys
+from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, TextIO, cast
 
@@ -19,6 +20,8 @@ from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from typer._click.core import Command
 
 EXIT_USAGE = 2
 NEW_OBJECTS = 1_000_000  # between two looks of the garbage collector
@@ -107,14 +110,7 @@ def _call(name: str, arguments: list[str]) -> int:
     import typer
 
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # to look for them it reads every installed package, 8 ms
-    entry = COMMANDS[name]
-    target = getattr(import_module(entry.module), name)
-    app = target
-    if not isinstance(target, typer.Typer):
-        app = typer.Typer(add_completion=False, rich_markup_mode=None)
-        app.command(name, context_settings={"help_option_names": ["--help", "-h"]})(target)
-    command = typer.main.get_command(app)
-    command.epilog = f"\b\nExample:\n  {entry.example}"  # \b: typer keeps the line breaks
+    command = _command(name)
     # the class of every usage error; typer does not export it, but derives BadParameter from it
     usage_error = cast("type[Exception]", typer.BadParameter.__base__)
     try:
@@ -129,6 +125,21 @@ def _call(name: str, arguments: list[str]) -> int:
         _complain(f"{text}{end} 'photostrip {name} --help' shows how it is called.")
         return EXIT_USAGE
     return code if isinstance(code, int) else 0
+
+
+@cache  # for a program that calls many commands: typer takes 5 ms for one
+def _command(name: str) -> Command:
+    """Import a command and let typer make its parser."""
+    import typer
+
+    entry = COMMANDS[name]
+    app = getattr(import_module(entry.module), name)
+    if not isinstance(app, typer.Typer):
+        target, app = app, typer.Typer(add_completion=False, rich_markup_mode=None)
+        app.command(name, context_settings={"help_option_names": ["--help", "-h"]})(target)
+    command: Command = typer.main.get_command(app)
+    command.epilog = f"\b\nExample:\n  {entry.example}"  # \b: typer keeps the line breaks
+    return command
 
 
 def _complain(message: str) -> None:
