@@ -1,10 +1,10 @@
 """What the verdict sees: sound strips and blocks, a wrong principal distance, control worse than stated.
 
-Run it as ``python benchmarks/verdict.py [--first SEED] [--number N]``. Strips and pairs of strips of 5 to 20 photos
-with three to five bands of control, adjusted by polynomials, covariance and bundle in turn; once with twelve check
-points, once without any and ``processing.cross_validation``. Counted are verdicts, and how often the tests of what the
-adjustment has not seen contradict it; plan and height are rms of differences over standard deviations, times what the
-cross-validation takes beside the adjustment alone.
+Run it as ``python benchmarks/verdict.py [--first SEED] [--number N] [--photos N ...]``. Strips and pairs of strips of 5
+to 20 photos with three to five bands of control, adjusted by polynomials, covariance and bundle in turn; once with
+twelve check points, once without any and ``processing.cross_validation``. Counted are verdicts, and how often the tests
+of what the adjustment has not seen contradict it; plan and height are rms of differences over standard deviations, and
+times is what the cross-validation takes beside the adjustment alone.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +28,9 @@ from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Points, Spec, Terrain
 from photostrip.threads import limit_threads
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 ADJUSTMENTS = ("polynomial", "covariance", "bundle")
 PHOTOS, STRIPS, BANDS = (5, 8, 12, 20), (1, 1, 2), (3, 4, 5)
@@ -58,23 +62,23 @@ def control(inputs: Inputs, rng: np.random.Generator) -> Inputs:
 MISTAKES = {"sound": sound, "principal distance 1 % off": principal_distance, "control 0.5 m off": control}
 
 
-def spec(seed: int, rng: np.random.Generator, checks: int) -> Spec:
-    """Describe a strip or two."""
+def spec(seed: int, rng: np.random.Generator, checks: int, photos: Sequence[int]) -> Spec:
+    """Describe a strip or two, as long as one of `photos`."""
     return Spec(
         seed=seed,
-        flight=Flight(photos=int(rng.choice(PHOTOS)), strips=int(rng.choice(STRIPS)), heading_deg=70.0),
+        flight=Flight(photos=int(rng.choice(photos)), strips=int(rng.choice(STRIPS)), heading_deg=70.0),
         terrain=Terrain(relief=200.0),
         points=Points(extra_per_model=8),
         control=Control(bands=int(rng.choice(BANDS)), check=checks),
     )
 
 
-def run(mistake: str, first: int, number: int, checks: int) -> str:
+def run(mistake: str, first: int, number: int, checks: int, photos: Sequence[int]) -> str:
     """Adjust so many projects and return a line of the table."""
     found, ratios, cost = Counter[str](), [], []
     for seed in range(first, first + number):
         rng = np.random.default_rng(seed)
-        inputs = MISTAKES[mistake](inputs_of(simulate(spec(seed, rng, checks))), rng)
+        inputs = MISTAKES[mistake](inputs_of(simulate(spec(seed, rng, checks, photos))), rng)
         settings = Settings(adjustment=ADJUSTMENTS[seed % len(ADJUSTMENTS)])
         try:
             begin = time.process_time()
@@ -103,12 +107,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--number", type=int, default=12)
+    parser.add_argument("--photos", type=int, nargs="+", default=PHOTOS, help="of a strip, drawn")
     asked = parser.parse_args()
     limit_threads()
     print(f"{'':42}    good    look  failed refused  by test    plan  height  times")
     for mistake in MISTAKES:
         for checks in (CHECKS, 0):
-            print(run(mistake, asked.first, asked.number, checks), flush=True)
+            print(run(mistake, asked.first, asked.number, checks, asked.photos), flush=True)
 
 
 if __name__ == "__main__":

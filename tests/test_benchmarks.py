@@ -218,11 +218,12 @@ def test_false_alarms_prints_a_row_for_each_layout() -> None:
 
 @pytest.mark.slow
 def test_verdict_prints_what_is_seen() -> None:
-    out = printed("verdict.py", "--number", "1", "--first", "34")  # of five photos
+    out = printed("verdict.py", "--number", "1", "--photos", "5")
     rows = re.findall(
         r"^(.{28})(check points|left out) +(\d) +(\d) +(\d) +(\d) +(\d) +\d\.\d\d +\d\.\d\d", out, re.MULTILINE
     )
     assert [row[1] for row in rows] == ["check points", "left out"] * 3
     assert all(sum(map(int, row[2:6])) == 1 for row in nonempty(rows))
     assert rows[0][2] == rows[1][2] == "1"  # the sound ones are good
-    assert rows[4][6] == rows[5][6] == "1"  # control ten times worse than stated is seen
+    assert rows[4][2] == rows[5][2] == "0"  # those with control ten times worse than stated are not
+    assert rows[5][6] == "1"  # seen in each of ten strips; by check points in seven
