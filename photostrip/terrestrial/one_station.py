@@ -134,21 +134,19 @@ def _known_turn(turn: Turn | None, number: int | None) -> tuple[Floats, Floats]:
 def _displacement(quantities: Floats, principal_distance: float, rotation: Floats) -> tuple[Floats, Floats]:
     """Displacement on the ground, and the direction of the second ray.
 
-    quantities: (9,): x, z, dx, dz in mm, both distances in metres, the turn of the camera in radians.
+    quantities: (..., 9): x, z, dx, dz in mm, both distances in metres, the turn of the camera in radians.
     """
-    xz = np.stack([quantities[:2], quantities[:2] + quantities[2:4]])
-    ray = rays(xz, principal_distance)
-    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    second = rotation @ small_turn(quantities[6:]) @ ray[1]
-    first, later = quantities[4], quantities[5] if np.isfinite(quantities[5]) else quantities[4]
-    return later * second - first * (rotation @ ray[0]), second
+    q = np.asarray(quantities, float)
+    ray = rays(np.stack([q[..., :2], q[..., :2] + q[..., 2:4]]), principal_distance)
+    ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
+    second = (rotation @ small_turn(q[..., 6:]) @ ray[1, ..., None])[..., 0]
+    first = q[..., 4, None]
+    later = np.where(np.isfinite(q[..., 5, None]), q[..., 5, None], first)
+    return later * second - first * (ray[0] @ rotation.T), second
 
 
 def _slope(quantities: Floats, principal_distance: float, rotation: Floats) -> Floats:
     """Differentiate the displacement, (3, 9), by differences; zero by a second distance that is not known."""
-    columns = []
-    for number, step in enumerate(STEPS.tolist()):
-        moved = np.eye(len(STEPS))[number] * step
-        ends = [_displacement(quantities + sign * moved, principal_distance, rotation)[0] for sign in (1, -1)]
-        columns.append((ends[0] - ends[1]) / (2 * step))
-    return np.column_stack(columns)
+    steps = np.diag(STEPS)
+    ahead, behind = (_displacement(quantities + step, principal_distance, rotation)[0] for step in (steps, -steps))
+    return np.asarray((ahead - behind).T / (2 * STEPS), float)
