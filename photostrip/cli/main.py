@@ -19,7 +19,7 @@ from photostrip.cli.command_table import COMMANDS, COMPLETION, usage
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from typer._click.core import Command
 
@@ -110,7 +110,7 @@ def _call(name: str, arguments: list[str]) -> int:
     import typer
 
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # to look for them it reads every installed package, 8 ms
-    command = _command(name)
+    command = _parser(name, getattr(import_module(COMMANDS[name].module), name))
     # the class of every usage error; typer does not export it, but derives BadParameter from it
     usage_error = cast("type[Exception]", typer.BadParameter.__base__)
     try:
@@ -127,18 +127,17 @@ def _call(name: str, arguments: list[str]) -> int:
     return code if isinstance(code, int) else 0
 
 
-@cache  # for a program that calls many commands: typer takes 5 ms for one
-def _command(name: str) -> Command:
-    """Import a command and let typer make its parser."""
+@cache  # for a program that calls many commands: typer takes 7 ms for one
+def _parser(name: str, target: Callable[..., object]) -> Command:
+    """Let typer make what reads the arguments of a command."""
     import typer
 
-    entry = COMMANDS[name]
-    app = getattr(import_module(entry.module), name)
+    app = target
     if not isinstance(app, typer.Typer):
-        target, app = app, typer.Typer(add_completion=False, rich_markup_mode=None)
+        app = typer.Typer(add_completion=False, rich_markup_mode=None)
         app.command(name, context_settings={"help_option_names": ["--help", "-h"]})(target)
-    command: Command = typer.main.get_command(app)
-    command.epilog = f"\b\nExample:\n  {entry.example}"  # \b: typer keeps the line breaks
+    command = typer.main.get_command(app)
+    command.epilog = f"\b\nExample:\n  {COMMANDS[name].example}"  # \b: typer keeps the line breaks
     return command
 
 

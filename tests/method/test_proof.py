@@ -399,6 +399,7 @@ def rms(spec: Spec, seeds: int, *choices: str) -> dict[str, Floats]:
     squares: dict[str, list[Floats]] = {choice: [] for choice in choices}
     for seed in range(1, seeds + 1):
         done = simulate(replace(spec, seed=seed))
+        inputs = inputs_of(done)
         for choice in choices:
             simple = choice == "similarity"
             asked = Settings(
@@ -406,7 +407,7 @@ def rms(spec: Spec, seeds: int, *choices: str) -> dict[str, Floats]:
                 polynomial=correction.PolynomialSettings("auto" if simple else choice),
                 precision=False,
             )
-            squares[choice].append(Recovery(done, triangulate(inputs_of(done), asked)).along_across_up())
+            squares[choice].append(Recovery(done, triangulate(inputs, asked)).along_across_up())
     return {choice: np.sqrt(np.mean(found, axis=0)) / SIGMA for choice, found in squares.items()}
 
 

@@ -292,19 +292,19 @@ def test_pictures_are_the_same_every_time(capsys: pytest.CaptureFixture[str], tm
     file.write_text(CAMERAS)
     for command, endings in (
         (("model",), [".svg", ".svg", ".png", ".png"]),
-        (("camera", str(file)), [".svg", ".svg", ".png"]),
-        (("camera", "--source-table"), [".svg", ".png"]),
-        (("model", "--source-table"), [".svg", ".png"]),
-        (("model", "--elements", "5,-3,10,-8,12"), [".svg", ".svg", ".png"]),
+        (("camera", str(file)), [".svg", ".svg"]),
+        (("camera", "--source-table"), [".svg"]),
+        (("model", "--source-table"), [".svg"]),
+        (("model", "--elements", "5,-3,10,-8,12"), [".svg", ".svg"]),
     ):
         found: dict[str, set[bytes]] = {}
         for ending in endings:
             target = tmp_path / f"picture{ending}"
             assert answer(capsys, "plan", *command, "-q", "-o", str(target)) == ""
             found.setdefault(ending, set()).add(target.read_bytes())
-        (svg,), (png,) = found.values()
-        assert svg.startswith(b"<?xml")
-        assert png.startswith(b"\x89PNG")
+        for ending, pictures in nonempty(found.items()):
+            (picture,) = pictures
+            assert picture.startswith(b"<?xml" if ending == ".svg" else b"\x89PNG")
 
 
 def test_a_picture_without_matplotlib_names_the_extra(
