@@ -146,8 +146,8 @@ def drawn(count: int, seed: int, rooms: Sequence[str]) -> list[Change]:
     rng = random.Random(seed)  # noqa: S311 - a sample, no secret
     urns: dict[str, dict[str, list[Change]]] = {}
     for file in sorted((ROOT / PACKAGE).rglob("*.py")):
-        for change in changes_of(file):
-            if _asked(change.room, rooms):
+        if _asked(str(file.relative_to(ROOT / PACKAGE).parent), rooms):
+            for change in changes_of(file):
                 urns.setdefault(change.room, {}).setdefault(change.kind, []).append(change)
     queues = []
     for room in sorted(urns):
