@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 # Bottom to top. A room is a module or a folder directly below photostrip/.
 LAYERS = (
-    {"arrays", "errors", "frozen", "notes", "threads", "distributions", "units", "visible"},
-    {"points", "camera", "statistics", "geometry", "geodesy", "rejection"},
+    {"arrays", "errors", "frozen", "notes", "statistics", "threads", "units", "visible"},
+    {"points", "camera", "geometry", "geodesy", "rejection"},
     {"triangulation", "terrestrial"},
     {"simulation"},
     {"planning"},

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
-from photostrip.distributions import gamma_cdf
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
-from photostrip.statistics import normal_quantile
+from photostrip.statistics import gamma_cdf, normal_quantile
 from photostrip.triangulation.covariance_adjustment import system
 from photostrip.triangulation.covariance_adjustment.block_tridiagonal import InverseRow
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.distributions import gamma_cdf
 from photostrip.frozen import dataclass
+from photostrip.statistics import gamma_cdf
 
 if TYPE_CHECKING:
     from collections.abc import Collection

@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from photostrip.distributions import gamma_cdf
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.report import sections_of, title_of
 from photostrip.report.page.text import to_text
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import GrossError
+from photostrip.statistics import gamma_cdf
 from tests.loops import nonempty
 from tests.results import Case, case, solved, spec
 
