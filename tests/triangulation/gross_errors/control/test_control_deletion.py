@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
 from benchmarks.gross_errors import much_wrong_run
+from photostrip.frozen import dataclass
 from photostrip.pipeline import Settings, triangulate
 from photostrip.points import ControlPoints
 from photostrip.result.document import document_of
