@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.notes import listed
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile, f_p_value
@@ -33,7 +34,6 @@ REFRACTION = "k"
 UNKNOWNS = (*ANGLES, *INTERIOR, REFRACTION)
 # what may be determined besides the angles
 FREE = {"principal-distance": ("f",), "principal-point": ("x0", "z0"), "refraction": (REFRACTION,)}
-EARTH_RADIUS = 6_371_000.0  # metres
 SCREENINGS = ("deletion", "stated", "none")
 MOST_ITERATIONS = 50
 CONVERGED = 1e-11  # of the normalised unknowns: rad, and mm over the principal distance

@@ -10,6 +10,7 @@ from photostrip.formats.measured.columns import POINT, repeated_rows
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
 from photostrip.frozen import dataclass
+from photostrip.terrestrial.normal_case import SIDES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
 
-SIDES = ("left", "right")
 EPOCH = Column("epoch", aliases=("epoch_id",))
 IMAGE = (Column("x", number=True), Column("z", number=True, aliases=("y",)))
 DIRECTIONS = (

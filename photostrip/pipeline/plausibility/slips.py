@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import dataclass
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.pipeline.given_points import rejected_control, rows_of_given
 from photostrip.points import locate
 from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
 from photostrip.triangulation.plausibility.control import control_slips, given_points
 from photostrip.triangulation.plausibility.control.control_fit import ODD_PROBABILITY
-from photostrip.triangulation.plausibility.control.control_strip import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -131,7 +131,7 @@ def of_models(result: Result, models: MeasuredModels, predicted: Predicted, cont
 
 def _confirmed(finding: Finding, row: int, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
     """Test a slip by a prediction; it stands as it is where the adjustment has none."""
-    axis = AXES.index(str(finding.evidence["axis"]))
+    axis = GROUND_AXES.index(str(finding.evidence["axis"]))
     if predicted.sound[row, axis]:
         return
     if not np.isfinite(predicted.off[row, axis] * predicted.sigma[row, axis]):

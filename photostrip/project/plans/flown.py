@@ -14,6 +14,7 @@ from photostrip.formats.text.findings import Findings
 from photostrip.planning.strip.ideal_strip import StripGeometry
 from photostrip.project.schema.values import Positive, Range, Section, Triple, Words, bounded, key, wrong
 from photostrip.project.simulation import SimulatedCamera
+from photostrip.project.terrestrial.ranges import IMAGE_SIGMA_UM
 from photostrip.project.yaml.document import COMMAND_LINE, Node, Place
 from photostrip.project.yaml.reading import Reading
 
@@ -34,7 +35,6 @@ NUMBER_KEYS = {
     "photostrip_plan_screening",
 }
 OVERLAP = Range(1.0, 99.0, "%")
-IMAGE_SIGMA_UM = Range(1e-3, 1e4, "µm")
 
 Percent = Annotated[Positive, AfterValidator(bounded(OVERLAP))]
 SigmaUm = Annotated[Positive, AfterValidator(bounded(IMAGE_SIGMA_UM))]

@@ -15,6 +15,7 @@ from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
 from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLIMETRES, refuse_outside
 from photostrip.terrestrial.monitoring import Series
+from photostrip.terrestrial.normal_case import SIDES
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats
@@ -140,7 +141,7 @@ def _from_coordinates(
         return None
     number = locate(read.epochs, epochs)[read.epoch]
     rows = np.flatnonzero(number >= 0)
-    shape = (len(epochs), len(read.points), len(terrestrial.SIDES), 2)
+    shape = (len(epochs), len(read.points), len(SIDES), 2)
     coordinates, of_epoch = np.full(shape, np.nan), np.ones(shape)
     where = (number[rows], read.point[rows], read.side[rows])
     flip = np.array([1.0, -1.0 if table.z_axis == "down" else 1.0])

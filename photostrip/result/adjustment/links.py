@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.pipeline.strips.model_notes import far_ends
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import Document, rms
@@ -14,8 +15,6 @@ from photostrip.result.quantities import grouped, record, records
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
     from photostrip.pipeline import Result, StripResult
-
-AXES = ("x", "y", "z")
 
 
 def sigma0(strip: StripResult) -> float:
@@ -124,7 +123,7 @@ def residuals_of(result: Result, rank: Numbers) -> list[Document]:
         order = np.lexsort((place[node[shared.before]], shared.link))
         columns = {
             "points": names_of(result, node[shared.before[order]]),
-            **{f"v{axis}_um": -1000.0 * links.solved.residual[order, k] for k, axis in enumerate(AXES)},
+            **{f"v{axis}_um": -1000.0 * links.solved.residual[order, k] for k, axis in enumerate(CARTESIAN_AXES)},
             "test": links.value[order],
             "used": links.used[order],
         }

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.result.adjustment.bundle import Kind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
-from photostrip.result.adjustment.links import AXES, names_of
+from photostrip.result.adjustment.links import names_of
 from photostrip.result.numbers import Document, natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
 from photostrip.triangulation.gross_errors.control.control_rejections import EXCHANGED, WRONG_IMAGE
@@ -224,7 +224,9 @@ def _from_links(result: Result, strip: StripResult) -> list[Document]:
         link = int(formed.links.shared.link[each.row])
         before, after = formed.links.shared.before[each.row], formed.links.shared.after[each.row]
         pair = [names[link], names[link + 1]]
-        parts = ", ".join(f"{axis} {value * MICROMETRES:+.0f}" for axis, value in zip(AXES, each.size, strict=True))
+        parts = ", ".join(
+            f"{axis} {value * MICROMETRES:+.0f}" for axis, value in zip(CARTESIAN_AXES, each.size, strict=True)
+        )
         size = float(np.linalg.norm(each.size))
         if formed.used[before] == formed.used[after]:
             wrong = "it cannot be told which one is wrong, and neither enters the mean"

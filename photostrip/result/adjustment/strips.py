@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.result.adjustment import links, pairs
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.pipeline import Result, StripResult
     from photostrip.triangulation.polynomial.correction import Polynomial
-
-AXES = ("x", "y", "z")
 
 
 def strips_of(result: Result) -> list[Document]:
@@ -171,4 +169,4 @@ def _polynomial(strip: str, found: Polynomial) -> Document:
 
 
 def _by_axis(values: Sequence[Any]) -> Document:
-    return dict(zip(AXES, values, strict=True))
+    return dict(zip(CARTESIAN_AXES, values, strict=True))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.planning.model.closed_form import ORDER
+from photostrip.planning.model.deformation import TERMS
 from photostrip.planning.model.element_errors import ELEMENTS, FREE
 from photostrip.planning.model.plan import (
     BothForms,
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
 
 IN_PHOTO = 2  # decimals of mm: places of points
-SURFACE = ("E0", "A", "B", "C", "D")
 AXES = ("x", "y", "z")
 NOTHING = 9  # decimals of coefficients below which there are errors of rounding only
 DIGITS = 8  # of coefficients, so that two forms can be compared
@@ -245,7 +245,7 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Document:
                     "value": significant(value * unit),
                     "unit": "m" if not power else f"m/mm{'²' if power == 2 else ''}",
                 }
-                for name, value, power in zip(SURFACE, bent.surface.tolist(), (0, 1, 1, 2, 2), strict=True)
+                for name, value, power in zip(TERMS, bent.surface.tolist(), (0, 1, 1, 2, 2), strict=True)
             ],
             # against the middle of the model
             "twist_at_corner_m": rounded(abs(twist) * spec.base / 2 * spec.width * unit, GROUND),

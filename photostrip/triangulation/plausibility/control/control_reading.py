@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.triangulation.plausibility.control import control_heights, control_lists, control_slips
 from photostrip.triangulation.plausibility.control.control_fit import (
     LEAST_POINTS,
@@ -22,7 +23,6 @@ from photostrip.triangulation.plausibility.control.control_fit import (
 )
 from photostrip.triangulation.plausibility.control.control_slips import Misclosures
 from photostrip.triangulation.plausibility.control.control_strip import (
-    AXES,
     GivenPoints,
     LevelStrip,
     StripPoints,
@@ -162,7 +162,7 @@ def _columns(
             and middle < FIT_SHARE * FIT_SHARE * spread
             and full.sum() > LEAST_POINTS
         ):
-            names = [AXES[each] for each in (order if read is given else (1, 0, 2))]
+            names = [GROUND_AXES[each] for each in (order if read is given else (1, 0, 2))]
             message = (
                 f"strip {on_strip.strip} does not fit its control in plan (middle misclosure {normal.median:.4g} m), "
                 f"but fits within {middle:.3g} m when what is called east, north, up is read as {', '.join(names)}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.geodesy.curvature import EARTH_RADIUS
-from photostrip.triangulation.plausibility.control.control_strip import AXES
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.triangulation.plausibility.control.digits import slip
 from photostrip.triangulation.plausibility.finding import found
 
@@ -200,17 +200,17 @@ def slip_in(
     exact = np.spacing(abs(written)) * unit < spread[0]  # whether the computer holds digits that could be compared
     fits = slip(written, written - off / unit, spread[0] / unit, near / unit) if exact else None
     role = "check" if given.check[row] else "control"
-    evidence: Evidence = {"axis": AXES[axis], "given": written, "off_m": off, "standard_deviation_m": spread[0]}
+    evidence: Evidence = {"axis": GROUND_AXES[axis], "given": written, "off_m": off, "standard_deviation_m": spread[0]}
     if fits is not None:
         message = (
-            f"{role} point {given.ids[row]} is off by {off:+.2f} m in {AXES[axis]}: looks like {fits.text}; "
+            f"{role} point {given.ids[row]} is off by {off:+.2f} m in {GROUND_AXES[axis]}: looks like {fits.text}; "
             f"{fits.meant:.10g} would fit within {abs(fits.meant - written + off / unit) * unit:.2g} m"
         )
         evidence["would_fit"] = fits.meant
     elif nowhere:
         message = (
-            f"{role} point {given.ids[row]} has {written:.10g} for {AXES[axis]}, {abs(off) / 1000:.6g} km from where "
-            "the photos show it: no place on the Earth is so far away"
+            f"{role} point {given.ids[row]} has {written:.10g} for {GROUND_AXES[axis]}, {abs(off) / 1000:.6g} km from "
+            "where the photos show it: no place on the Earth is so far away"
         )
     else:
         return None

@@ -37,7 +37,6 @@ FEET_TOLERANCE = 0.04  # relative, of a ratio to that of foot and metre
 SIMPLE_SIGMAS = 2.5  # times what makes sense that a fit may leave before bending is taken out
 LEAST_REDUNDANCY = 2  # redundancy that must be left then
 LEAST_AHEAD = 0.1  # of the distance of a point from a photo, along its axis: within 84 degrees of it
-AXES = ("east", "north", "up")
 
 
 class WrittenAxes(NamedTuple):
