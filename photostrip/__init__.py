@@ -12,6 +12,7 @@ from photostrip.threads import limit_threads
 
 if TYPE_CHECKING:
     from photostrip.errors import GeometryError, InputError, PhotostripError
+    from photostrip.library import steps
     from photostrip.library.comparison import Comparison, compare
     from photostrip.library.plan import Plan, plan
     from photostrip.library.project import Check, Project, check, load, run
@@ -49,6 +50,7 @@ __all__ = [
     "read_result",
     "run",
     "simulate",
+    "steps",
 ]
 
 # Before anything can import numpy: the thread pools read these variables once, when they are loaded.
@@ -59,6 +61,8 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 (any of the public names)
     """Load a public name when it is first asked for."""
     from importlib import import_module
 
+    if name == "steps":
+        return import_module("photostrip.library.steps")
     for home, names in _HOMES.items():
         if name in names:
             found = getattr(import_module(f"photostrip.{home}"), name)

@@ -41,6 +41,11 @@ _TEXTS = (
         "photostrip plan model --overlap 60 --control corners",
     ),
     (
+        "step",
+        "Single steps of the method, for teaching and checking.",
+        "photostrip step relative pair.csv -f 153 --base 920 --unit m",
+    ),
+    (
         "terrestrial",
         "Directions of a phototheodolite, displacements between epochs.",
         "photostrip terrestrial displacement survey.yaml -o result",

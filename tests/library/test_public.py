@@ -33,11 +33,16 @@ MEMBERS = {
     "Simulation": ["files", "project", "truth", "write"],
     "Table": ["columns", "meanings", "name", "to_arrow", "to_pandas", "units", "where"],
 }  # fmt: skip
+STEPS = [
+    "absolute", "chain", "interior", "intersection", "polynomial", "refine", "relative", "resection", "scale_transfer",
+]  # fmt: skip
 ERRORS = ["GeometryError", "InputError", "PhotostripError"]
 
 
 def test_the_public_names_are_these() -> None:
-    assert photostrip.__all__ == sorted([*PARAMETERS, *MEMBERS, *ERRORS])
+    assert photostrip.__all__ == sorted([*PARAMETERS, *MEMBERS, *ERRORS, "steps"])
+    steps = [name for name in vars(photostrip.steps) if name in STEPS]
+    assert sorted(steps) == STEPS
     assert dir(photostrip) == sorted([*photostrip.__all__, "__version__"])
 
 

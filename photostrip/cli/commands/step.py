@@ -1,0 +1,235 @@
+"""``photostrip step``: single steps of the method, from a table of points, for teaching and checking."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from photostrip.cli.documents import FORMS, Form, Rendering, require_target
+from photostrip.cli.failures import failures_as
+from photostrip.cli.option_groups import with_groups
+from photostrip.cli.options import Silent
+from photostrip.frozen import dataclass
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from photostrip.report.page.parts import Document
+
+HELP_NAMES = {"help_option_names": ["--help", "-h"]}
+
+step = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    context_settings=HELP_NAMES,
+    help="Single steps of the method, from a table of points: for teaching and checking.",
+)
+
+Table = Annotated[Path, typer.Argument(metavar="FILE", help="Table of points (CSV).", show_default=False)]
+Focal = Annotated[float, typer.Option("--principal-distance", "-f", metavar="MM", min=1e-6, help="Principal distance.")]
+Unit = Annotated[str, typer.Option("--unit", metavar="NAME", help="What ground or model coordinates are in.")]
+Sigma = Annotated[
+    float, typer.Option("--sigma-um", metavar="UM", min=1e-6, help="Standard deviation of an image coordinate.")
+]
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """How a step is printed, and where it is written."""
+
+    form: Annotated[Form, typer.Option("--format", help="How the answer is printed.")] = "text"
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write .json, .csv, .md or .txt.")
+    ] = None
+    quiet: Silent = False
+
+    def deliver(self, document: Document) -> None:
+        """Print a step; write it when a file is named."""
+        from photostrip.formats.output.csv_text import to_csv
+        from photostrip.report.commands.steps import step_report
+
+        def table(document: Document) -> str:
+            return to_csv(["point", *(each["name"] for each in document["columns"])], document["points"])
+
+        rendering = Rendering(step_report, table)
+        if self.output is not None:
+            from photostrip.formats.text.writing import write_text
+
+            write_text(self.output, rendering.rendered(document, FORMS[self.output.suffix.lower()]))
+        if self.output is None or not self.quiet:
+            rendering.show(document, self.form)
+
+    def checked(self) -> None:
+        """Refuse a file that cannot be written before anything is computed."""
+        require_target(None, self.output)
+        if self.output is not None and self.output.suffix.lower() not in FORMS:
+            message = f"no step is written as '{self.output.suffix}': the name may end in {', '.join(FORMS)}"
+            raise typer.BadParameter(message, param_hint="--output")
+
+
+def _command(name: str, columns: str, example: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    text = f"\b\nColumns of FILE: {columns}\n\b\nExample:\n  photostrip step {name} {example}"
+
+    def register(command: Callable[..., None]) -> Callable[..., None]:
+        return step.command(name, context_settings=HELP_NAMES, epilog=text)(with_groups(command))
+
+    return register
+
+
+@_command("interior", "mark, x, y, x_photo, y_photo", "marks.csv --transform conformal")
+def interior(
+    *,
+    file: Table,
+    transform: Annotated[
+        Literal["conformal", "affine", "bilinear", "projective"],
+        typer.Option("--transform", help="From measured to photo coordinates."),
+    ] = "affine",
+    delivery: Delivery,
+) -> None:
+    """Fit the transformation of measured fiducial marks to calibrated ones, mm."""
+    with failures_as(delivery.form):
+        from photostrip.library import steps
+        from photostrip.library.step_documents import interior_document
+
+        ids, (measured, calibrated) = _read(file, "interior", delivery)
+        delivery.deliver(interior_document(ids, steps.interior(measured, calibrated, transform)))
+
+
+@_command("refine", "point, x, y", "points.csv -f 152.12 --principal-point 0.012,-0.004 --k 2.5e-8,0,0")
+def refine(
+    *,
+    file: Table,
+    focal: Focal,
+    principal_point: Annotated[
+        str, typer.Option("--principal-point", metavar="X,Y", help="Principal point, mm.")
+    ] = "0,0",
+    k: Annotated[
+        str, typer.Option("--k", metavar="K1,K2,K3", help="Radial distortion, from image to ideal coordinates.")
+    ] = "0,0,0",
+    flying_height: Annotated[
+        float | None, typer.Option("--flying-height", metavar="M", help="Above sea level; corrects refraction.")
+    ] = None,
+    ground_height: Annotated[
+        float, typer.Option("--ground-height", metavar="M", help="Of the terrain, above sea level.")
+    ] = 0.0,
+    delivery: Delivery,
+) -> None:
+    """Reduce photo coordinates, mm, to the principal point, and correct lens distortion and refraction."""
+    with failures_as(delivery.form):
+        from photostrip.camera import Camera, Distortion
+        from photostrip.library import steps
+        from photostrip.library.step_documents import refine_document
+
+        ids, (xy,) = _read(file, "refine", delivery)
+        k1, k2, k3 = _numbers(k, 3, "--k")
+        x0, y0 = _numbers(principal_point, 2, "--principal-point")
+        lens = Distortion(model="brown", direction="image_to_ideal", k=(k1, k2, k3)) if any((k1, k2, k3)) else None
+        camera = Camera(name="camera", principal_distance=focal, principal_point=(x0, y0), distortion=lens)
+        refined = steps.refine(xy, camera, flying_height=flying_height, ground_height=ground_height)
+        delivery.deliver(refine_document(ids, xy, refined))
+
+
+@_command("relative", "point, x_left, y_left, x_right, y_right", "pair.csv -f 153 --base 920 --unit m")
+def relative(
+    *,
+    file: Table,
+    focal: Focal,
+    base: Annotated[float, typer.Option("--base", metavar="B", min=1e-9, help="Length of the base.")] = 100.0,
+    unit: Unit = "mm",
+    delivery: Delivery,
+) -> None:
+    """Orient two photos relative to each other, image coordinates in mm, and form their model in any unit.
+
+    The elements stand relative to the base, and as bx, by, bz and angles of the right photo in the system of the left.
+    """
+    with failures_as(delivery.form):
+        from photostrip.library import steps
+        from photostrip.library.step_documents import relative_document
+
+        ids, (left, right) = _read(file, "relative", delivery)
+        delivery.deliver(relative_document(ids, steps.relative(left, right, focal, base=base), base, unit))
+
+
+@_command(
+    "intersection",
+    "point, x_left, y_left, x_right, y_right",
+    "pair.csv -f 153 --base 920,0,0 --left 0,0,0 --right 0.2,-0.1,1.4",
+)
+def intersection(
+    *,
+    file: Table,
+    focal: Focal,
+    base: Annotated[str, typer.Option("--base", metavar="BX,BY,BZ", help="From the left to the right centre.")],
+    left: Annotated[
+        str, typer.Option("--left", metavar="W,P,K", help="Omega, phi, kappa of the left photo, degrees.")
+    ] = "0,0,0",
+    right: Annotated[
+        str, typer.Option("--right", metavar="W,P,K", help="Omega, phi, kappa of the right photo, degrees.")
+    ] = "0,0,0",
+    unit: Unit = "m",
+    left_ray: Annotated[
+        bool, typer.Option("--left-ray", help="Y of the left ray, as printed, instead of the mean of both.")
+    ] = False,
+    delivery: Delivery,
+) -> None:
+    """Intersect the rays of two photos of known orientation; points stand relative to the left perspective centre."""
+    with failures_as(delivery.form):
+        from photostrip.library import steps
+        from photostrip.library.step_documents import intersection_document
+
+        ids, (one, other) = _read(file, "intersection", delivery)
+        turned = tuple(_rotation(text, name) for text, name in ((left, "--left"), (right, "--right")))
+        b = _numbers(base, 3, "--base")
+        found = steps.intersection(one, other, focal, base=b, rotations=(turned[0], turned[1]), left_ray=left_ray)
+        delivery.deliver(intersection_document(ids, found, unit))
+
+
+@_command("absolute", "point, x, y, z, x_ground, y_ground, z_ground", "control.csv")
+def absolute(*, file: Table, unit: Unit = "m", delivery: Delivery) -> None:
+    """Fit a model to points that are known in Cartesian ground coordinates, by seven parameters."""
+    with failures_as(delivery.form):
+        from photostrip.library import steps
+        from photostrip.library.step_documents import absolute_document
+
+        ids, (model, ground) = _read(file, "absolute", delivery)
+        delivery.deliver(absolute_document(ids, steps.absolute(model, ground), unit))
+
+
+@_command("resection", "point, x, y, x_ground, y_ground, z_ground", "photo.csv -f 152.12 --sigma-um 8")
+def resection(*, file: Table, focal: Focal, sigma_um: Sigma = 5.0, unit: Unit = "m", delivery: Delivery) -> None:
+    """Orient one photo on known points, at any attitude, image coordinates in mm."""
+    with failures_as(delivery.form):
+        from photostrip.library import steps
+        from photostrip.library.step_documents import resection_document
+
+        ids, (xy, ground) = _read(file, "resection", delivery)
+        delivery.deliver(resection_document(ids, steps.resection(xy, ground, focal, sigma=sigma_um / 1000.0), unit))
+
+
+def _read(file: Path, name: str, delivery: Delivery) -> tuple[list[str], Any]:
+    """Read the table of a step; a file that cannot be written is refused before."""
+    from photostrip.formats.measured.steps import read_step
+
+    delivery.checked()
+    return read_step(str(file), name)
+
+
+def _numbers(text: str, count: int, option: str) -> list[float]:
+    """Return the numbers of an option, or refuse it."""
+    try:
+        found = [float(each) for each in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) != count or not all(-1e12 < each < 1e12 for each in found):  # noqa: PLR2004 (no NaN, no infinity)
+        raise typer.BadParameter(f"'{text}' is not {count} numbers with commas between them", param_hint=option)
+    return found
+
+
+def _rotation(text: str, option: str) -> Any:  # noqa: ANN401 (an array)
+    from math import radians
+
+    from photostrip.geometry.rotation import from_angles
+
+    return from_angles([radians(each) for each in _numbers(text, 3, option)], "omega-phi-kappa")

@@ -1,0 +1,37 @@
+"""Tables of single steps of the method: points in two systems, or on two photos."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip.errors import InputError
+from photostrip.formats.measured.columns import POINT, numbers
+from photostrip.formats.measured.terrestrial import read_points
+from photostrip.formats.text.findings import Findings
+from photostrip.formats.text.tables import Column
+
+if TYPE_CHECKING:
+    from photostrip.arrays import Floats
+
+IMAGE, GROUND = ("x", "y"), ("x_ground", "y_ground", "z_ground")
+PHOTOS = (("x_left", "y_left"), ("x_right", "y_right"))
+COLUMNS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "interior": (IMAGE, ("x_photo", "y_photo")),
+    "refine": (IMAGE,),
+    "relative": PHOTOS,
+    "intersection": PHOTOS,
+    "absolute": (("x", "y", "z"), GROUND),
+    "resection": (IMAGE, GROUND),
+}
+MARK = Column("point", aliases=("mark", *POINT.aliases))
+
+
+def read_step(file: str, step: str) -> tuple[list[str], list[Floats]]:
+    """Read the table of a step: ids, and its coordinates by system; or raise every fault of it."""
+    findings = Findings()
+    systems = COLUMNS[step]
+    table = read_points(file, (MARK, *(each for names in systems for each in numbers(*names))), findings)
+    findings.stop()
+    if table is None:  # cannot be: what is not read has a fault, and stop() raised it
+        raise InputError(f"{file} cannot be read")
+    return table.cells("point"), [table.columns(*names) for names in systems]

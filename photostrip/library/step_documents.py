@@ -1,0 +1,125 @@
+"""Documents of single steps: values with their units, and a table of points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.geometry.rotation import angles
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from photostrip.arrays import Floats
+    from photostrip.library.steps import Absolute, Interior, Relative
+    from photostrip.triangulation.resection.closed_form import OrientedPhoto
+    from photostrip.triangulation.strip_formation.intersection import Intersection
+
+    Document = dict[str, Any]
+
+MICROMETRES = 1000.0  # in a millimetre
+DIGITS = 10  # of values: more than any measurement has
+SYSTEM = "omega-phi-kappa"
+XYZ = "xyz"
+
+
+def interior_document(ids: Sequence[str], found: Interior) -> Document:
+    """Return an interior orientation: the coefficients of both axes, and the residuals of the marks."""
+    names = ("x", "y", "x y", "1")
+    rows = zip(("x", "y", "denominator"), found.transform.coefficients, strict=True)
+    values = [_value(f"{axis}: {term}", c) for axis, row in rows for term, c in zip(names, row, strict=True) if c]
+    residuals = [
+        ("vx", "um", 2, found.residuals[:, 0] * MICROMETRES),
+        ("vy", "um", 2, found.residuals[:, 1] * MICROMETRES),
+    ]
+    return _document("interior", [*values, *_fit(found.sigma0 * MICROMETRES, "um", found.redundancy)], ids, residuals)
+
+
+def refine_document(ids: Sequence[str], measured: Floats, refined: Floats) -> Document:
+    """Return ideal image coordinates, and what was corrected; the principal point is part of it."""
+    shift = (refined - measured) * MICROMETRES
+    columns = [("x", "mm", 4, refined[:, 0]), ("y", "mm", 4, refined[:, 1])]
+    columns += [("dx", "um", 1, shift[:, 0]), ("dy", "um", 1, shift[:, 1])]
+    return _document("refine", [], ids, columns)
+
+
+def relative_document(ids: Sequence[str], found: Relative, base: float, unit: str) -> Document:
+    """Return a relative orientation: relative to the base; base and right photo in the left one; the model."""
+    elements = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
+    degrees = zip(elements, np.degrees(found.elements), np.degrees(found.sigmas), strict=True)
+    values = [_value(name, value, "deg", sigma) for name, value, sigma in degrees]
+    values += [_value(name, base * each, unit) for name, each in zip(("bx", "by", "bz"), found.base, strict=True)]
+    values += _angles(found.rotation)
+    values += _fit(found.sigma0 * MICROMETRES, "um", len(ids) - len(elements))
+    columns = [("q", "um", 2, found.parallax * MICROMETRES), *_places(found.model, unit)]
+    return _document("relative", [*values, _value("iterations", found.iterations)], ids, columns)
+
+
+def intersection_document(ids: Sequence[str], found: Intersection, unit: str) -> Document:
+    """Return intersected points, and the gap between the rays."""
+    return _document("intersection", [], ids, [*_places(found.xyz, unit), ("gap", unit, 4, found.gap)])
+
+
+def absolute_document(ids: Sequence[str], found: Absolute, unit: str) -> Document:
+    """Return an absolute orientation: seven parameters, and the residuals of the points."""
+    similarity = found.similarity
+    values = [_value("scale", similarity.scale)]
+    values += [_value(f"shift {axis}", each, unit) for axis, each in zip(XYZ, similarity.shift, strict=True)]
+    values += _angles(similarity.rotation)
+    columns = [(f"v{axis}", unit, 4, found.residuals[:, k]) for k, axis in enumerate(XYZ)]
+    return _document("absolute", [*values, *_fit(found.sigma0, unit, found.redundancy)], ids, columns)
+
+
+def resection_document(ids: Sequence[str], found: OrientedPhoto, unit: str) -> Document:
+    """Return the orientation of a photo with its precision, and the image residuals."""
+    sigma = np.sqrt(np.diag(found.covariance))
+    values = [_value(axis, found.center[k], unit, sigma[k]) for k, axis in enumerate(XYZ)]
+    values += _angles(found.rotation)
+    values += _fit(found.sigma0, "", found.redundancy)
+    return _document("resection", values, ids, _image_residuals(found.residuals))
+
+
+def _value(name: str, value: float, unit: str = "", sigma: float | None = None) -> Document:
+    return {"name": name, "value": _number(value), "unit": unit, "sigma": None if sigma is None else _number(sigma)}
+
+
+def _fit(sigma0: float, unit: str, redundancy: int) -> list[Document]:
+    return [_value("sigma0", sigma0, unit), _value("redundancy", redundancy)]
+
+
+def _angles(rotation: Floats) -> list[Document]:
+    turned = np.degrees(angles(rotation, SYSTEM))
+    return [_value(name, value, "deg") for name, value in zip(SYSTEM.split("-"), turned, strict=True)]
+
+
+def _image_residuals(residuals: Floats) -> list[tuple[str, str, int, Floats]]:
+    return [(f"v{axis}", "um", 2, residuals[:, k] * MICROMETRES) for k, axis in enumerate("xy")]
+
+
+def _places(xyz: Floats, unit: str) -> list[tuple[str, str, int, Floats]]:
+    return [(axis, unit, 4, xyz[:, k]) for k, axis in enumerate(XYZ)]
+
+
+def _number(value: float) -> float | None:
+    if isinstance(value, int):
+        return value
+    return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
+
+
+def _document(
+    step: str, values: list[Document], ids: Sequence[str], columns: Iterable[tuple[str, str, int, Floats]]
+) -> Document:
+    """Put values and columns together; the rows are lists in the order of the columns, the id first."""
+    listed = list(columns)
+    numbers = [
+        [round(value, decimals) if np.isfinite(value) else None for value in column.tolist()]
+        for _, _, decimals, column in listed
+    ]
+    return {
+        "photostrip_step": 1,
+        "step": step,
+        "values": values,
+        "columns": [{"name": name, "unit": unit, "decimals": decimals} for name, unit, decimals, _ in listed],
+        "points": [list(row) for row in zip(ids, *numbers, strict=True)],
+    }

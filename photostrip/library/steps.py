@@ -1,0 +1,266 @@
+"""The steps of the method one by one, with arrays: what a run does in one walk.
+
+Image coordinates are millimetres, x to the right and y up, reduced to the principal point but in ``interior`` and
+``refine``; the principal distance is in millimetres, angles in radians. Models have the unit of the base that is given;
+ground coordinates are Cartesian, metres: tangent plane, geocentric, or a map where its curvature does not matter.
+Rotations take image axes, or those of a model, to the axes named beside them. ``photostrip.run`` is the bundle.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from photostrip.errors import GeometryError, InputError
+from photostrip.frozen import dataclass
+from photostrip.geometry import plane
+from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
+from photostrip.triangulation.image_coordinates.refraction import refraction_constant
+from photostrip.triangulation.polynomial.terms import columns
+from photostrip.triangulation.relative_orientation.orientation import orient_pairs
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
+from photostrip.triangulation.resection.closed_form import OrientedPhoto, space_resection
+from photostrip.triangulation.strip_formation.intersection import Intersection, intersect
+from photostrip.triangulation.strip_formation.strip import hand_on_rotations
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from photostrip.arrays import Floats
+    from photostrip.camera import Camera
+
+ON_A_LINE = 1e-6  # ratio of the spreads of points that lie on one line
+
+
+@dataclass(frozen=True, eq=False)
+class Interior:
+    """Measured coordinates to photo coordinates, and how well the marks fit."""
+
+    transform: plane.PlaneTransform  # to be called with measured coordinates (n, 2)
+    residuals: Floats  # (n, 2): transformed minus calibrated coordinates of the marks, mm
+    sigma0: float  # standard deviation of a coordinate of a mark, mm; NaN without redundancy
+    redundancy: int
+
+
+def interior(
+    measured: ArrayLike,
+    calibrated: ArrayLike,
+    kind: Literal["conformal", "affine", "bilinear", "projective"] = "affine",
+) -> Interior:
+    """Interior orientation: the transformation of measured fiducial marks (n, 2) to calibrated ones (n, 2), mm.
+
+    Raises GeometryError where the marks do not determine the transformation.
+    """
+    source, target = _rows(measured, 2), _rows(calibrated, 2)
+    _same(source, target)
+    if kind not in plane.KINDS:
+        raise InputError(f"there is no transformation {kind!r}: {', '.join(plane.KINDS)}")
+    fitted = plane.KINDS[kind].fit(source, target, np.ones(len(source)))
+    residuals = fitted.residuals(source, target)
+    redundancy = 2 * len(source) - plane.KINDS[kind].unknowns
+    return Interior(fitted, residuals, sigma0=_sigma0(residuals, redundancy), redundancy=redundancy)
+
+
+def refine(xy: ArrayLike, camera: Camera, *, flying_height: float | None = None, ground_height: float = 0.0) -> Floats:
+    """Refine photo coordinates (n, 2): principal point, lens distortion, with heights in metres refraction, too.
+
+    Returns ideal image coordinates, reduced to the principal point, shape (n, 2). Source: docs/image-coordinates.md.
+    """
+    refraction = 0.0 if flying_height is None else refraction_constant(flying_height, ground_height)
+    return undistort(_rows(xy, 2), camera, Bending(refraction=refraction))
+
+
+@dataclass(frozen=True, eq=False)
+class Relative:
+    """Relative orientation of two photos, and the model that they form."""
+
+    elements: Floats  # (5,): alpha1, kappa1, alpha2, omega2, kappa2 relative to the base, radians
+    sigmas: Floats  # (5,): their standard deviations; NaN without redundancy
+    sigma0: float  # standard deviation of an image coordinate, mm; NaN without redundancy
+    parallax: Floats  # (n,): residual y parallaxes, mm
+    base: Floats  # (3,): direction of the base in the system of the left photo, a unit vector: bx, by, bz
+    rotation: Floats  # (3, 3): right photo to the system of the left photo
+    model: Floats  # (n, 3): points in the base frame (X along the base), in the unit of the base; NaN behind a camera
+    iterations: int
+
+
+def relative(
+    left: ArrayLike, right: ArrayLike, principal_distance: float, *, base: float = 1.0, weights: ArrayLike | None = None
+) -> Relative:
+    """Relative orientation of two photos by their y parallaxes, without approximate values and any search for errors.
+
+    left, right: (n, 2), the same points on both photos.
+    base: length of the base, in the unit that the model shall have.
+    weights: (n,), of the y parallaxes; 0 leaves a point out.
+    Raises GeometryError with fewer than five points, or where they do not determine the elements.
+
+    Source: [001] eq. 131-137.
+    """
+    one, other = _rows(left, 2), _rows(right, 2)
+    _same(one, other)
+    weight = np.ones(len(one)) if weights is None else np.asarray(weights, float)
+    if np.count_nonzero(weight) < MINIMUM_POINTS:
+        message = f"{np.count_nonzero(weight)} common points cannot orient a pair; five are needed"
+        raise GeometryError(message, code="too-few-common-points")
+    number = np.arange(len(one))
+    pairs = Pairs(
+        starts=np.zeros(1, np.intp),
+        pair=np.zeros(len(one), np.intp),
+        left=one,
+        right=other,
+        weight=weight,
+        focal=principal_distance,
+        point=number,
+        rows=np.column_stack([number, number]),
+    )
+    found = orient_pairs(pairs, ("left", "right"))
+    alpha1, kappa1, alpha2, omega2, kappa2 = found.elements[0]
+    rotations = (from_alpha_omega_kappa(alpha1, 0.0, kappa1), from_alpha_omega_kappa(alpha2, omega2, kappa2))
+    directions, turned = found.relative
+    return Relative(
+        elements=found.elements[0],
+        sigmas=found.sigmas[0],
+        sigma0=float(found.sigma0[0]),
+        parallax=found.parallax,
+        base=directions[0],
+        rotation=turned[0],
+        model=intersection(one, other, principal_distance, base=(base, 0.0, 0.0), rotations=rotations).xyz,
+        iterations=int(found.iterations[0]),
+    )
+
+
+def intersection(
+    left: ArrayLike,
+    right: ArrayLike,
+    principal_distance: float,
+    *,
+    base: ArrayLike,
+    rotations: tuple[ArrayLike, ArrayLike],
+    left_ray: bool = False,
+) -> Intersection:
+    """Intersect the rays of two photos whose orientation is known.
+
+    base: (3,), from the left to the right perspective centre; its X is the longest.
+    rotations: (3, 3) each, photo to the frame of the base.
+    left_ray: Y of the left ray, as the textbook has it, instead of the mean of both.
+    Returns coordinates relative to the left perspective centre, and the gap in Y between the rays.
+
+    Source: [001] eq. 137, 138.
+    """
+    rays = []
+    for xy, rotation in zip((_rows(left, 2), _rows(right, 2)), rotations, strict=True):
+        rays.append(np.asarray(rotation, float) @ np.vstack([xy.T, np.full(len(xy), -principal_distance)]))
+    return intersect(np.asarray(base, float), rays[0], rays[1], principal_distance, left_ray=left_ray)
+
+
+def chain(rotations: ArrayLike, first: ArrayLike | None = None) -> Floats:
+    """Hand the orientation on from photo to photo.
+
+    rotations: (p, 3, 3), of each right photo in the system of its left one (``Relative.rotation``).
+    first: (3, 3), rotation of the first photo; default: none.
+    Returns rotations of all photos to the system of the first, or to that of `first`: (p + 1, 3, 3).
+
+    Source: [001] eq. 131-134.
+    """
+    start = None if first is None else np.asarray(first, float)
+    return hand_on_rotations(np.asarray(rotations, float).reshape(-1, 3, 3), start)
+
+
+def scale_transfer(first: ArrayLike, second: ArrayLike) -> tuple[float, Floats]:
+    """Bring the second of two models to the scale of the first.
+
+    first, second: (n, 3), common points in each model, from the perspective centre of the photo that both share.
+    Returns the factor that the second model is multiplied by, the mean over the points, and what each point departs
+        from it, as a part of it (n,).
+
+    Source: [001] eq. 139-141.
+    """
+    one, other = _rows(first, 3), _rows(second, 3)
+    _same(one, other)
+    ratios = np.linalg.norm(one, axis=1) / np.linalg.norm(other, axis=1)
+    factor = float(ratios.mean())
+    return factor, ratios / factor - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Absolute:
+    """The similarity from a model to the ground, and how well it fits."""
+
+    similarity: Similarity  # to be called with model coordinates (n, 3)
+    residuals: Floats  # (n, 3): transformed minus given, metres
+    sigma0: float  # standard deviation of a coordinate, metres; NaN without redundancy
+    redundancy: int
+
+
+def absolute(model: ArrayLike, ground: ArrayLike, weights: ArrayLike | None = None) -> Absolute:
+    """Absolute orientation of a model (n, 3) on points known in all three coordinates (n, 3), by seven parameters.
+
+    weights: (n,), of the points.
+    Raises GeometryError with fewer than three points, or with all on one line.
+
+    Source: [001] eq. 145-149.
+    """
+    source, target = _rows(model, 3), _rows(ground, 3)
+    _same(source, target)
+    weight = np.ones(len(source)) if weights is None else np.asarray(weights, float)
+    if collinearity(source[weight > 0]) < ON_A_LINE**2:
+        message = "fewer than three points, or all on one line: the rotation about it is not determined"
+        raise GeometryError(message, code="control-deficient")
+    found = Similarity.from_points(source, target, weight)
+    residuals = found.residuals(source, target)
+    redundancy = 3 * int(np.count_nonzero(weight)) - 7
+    squares = residuals * np.sqrt(weight)[:, None]
+    return Absolute(found, residuals, sigma0=_sigma0(squares, redundancy), redundancy=redundancy)
+
+
+def polynomial(xyz: ArrayLike, misclosures: ArrayLike, terms: Sequence[str]) -> tuple[Floats, Floats]:
+    """Fit the deformation of a strip along one axis by a polynomial.
+
+    xyz: (n, 3), control points in the intermediate frame; misclosures: (n,), strip minus given along the axis.
+    terms: as the report names them: ``"1"``, ``"X"``, ``"Y"``, ``"XY"``, ``"X^2"``.
+    Returns coefficients, one for each term, and residuals (n,). Subtract the polynomial from the strip.
+    Raises GeometryError where there are fewer points than terms, or they do not determine them.
+
+    Source: [001] eq. 151.
+    """
+    design = columns(_rows(xyz, 3), list(terms))
+    size = np.linalg.norm(design, axis=0)
+    values = np.asarray(misclosures, float)
+    if len(design) < design.shape[1] or np.linalg.matrix_rank(design / np.where(size > 0, size, 1)) < design.shape[1]:
+        raise GeometryError(f"{len(design)} points do not determine {len(terms)} terms", code="control-deficient")
+    found = np.linalg.lstsq(design / size, values, rcond=None)[0] / size
+    return found, values - design @ found
+
+
+def resection(xy: ArrayLike, ground: ArrayLike, principal_distance: float, *, sigma: float = 0.005) -> OrientedPhoto:
+    """Orient one photo on known points, at any attitude and without approximate values.
+
+    xy: (n, 2), image coordinates; ground: (n, 3), their points; sigma: standard deviation of an image coordinate, mm.
+    Returns centre, rotation (photo to ground), their covariance, and residuals (n, 2).
+    Raises GeometryError with fewer than four points, with points on one line, or where no orientation fits.
+    """
+    image, points = _rows(xy, 2), _rows(ground, 3)
+    _same(image, points)
+    return space_resection(image, np.full(image.shape, sigma), points, principal_distance)
+
+
+def _rows(values: ArrayLike, width: int) -> Floats:
+    """Return coordinates as an array (n, width), or refuse them."""
+    found = np.asarray(values, float)
+    if found.ndim != 2 or found.shape[1] != width or not np.isfinite(found).all():
+        raise InputError(f"an array of finite numbers with {width} columns is needed, not one of shape {found.shape}")
+    return found
+
+
+def _same(one: Floats, other: Floats) -> None:
+    if len(one) != len(other):
+        raise InputError(f"{len(one)} and {len(other)} rows: each point needs a row in both")
+
+
+def _sigma0(residuals: Floats, redundancy: int) -> float:
+    return float(np.sqrt((residuals**2).sum() / redundancy)) if redundancy > 0 else float("nan")

@@ -1,0 +1,49 @@
+"""Single steps of the method as sections, and their points as a table."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from photostrip.report.page.numbers import fixed
+from photostrip.report.page.parts import DASH, Document, Facts, Part, Section
+from photostrip.report.page.tables import number, tabulated, words
+
+TITLES = {
+    "interior": "Interior orientation",
+    "refine": "Refined image coordinates",
+    "relative": "Relative orientation",
+    "intersection": "Space intersection",
+    "absolute": "Absolute orientation",
+    "resection": "Space resection",
+}
+
+
+def step_report(document: Document) -> tuple[str, tuple[Section, ...]]:
+    """Return title and sections of a step."""
+    parts: list[Part] = []
+    if document["values"]:
+        parts.append(Facts(tuple((each["name"], _written(each)) for each in document["values"])))
+    columns = [words("point", lambda row: row[0])]
+    columns += [
+        number(each["name"], partial(_cell, place), each["decimals"], each["unit"])
+        for place, each in enumerate(document["columns"], 1)
+    ]
+    return TITLES[document["step"]], (Section("", (*parts, tabulated(document["points"], columns))),)
+
+
+def _cell(place: int, row: list[float]) -> float:
+    return row[place]
+
+
+def _written(value: Document) -> str:
+    if value["value"] is None:
+        return DASH
+    digits = 6 if value["unit"] == "deg" else 4
+    text = str(value["value"]) if isinstance(value["value"], int) else _digits(value["value"], digits)
+    sigma = "" if value["sigma"] is None else f" ± {_digits(value['sigma'], digits)}"
+    return f"{text}{sigma} {value['unit']}".rstrip()
+
+
+def _digits(value: float, decimals: int) -> str:
+    """Return a number with decimals, or with digits where decimals would show nothing of it."""
+    return fixed(value, decimals) if abs(value) >= 10.0 ** (2 - decimals) else f"{value:.4g}"
