@@ -7,7 +7,7 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING
 
-from tests.source_tree import modules
+from tests.source_tree import modules, nodes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,7 +28,7 @@ def codes() -> dict[str, str]:
     """Give every code with the first place where it is told: ``module:line``."""
     found = dict.fromkeys(UNNAMED, "photostrip.errors")
     for module, path in sorted(modules().items()):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             for expression in _candidates(node):
                 for code in _texts(expression):
                     if CODE.fullmatch(code):

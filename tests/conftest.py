@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
+from photostrip.cli.main import NEW_OBJECTS
 from photostrip.threads import limit_threads
 from tests.forked import Forks
 
@@ -58,6 +59,7 @@ def _no_findings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("photostrip.pipeline.plausibility.gate.of_result", lambda *_: ())
 
 
+gc.set_threshold(NEW_OBJECTS)  # as the command does: 5 s of the tests
 gc.disable()  # until the tests are collected, which makes no cycles worth a search
 
 

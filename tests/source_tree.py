@@ -34,6 +34,12 @@ def modules(root: Path = ROOT) -> dict[str, Path]:
 
 
 @cache
+def nodes(path: Path) -> list[ast.AST]:
+    """Give every node of a module, itself first; read once for all tests of a process."""
+    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))))
+
+
+@cache
 def imports(root: Path = ROOT) -> list[Import]:
     """Give every import of the package, also those inside functions and under ``TYPE_CHECKING``.
 
@@ -45,7 +51,7 @@ def imports(root: Path = ROOT) -> list[Import]:
 def _imports_of(module: str, path: Path) -> list[Import]:
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     found = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             found += [Import(module, node.lineno, alias.name) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):

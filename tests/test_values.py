@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.source_tree import PACKAGE, ROOT, modules
+from tests.source_tree import PACKAGE, ROOT, modules, nodes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,24 +31,24 @@ class Source:
     """The modules below a root: the values that they define, and what their names stand for."""
 
     def __init__(self, root: Path) -> None:
-        self.trees = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules(root).items()}
+        self.nodes = {name: nodes(path) for name, path in modules(root).items()}
         self.names = {
             name: {
                 node.name: f"{name}.{node.name}"
-                for node in tree.body
+                for node in ast.iter_child_nodes(module)
                 if isinstance(node, ast.ClassDef | ast.FunctionDef)
             }
-            for name, tree in self.trees.items()
+            for name, (module, *_) in self.nodes.items()
         }
-        for name, tree in self.trees.items():
-            for node in ast.walk(tree):
+        for name, inside in self.nodes.items():
+            for node in inside:
                 if isinstance(node, ast.ImportFrom) and node.module:
                     for alias in node.names:
                         self.names[name].setdefault(alias.asname or alias.name, f"{node.module}.{alias.name}")
         self.values = {
             f"{name}.{node.name}": self._value(name, node)
-            for name, tree in self.trees.items()
-            for node in ast.walk(tree)
+            for name, inside in self.nodes.items()
+            for node in inside
             if isinstance(node, ast.ClassDef)
         }
 
@@ -84,10 +84,10 @@ class Source:
         return inherited + len(value.fields) if value.is_value or inherited else 0
 
 
-def bare_calls(tree: ast.Module) -> Iterator[tuple[ast.Call, str]]:
+def bare_calls(nodes: list[ast.AST]) -> Iterator[tuple[ast.Call, str]]:
     """Give the calls with more than three arguments without a name; of ``cls(...)`` also the class that it is."""
-    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
-    for node in ast.walk(tree):
+    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
+    for node in nodes:
         if isinstance(node, ast.Call) and (len(node.args) > MOST or any(isinstance(a, ast.Starred) for a in node.args)):
             builds_itself = ast.unparse(node.func) == "cls"
             yield node, next((each.name for each in classes if builds_itself and node in ast.walk(each)), "")
@@ -97,8 +97,8 @@ def built_without_names(root: Path) -> list[str]:
     """Give every call below `root` that builds a value of more than three fields with four or more bare arguments."""
     source = Source(root)
     found = []
-    for module, tree in source.trees.items():
-        for node, inside in bare_calls(tree):
+    for module, nodes_of_module in source.nodes.items():
+        for node, inside in bare_calls(nodes_of_module):
             name = f"{module}.{inside}" if inside else source.full_name(module, node.func)
             if source.fields(name) > MOST:
                 found.append(f"{module}:{node.lineno} builds {name.rpartition('.')[2]}")
