@@ -305,7 +305,7 @@ def test_refraction_is_taken_out(tilt_deg: float, left: float) -> None:
 
 
 @pytest.mark.slow
-@hypothesis_settings(max_examples=40)
+@hypothesis_settings(max_examples=25)
 @given(
     seed=st.integers(0, 10_000),
     photos=st.integers(3, 14),

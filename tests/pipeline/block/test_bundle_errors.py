@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 
-TRIALS = 400
+TRIALS = 200
 BLOCK = Spec(flight=Flight(photos=8, strips=2), points=Points(extra_per_model=8))
 
 

@@ -157,6 +157,7 @@ def test_two_wrong_points_of_a_corner_do_not_cost_the_good_one() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
 def test_strips_without_errors_lose_nothing() -> None:
     lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.wrong_rays) for seed in range(20)]
     assert sum(each > 0 for each in lost) <= 2
