@@ -50,6 +50,7 @@ def strasbourg(tmp_path_factory: pytest.TempPathFactory) -> Result:
     return triangulate(loaded.inputs, loaded.settings)
 
 
+@pytest.mark.slow
 def test_the_published_sigma0_and_counts(strasbourg: Result) -> None:
     bundle = document_of(strasbourg)["bundle"]
     assert bundle["sigma0"] == pytest.approx(1.1786, abs=0.0001)

@@ -304,6 +304,7 @@ def test_answers_of_another_program_are_refused() -> None:
 # ------------------------------------------------------------------------------------------------ the parcel
 
 
+@pytest.mark.slow
 def test_a_parcel_is_all_that_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same answer, to the last byte and digest, where none of the files exists any more."""
     (project,) = write_projects(tmp_path / "strips", 1)

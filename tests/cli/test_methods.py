@@ -67,6 +67,7 @@ def test_a_method_that_is_refused_is_told(capsys: pytest.CaptureFixture[str], tm
     assert "control" in err
 
 
+@pytest.mark.slow
 def test_a_method_that_does_not_take_the_project_is_told_with_its_reason(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -110,6 +111,7 @@ def test_options_that_do_not_go_together(capsys: pytest.CaptureFixture[str], tmp
     assert "no --depfile" in err
 
 
+@pytest.mark.slow
 def test_the_report_of_a_bundle(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     code, out, _ = run(capsys, PROJECT, *BUNDLE, "-o", str(tmp_path), "--verbose")
     assert code == 0
@@ -170,6 +172,7 @@ def test_a_missing_table_of_positions_is_the_project(capsys: pytest.CaptureFixtu
     assert "camera_positions.file" in err
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_is_not_kept(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(capsys, PROJECT, *BUNDLE, "--set", "tolerances.check_rms_xy=0.01", "--quiet")
     assert code == 1

@@ -23,6 +23,7 @@ def project(tmp_path: Path) -> Path:
     return tmp_path / "plotted" / "project.yaml"
 
 
+@pytest.mark.slow
 def test_everything_that_is_written(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = project.parent.parent
     assert main(["run", str(project), "-o", str(folder / "a"), "--html"]) == 0
@@ -47,6 +48,7 @@ def test_everything_that_is_written(project: Path, capsys: pytest.CaptureFixture
     assert main(["compare", str(folder / "a" / "result.json"), str(folder / "b" / "result.json")]) == 0
 
 
+@pytest.mark.slow
 def test_a_changed_coordinate_is_seen_by_compare(project: Path) -> None:
     folder = project.parent.parent
     assert main(["run", str(project), "-o", str(folder / "a"), "--quiet"]) == 0
@@ -62,6 +64,7 @@ def test_batch_and_check_take_models(project: Path) -> None:
     assert (project.parent / "all").is_dir()
 
 
+@pytest.mark.slow
 def test_the_trace_shows_the_way_to_the_ground(project: Path) -> None:
     trace = project.parent / "trace.json"
     assert main(["run", str(project), "--quiet", "--trace", str(trace)]) == 0

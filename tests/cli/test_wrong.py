@@ -148,6 +148,7 @@ def test_a_file_for_another_command_is_told_as_such(
     assert f"{key}: this is {words}" in line
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_is_not_kept_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_project(tmp_path / "p", spec())
     assert call(capsys, "run", path, "--set", "tolerances.check_rms_xy=1e-6", "-o", tmp_path / "out")[0] == 1

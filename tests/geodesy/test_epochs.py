@@ -55,6 +55,7 @@ def notes(crs: str, output: FrameSpec) -> dict[str, str]:
     return {note.code: note.message for note in triangulate(inputs, settings_of(simulation)).notes}
 
 
+@pytest.mark.slow
 def test_a_change_of_datum_is_told_with_its_accuracy_and_area() -> None:
     """It was not told at all."""
     told = notes("EPSG:31468", FrameSpec("EPSG:25832", GROUND_AXES))

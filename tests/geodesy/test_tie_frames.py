@@ -602,6 +602,7 @@ def test_a_project_without_a_frame() -> None:
     assert refused() == ["no ground frame is given; expected a control list with its crs"]
 
 
+@pytest.mark.slow
 def test_all_faults_come_at_once_each_at_its_key() -> None:
     found = refused(
         "EPSG:99999",
@@ -649,6 +650,7 @@ print("pyproj" in sys.modules)
     assert run(program) == "False"
 
 
+@pytest.mark.slow
 def test_the_network_stays_off() -> None:
     program = """
 from photostrip.geodesy.frame_spec import FrameSpec

@@ -325,6 +325,7 @@ def test_the_lunar_outlier_is_found_and_nothing_else(screening: str) -> None:
     assert rejected == [("F1", "F2", OUTLIER)]
 
 
+@pytest.mark.slow
 def test_without_the_outlier_the_first_lunar_pair_fits_like_the_others() -> None:
     assert parallax_rms(result(APOLLO).strips[0]) == pytest.approx([5.6, 8.2, 6.9, 6.8], abs=0.06)
 
@@ -594,6 +595,7 @@ def test_the_simulated_sample_is_what_its_specification_gives() -> None:
         assert (DATA / SIMULATED / file).read_text(encoding="utf-8") == text, "renew with make golden"
 
 
+@pytest.mark.slow
 def test_simulated_new_points_are_near_the_truth_and_not_on_it() -> None:
     errors = true_errors("new", "check")
     assert len(errors) == 159

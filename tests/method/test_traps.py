@@ -289,6 +289,7 @@ def with_rows(inputs: Inputs, rows: list[tuple[str, str, float, float]]) -> Inpu
     return replace(inputs, observations=observations)
 
 
+@pytest.mark.slow
 def test_points_seen_once_are_listed_and_change_nothing() -> None:
     done = simulate(Spec())
     inputs = inputs_of(done)

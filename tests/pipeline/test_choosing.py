@@ -78,6 +78,7 @@ def test_other_strips_get_their_covariance(name: str) -> None:
     assert points_of(result) == points_of(adjusted(name, "covariance"))
 
 
+@pytest.mark.slow
 def test_a_lens_error_that_no_calibration_knows_brings_the_polynomial_back() -> None:
     (strip,) = adjusted("usual", AUTO, 60.0).strips
     choice = strip.choice

@@ -36,6 +36,7 @@ def both() -> tuple[Result, Result]:
     return triangulate(inputs, settings), triangulate(geocentric(inputs), settings)
 
 
+@pytest.mark.slow
 def test_points_and_photos_are_the_same(both: tuple[Result, Result]) -> None:
     on_map, in_space = both
     np.testing.assert_allclose(in_space.points.ground, on_map.points.ground, rtol=0, atol=MILLIMETRE)

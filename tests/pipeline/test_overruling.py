@@ -45,6 +45,7 @@ def test_a_wrong_measurement_is_rejected_by_itself() -> None:
     assert not [note for note in result.notes if note.code.startswith("user-")]
 
 
+@pytest.mark.slow
 def test_a_measurement_that_is_kept_stays_in_use_and_is_reported() -> None:
     result = adjusted(keep=("105/p4_1",))
     assert in_use(result, *WRONG)
@@ -56,6 +57,7 @@ def test_a_measurement_that_is_kept_stays_in_use_and_is_reported() -> None:
     }
 
 
+@pytest.mark.slow
 def test_a_measurement_that_is_dropped_takes_no_part_and_is_reported() -> None:
     assert in_use(adjusted(), "103", "p2_0")
     result = adjusted(drop=("103/p2_0",))

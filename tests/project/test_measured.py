@@ -100,6 +100,7 @@ def test_a_list_of_pairs_without_a_parallax_is_told_what_it_lacks(sample: Sample
     )
 
 
+@pytest.mark.slow
 def test_a_strip_from_a_stereocomparator_is_that_of_its_photos(tmp_path: Path) -> None:
     """Every photo but the first and the last is measured in two pairs; the means are what was measured."""
     simulation = simulate(Spec(flight=Flight(photos=6)))

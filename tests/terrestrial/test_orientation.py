@@ -298,6 +298,7 @@ def test_a_refraction_coefficient_is_found_or_given() -> None:
     assert fixed.values == pytest.approx(np.array(angles), abs=1e-11)
 
 
+@pytest.mark.slow
 def test_the_standard_deviation_of_the_coefficient_is_its_scatter() -> None:
     angles, found = (0.4, 0.08, -0.02), []
     exact = from_the_theodolite(angles, 0.0, refraction=0.13)

@@ -227,6 +227,7 @@ def test_weights_add_the_strip_to_the_control() -> None:
     assert np.array_equal(weight[1] > 0, [False, False, True])
 
 
+@pytest.mark.slow
 def test_with_noise_sigma0_is_one() -> None:
     rng, squares = np.random.default_rng(1), []
     for _ in range(150):

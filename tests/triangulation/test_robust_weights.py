@@ -30,6 +30,7 @@ def test_the_median_of_a_long_group_is_that_of_its_values() -> None:
         assert found[number] == np.sort(values[group == number])[((group == number).sum() - 1) // 2]
 
 
+@pytest.mark.slow
 def test_the_scale_of_normal_residuals_and_its_spread() -> None:
     rng = np.random.default_rng(2)
     size = np.abs(rng.normal(0, 2.0, (3000, 201)))

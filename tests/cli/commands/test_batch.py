@@ -54,6 +54,7 @@ def test_every_project_gets_the_result_that_run_gives(here: Path, capsys: pytest
     assert {path.name for path in (here / "out").iterdir()} == {"s1", "s2", "s3", ".batch.lock", *SUMMARIES}
 
 
+@pytest.mark.slow
 def test_strict_asks_more_of_the_same_results(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     control = here / "strips" / "s2" / "control.csv"
     lines = control.read_text(encoding="utf-8").splitlines(keepends=True)
@@ -68,6 +69,7 @@ def test_strict_asks_more_of_the_same_results(here: Path, capsys: pytest.Capture
     assert junit.count("<failure") == 1
 
 
+@pytest.mark.slow
 def test_a_failure_ends_no_other_project(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     spoil(here / "strips" / "s2")
     assert main(["batch", "strips", "-o", "out", "-j", "1"]) == 2
@@ -81,6 +83,7 @@ def test_a_failure_ends_no_other_project(here: Path, capsys: pytest.CaptureFixtu
     assert summary["projects"][1]["findings"][0]["code"] == "file-missing"
 
 
+@pytest.mark.slow
 def test_the_summary_is_the_same_on_paper_and_on_the_terminal(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     spoil(here / "strips" / "s2")
     for form, file in (
@@ -103,6 +106,7 @@ def test_the_table_has_the_numbers_of_the_results(here: Path, capsys: pytest.Cap
     assert float(row["rms_height_m"]) == result["summary"][row["rms_at"]]["height"]["rms"]
 
 
+@pytest.mark.slow
 def test_a_tolerance_is_a_failure_and_a_fault_an_error(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     spoil(here / "strips" / "s3")
     assert main(["batch", "strips", "--set", "tolerances.sigma0_um=0.001", "--format", "junit"]) == 2
@@ -121,6 +125,7 @@ def test_the_exit_code_is_that_of_the_worst_project(here: Path, change: str, cod
     assert not (here / "s1").exists()
 
 
+@pytest.mark.slow
 def test_annotations_name_file_and_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     spoil(here / "strips" / "s2")
     assert main(["batch", "strips", "--format", "github", "--quiet"]) == 2
@@ -128,6 +133,7 @@ def test_annotations_name_file_and_line(here: Path, capsys: pytest.CaptureFixtur
     assert line.startswith("::error file=strips/s2/project.yaml,line=")
 
 
+@pytest.mark.slow
 def test_a_rule_for_make_lists_what_was_read(here: Path) -> None:
     assert main(["batch", "strips", "-o", "out", "--depfile", "out.d", "--quiet"]) == 0
     first = (here / "out.d").read_text(encoding="utf-8").splitlines()[0]
@@ -199,6 +205,7 @@ def test_a_file_that_two_projects_share_changes_both(here: Path, capsys: pytest.
     assert computed(capsys.readouterr().err) == {"s1", "s3"}
 
 
+@pytest.mark.slow
 def test_a_grid_file_that_appears_changes_its_project(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     name = "made-up-grid.gsb"
     project = here / "strips" / "s1" / "project.yaml"

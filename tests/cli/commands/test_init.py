@@ -58,6 +58,7 @@ def test_the_template_asks_for_what_is_missing_and_for_nothing_else(
     ]
 
 
+@pytest.mark.slow
 def test_the_template_runs_when_it_is_filled_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "strip"
     call(capsys, "init", folder)

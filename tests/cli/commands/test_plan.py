@@ -462,6 +462,7 @@ def test_the_picture_of_a_strip_has_one_legend(capsys: pytest.CaptureFixture[str
 # -------------------------------------------------------------------------------------------------- displacements
 
 
+@pytest.mark.slow
 def test_displacements_from_options_and_from_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     options = ("--camera", "UMK 10/1318", "--base", "30", "--distances", "50,120", "--sigma-um", "4")
     from_options = answer(capsys, "plan", "displacement", *options, "--format", "json")

@@ -326,6 +326,7 @@ def test_correction_directions_from_both_ends_of_the_base_feed_the_displacements
     assert (code, "`directions` gives the orientation of the photo, and `omega` another one" in words(err)) == (2, True)
 
 
+@pytest.mark.slow
 def test_displacement_in_every_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     survey = write(tmp_path)
     document = answer(capsys, "displacement", survey)

@@ -245,6 +245,7 @@ def test_sigma0_and_precision_are_those_of_the_noise() -> None:
     assert min(squares) > 150
 
 
+@pytest.mark.slow
 def test_stated_standard_deviations_that_are_wrong_are_told() -> None:
     simulation = simulate(Spec(flight=Flight(photos=6, strips=2), image=Image(sigma_um=5.0)))
     inputs = inputs_of(simulation)

@@ -86,6 +86,7 @@ def test_many_errors_at_once(method: str) -> None:
     assert np.sqrt((errors(simulation, result) ** 2).mean()) < 0.15
 
 
+@pytest.mark.slow
 def test_wrong_control_is_named_and_left_out() -> None:
     simulation = simulate(BLOCK)
     inputs = inputs_of(simulation)
@@ -103,6 +104,7 @@ def test_wrong_control_is_named_and_left_out() -> None:
     assert np.abs(difference[:2]).max() < 0.2  # the plan still counts
 
 
+@pytest.mark.slow
 def test_a_wrong_camera_position_is_named() -> None:
     simulation = simulate(BLOCK)
     noise = np.random.default_rng(1).normal(size=(16, 3)) * 0.05
@@ -278,6 +280,7 @@ def test_a_wrong_calibration_is_found() -> None:
     assert np.sqrt((errors(simulation, without) ** 2).mean()) > np.sqrt((errors(simulation, result) ** 2).mean())
 
 
+@pytest.mark.slow
 def test_parameters_that_are_nothing_are_told() -> None:
     _, result = calibrated(CROSSED, {}, ("k1", "p1", "affinity"))
     assert result.bundle is not None

@@ -43,6 +43,7 @@ def test_single_photos_on_full_control_come_back_to_the_truth(crs: str) -> None:
     assert [row["strip"] for row in document["precision"]["basis"]] == [photo["id"] for photo in document["photos"]]
 
 
+@pytest.mark.slow
 def test_every_output_knows_single_photos() -> None:
     simulation = simulate(replace(Spec(), flight=Flight(photos=6), control=replace(MANY, noise=(0.05, 0.05, 0.08))))
     result = adjusted(simulation, singles(simulation))

@@ -330,6 +330,7 @@ def test_a_check_point_outside_a_projection_is_refused_by_name() -> None:
         triangulate(away, Settings())
 
 
+@pytest.mark.slow
 def test_two_control_points_exchanged() -> None:
     inputs = inputs_of(simulation("utm"))
     one, other = control_rows(inputs)[[1, 7]]
@@ -343,6 +344,7 @@ def test_two_control_points_exchanged() -> None:
     assert set(findings[0].points) == {inputs.control.ids[one], inputs.control.ids[other]}
 
 
+@pytest.mark.slow
 def test_start_angles_in_gons_and_in_another_system() -> None:
     made = simulation("utm")
     truth, inputs = made.truth, inputs_of(made)

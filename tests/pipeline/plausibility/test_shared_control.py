@@ -53,6 +53,7 @@ def test_a_bundle_names_the_list_and_rejects_its_points() -> None:
     assert {each.kind for each in result.bundle.screened.rejections if not each.readmitted} == {"control"}
 
 
+@pytest.mark.slow
 def test_lists_that_go_together_share_nothing() -> None:
     """With single wrong points too."""
     assert two_lists((0.0, 0.0, 0.0)).findings == ()

@@ -85,6 +85,7 @@ def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shi
     assert rms(simulation, result) < 0.4
 
 
+@pytest.mark.slow
 def test_one_strip_of_several_is_named_alone() -> None:
     """Only the second strip is off."""
     shift = np.repeat([[0.0] * 3, [4.0, 4.0, 0.0]], 10, axis=0)
@@ -104,6 +105,7 @@ def test_a_drift_of_the_positions_is_named() -> None:
     assert lost(result) == []
 
 
+@pytest.mark.slow
 def test_a_principal_distance_off_by_a_percent_is_named() -> None:
     """Positions and control tell it from a common height."""
     simulation, result = adjusted(distance=1.01)

@@ -113,6 +113,7 @@ def test_a_bundle_says_whose_given_points_need_a_closer_look(role: str, monkeypa
     assert 0 < len(looked_at) < len(inputs.strips)
 
 
+@pytest.mark.slow
 def test_one_control_list_outside_its_area_is_told_alone() -> None:
     """Gauss-Kruger zones are used beyond the countries for which they were registered."""
     spec = Spec(
@@ -168,6 +169,7 @@ def test_the_bend_of_a_long_strip_is_no_typing_error(adjustment: str) -> None:
     assert told(inputs_of(made), replace(settings_of(made), adjustment=adjustment)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("role", "index", "worth"), [("K", 1, 10.0), ("G", 5, 100.0)])
 def test_a_typing_error_in_a_long_strip_is_told_as_the_adjustment_sees_it(role: str, index: int, worth: float) -> None:
     made = long_strip()

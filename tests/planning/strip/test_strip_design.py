@@ -309,6 +309,7 @@ def test_ways_of_equal_spacing() -> None:
     assert list(equal_ways(Placement(30, ""), 5, 3)) == []
 
 
+@pytest.mark.slow
 def test_a_whole_design() -> None:
     layouts = (ControlLayout("corners", kind="corners"), ControlLayout("bands", bands=3))
     design = Design(

@@ -71,6 +71,7 @@ def test_the_page_has_no_other_unit(adjustment: str) -> None:
     assert re.findall(r"\bdeg\b|″", page) == []
 
 
+@pytest.mark.slow
 def test_points_csv_has_the_unit_in_its_head() -> None:
     rows = {
         unit: list(csv.DictReader(io.StringIO(result_files(document(unit))["points.csv"]))) for unit in ("deg", "gon")

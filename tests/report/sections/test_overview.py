@@ -55,6 +55,7 @@ def test_it_is_short(frame: str, strips: int) -> None:
     assert len(lines(case(frame, strips).document)) < 100
 
 
+@pytest.mark.slow
 def test_it_is_short_with_too_much_of_everything() -> None:
     printed = lines(crowded())
     assert 80 < len(printed) <= MOST_LINES

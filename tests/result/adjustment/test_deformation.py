@@ -69,6 +69,7 @@ def _deformations(result: Result) -> list[Any]:
     return [model for strip in result.strips for model in model_deformations(strip, result.frames)]
 
 
+@pytest.mark.slow
 def test_a_twisted_photo_shows_in_its_models() -> None:
     rows = documents(run(twist_arcsec=400.0))
     assert [row["left"] for row in rows] == ["1001", "1002", "1003"]
@@ -115,6 +116,7 @@ def test_what_all_models_have_in_common_is_in_the_verdict() -> None:
     assert document["status"] in {"look", "failed"}
 
 
+@pytest.mark.slow
 def test_the_mean_of_all_models_is_tested_by_their_scatter() -> None:
     """By scipy, from the coefficients that the result shows."""
     document = with_a_lens(2, 0.0)

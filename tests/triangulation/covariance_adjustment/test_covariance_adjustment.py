@@ -190,6 +190,7 @@ def test_passes_go_on_until_nothing_is_left_to_be_linear(monkeypatch: pytest.Mon
     assert off[2] > 0.5
 
 
+@pytest.mark.slow
 def test_the_control_alone_when_asked_for() -> None:
     """Without the distances nothing is known better, and much is known worse; both forms say what took part."""
     inputs = noisy(9, 80.0).inputs

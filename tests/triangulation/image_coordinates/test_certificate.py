@@ -74,6 +74,7 @@ def test_five_distances_fix_four_marks_and_six_check_them() -> None:
     assert 0.02 < wrong.sigma0 < 0.1
 
 
+@pytest.mark.slow
 def test_sigma0_is_the_precision_of_the_distances() -> None:
     rng = np.random.default_rng(8)
     truth = distances(figure(CORNERS | SIDES, rng))

@@ -142,6 +142,7 @@ def test_a_third_model_says_which_one_is_wrong() -> None:
     assert np.abs(back(found.node_xyz[[place]]) - more.points[node]).max() < 0.5  # metres; the error is 4 to 7 m
 
 
+@pytest.mark.slow
 def test_good_points_are_rejected_as_rarely_as_stated() -> None:
     gone = links = 0
     for seed in range(40):

@@ -270,6 +270,7 @@ def test_a_deformation_asks_for_its_degree(power: int, degree: int) -> None:
     assert degrees.count(degree) > 15  # a term too many is taken now and then; it costs little
 
 
+@pytest.mark.slow
 def test_an_affine_deformation_asks_for_the_first_degree() -> None:
     xyz = layout(SEVEN)
     stretch = np.column_stack([0 * xyz[:, 0], xyz[:, 1] * 1e-3, 0 * xyz[:, 0]])  # 1.4 m at the edges, none along

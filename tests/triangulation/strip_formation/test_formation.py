@@ -359,6 +359,7 @@ def test_both_transfers_are_equally_good_over_all_common_points(overlap: float) 
     assert least_squares / distances == pytest.approx(1, abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_spread_of_the_ratios_is_that_of_the_parallaxes() -> None:
     """A ratio of two distances along one ray is known to sqrt(2) sigma_p / p at best, sigma_p = sqrt(2) sigma."""
     sigma, spreads = 5 * MICROMETRE, []

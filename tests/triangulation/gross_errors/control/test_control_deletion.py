@@ -244,6 +244,7 @@ def test_a_wrong_point_is_found_in_sections_too(monkeypatch: pytest.MonkeyPatch)
     assert [(found.control.ids[each.row], each.axes) for each in found.wrong_control] == [("p6_1", (2,))]
 
 
+@pytest.mark.slow
 def test_a_bend_takes_no_good_control() -> None:
     """A bend that no random error explains: polynomials take it, and the good control stays."""
     strip = flown()
@@ -286,6 +287,7 @@ def test_the_rest_of_a_wrong_point_is_tested_at_a_level_of_its_own(height: float
     assert {column - 3 for column in tested.completed(tested.grown())} == wrong
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [21, 28, 41])
 def test_two_fifths_of_the_control_are_found_wrong(seed: int) -> None:
     """Suspected on the way: more than half, or a set that explains the misclosures not quite."""

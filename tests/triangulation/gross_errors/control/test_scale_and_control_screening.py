@@ -67,6 +67,7 @@ def test_a_wrong_height_leaves_the_plan_position_in_use() -> None:
     assert strip.control.use[row].tolist() == [True, True, False]
 
 
+@pytest.mark.slow
 def test_exchanged_points_are_named_as_an_exchange() -> None:
     strip = flown()
     step = strip.xyz[strip.at["p9_-1"]] - strip.xyz[strip.at["p6_1"]]
@@ -76,6 +77,7 @@ def test_exchanged_points_are_named_as_an_exchange() -> None:
     assert {ids[each.row]: ids[each.other] for each in found.wrong_control} == {"p6_1": "p9_-1", "p9_-1": "p6_1"}
 
 
+@pytest.mark.slow
 def test_the_result_is_as_good_as_without_the_wrong_control() -> None:
     strip = flown()
 
@@ -151,6 +153,7 @@ def test_two_fifths_of_wrong_control_come_out_and_nothing_else(seed: int) -> Non
     assert np.array_equal(kept.use, control.use[rows] & ~bad[rows])
 
 
+@pytest.mark.slow
 def test_a_scale_that_may_be_wrong_does_not_cost_sound_control() -> None:
     """One of the two points that join the models is wrong along the base: which, nobody can tell."""
     strip = flown(extra=20)

@@ -113,6 +113,7 @@ def test_a_fifth_of_wrong_points_comes_out_and_nothing_else(size: float) -> None
     assert np.median(flown.errors(found.orientation.elements)) < 1.5 * np.median(clean)
 
 
+@pytest.mark.slow
 def test_two_equal_errors_in_a_corner_zone_come_out_although_the_third_point_looks_wrong() -> None:
     flown = level(6, 50, (3,) * 6)
     errors = np.zeros((50, 18))
@@ -165,6 +166,7 @@ def test_a_sigma_stated_too_large_is_kept() -> None:
     assert np.isnan(found.scatter.found)
 
 
+@pytest.mark.slow
 def test_neither_the_order_of_rows_nor_that_of_pairs_matters() -> None:
     flown = level(12, 12, (3,) * 6)
     rng = np.random.default_rng(13)
@@ -190,6 +192,7 @@ def test_errors_that_cannot_be_found_are_suspected() -> None:
     assert found.masked.tolist() == [True]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", [0.55, 1.0])
 def test_what_no_search_can_put_right_is_given_up(wrong: float, monkeypatch: pytest.MonkeyPatch) -> None:
     from_nothing, again = list[int](), list[int]()
@@ -313,6 +316,7 @@ def test_the_scatter_is_that_of_the_strip_when_one_photo_is_worse() -> None:
     assert (~found.orientation.used).sum() <= 12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scatter", "searched"), [(0.008, True), (0.013, False)])
 def test_parallaxes_that_scatter_by_a_hundredth_of_the_principal_distance_are_not_searched(
     scatter: float, *, searched: bool
@@ -323,6 +327,7 @@ def test_parallaxes_that_scatter_by_a_hundredth_of_the_principal_distance_are_no
     assert found.masked.all() == (not searched)
 
 
+@pytest.mark.slow
 def test_the_number_of_pairs_at_a_time_is_for_the_memory_and_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     flown = level(25, 150, (3,) * 6)
     rng = np.random.default_rng(26)

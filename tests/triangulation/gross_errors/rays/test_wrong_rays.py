@@ -112,6 +112,7 @@ def test_an_error_along_the_base_takes_the_place_and_leaves_the_parallaxes() -> 
     assert oriented.used[oriented.point == strip.at["p4_1"]].all()
 
 
+@pytest.mark.slow
 def test_a_point_within_rounding_of_the_limit_goes_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test of the whole adjustment and that of the point alone may differ in the last digit."""
 
@@ -125,6 +126,7 @@ def test_a_point_within_rounding_of_the_limit_goes_with_a_reason(monkeypatch: py
     assert {each["point"] for each in document_of(result)["rejected"] if each["reason"]} == {"p4_1"}
 
 
+@pytest.mark.slow
 def test_a_photo_that_is_measured_worse_is_told_from_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five times the standard deviation on one photo: the others keep theirs."""
     found: list[Floats] = []
@@ -227,6 +229,7 @@ def test_neither_order_nor_names_decide(seed: int) -> None:
     assert max(float(np.abs(there[name] - xyz[name]).max()) for name in xyz) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_pair_that_would_not_be_held_keeps_its_points_and_the_others_are_searched_all_the_same() -> None:
     """Six points a pair: without three of them, wrong along the base, the photos on either side hang free."""
     near = {("106", "p5_1"): (0.3, 0.0), ("107", "p6_-1"): (0.3, 0.0), ("107", "p6_0"): (-0.2, 0.0)}
