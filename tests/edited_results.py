@@ -36,7 +36,7 @@ class Edited(NamedTuple):
 
 def edited(document: Any, random: Random) -> Edited:  # noqa: ANN401 (any JSON)
     """Do one to three things to a document."""
-    document = json.loads(json.dumps(document))
+    document = json.loads(json.dumps(document, default=list))
     done = [_edit(document, random) for _ in range(random.randint(1, 3))]
     text = json.dumps(document).replace(f'"{TOO_LONG}"', "9" * 5000)
     if random.random() < 0.05:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -329,6 +330,14 @@ class Result:
     def model_strips(self) -> tuple[StripResult, ...]:
         """The strips where they are of independent models, otherwise none."""
         return () if self.inputs.models is None else self.strips
+
+    @cached_property
+    def level_covariances(self) -> Floats | None:
+        """Covariances (n, 3, 3) of the points along east, north and up, metres^2; None when they are not known."""
+        if self.precision is None:
+            return None
+        level = self.output.level_axes_at(self.points.cartesian)
+        return np.asarray(level @ self.precision.points @ level.transpose(0, 2, 1), float)
 
     @property
     def roles(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -12,14 +12,54 @@ from photostrip.result.description import Quantity, Table, table_at
 from photostrip.result.numbers import DEGREES, GEOGRAPHIC, GROUND, IMAGE, RADIANS, Document, Plain, rounded, significant
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     from numpy.typing import ArrayLike
+
+    from photostrip.arrays import Numbers
 
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
 DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES, "gon": DEGREES, "rad": RADIANS}
 
 
-class Records(list[Document]):
-    """Records as they are written: what holds them takes them as they are."""
+class Records(Sequence[Document]):
+    """Records as they are written, kept as columns of equal length: a record is made when it is asked for."""
+
+    def __init__(self, columns: Mapping[str, Sequence[Plain]]) -> None:
+        self.columns = dict(columns)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), ()))
+
+    def __iter__(self) -> Iterator[Document]:
+        return iter(as_records(self.columns))
+
+    @overload
+    def __getitem__(self, place: int) -> Document: ...
+    @overload
+    def __getitem__(self, place: slice) -> Records: ...
+    def __getitem__(self, place: int | slice) -> Document | Records:
+        found = {key: column[place] for key, column in self.columns.items()}
+        return Records(found) if isinstance(place, slice) else found
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and list(self) == list(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def taken(self, order: Numbers) -> Records:
+        """Return the records in another order."""
+        places = order.tolist()
+        return Records({key: [column[place] for place in places] for key, column in self.columns.items()})
+
+    @classmethod
+    def joined(cls, parts: Iterable[Records]) -> Records:
+        """Return records of the same keys one after the other."""
+        columns: dict[str, list[Plain]] = {}
+        for part in parts:
+            for key, column in part.columns.items():
+                columns.setdefault(key, []).extend(column)
+        return cls(columns)
 
 
 def rounded_as(entry: Quantity, value: ArrayLike, unit: str = "") -> Plain:
@@ -66,7 +106,7 @@ def records(block: str, columns: Mapping[str, Any]) -> Records:
     stands in every record.
     """
     size = next(len(column) for column in columns.values() if isinstance(column, list | tuple | np.ndarray))
-    return Records(as_records({key: _cells(table_at(block)[key], column, size) for key, column in columns.items()}))
+    return Records({key: _cells(table_at(block)[key], column, size) for key, column in columns.items()})
 
 
 def as_records(columns: Mapping[str, Sequence[Plain]]) -> list[Document]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import math
 from collections import Counter
 from dataclasses import replace
@@ -17,6 +18,7 @@ from photostrip.comparison import SetTolerance, Tolerance, Tolerances, baseline_
 from photostrip.comparison.ground import plan_and_height
 from photostrip.comparison.tolerances import UNITS
 from photostrip.errors import InputError
+from photostrip.formats.output.result_json import to_json
 from tests.loops import nonempty
 from tests.results import case
 
@@ -27,8 +29,8 @@ if TYPE_CHECKING:
 
 
 def documents(frame: str = "projected") -> tuple[Document, Document]:
-    """Give a result, and a copy of it to be changed."""
-    document = case(frame).document
+    """Give a result as it is read again, and a copy of it to be changed."""
+    document = json.loads(to_json(case(frame).document))
     return copy.deepcopy(document), document
 
 

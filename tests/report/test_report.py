@@ -18,6 +18,7 @@ from photostrip.report.page.layout import cells
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
 from photostrip.report.page.text import to_markdown, to_text
 from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN
+from photostrip.result.quantities import Records
 from tests.loops import nonempty
 from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
 from tests.results import FRAMES, case
@@ -62,7 +63,7 @@ def paths(value: object, path: str = "") -> Iterator[str]:
     if isinstance(value, dict):
         for key, each in value.items():
             yield from paths(each, f"{path}.{key}")
-    elif isinstance(value, list) and value and isinstance(value[0], dict):
+    elif isinstance(value, list | Records) and value and isinstance(value[0], dict):
         for each in value:
             yield from paths(each, f"{path}[]")
     else:

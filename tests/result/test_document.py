@@ -18,6 +18,7 @@ from photostrip.notes import Note
 from photostrip.pipeline import Settings
 from photostrip.result.document import document_of
 from photostrip.result.numbers import natural, rounded, significant
+from photostrip.result.quantities import Records
 from photostrip.result.summary import TOLERANCES
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, GrossError
@@ -55,7 +56,7 @@ def leaves(value: object) -> Iterator[object]:
     if isinstance(value, dict):
         for each in value.values():
             yield from leaves(each)
-    elif isinstance(value, list | tuple):
+    elif isinstance(value, list | tuple | Records):
         for each in value:
             yield from leaves(each)
     else:
@@ -102,7 +103,7 @@ def check_shape(value: object, shape: object, path: str) -> None:
             assert key in value, f"{path}.{key}"
             check_shape(value[key], each, f"{path}.{key}")
     elif isinstance(shape, list):
-        assert isinstance(value, list), path
+        assert isinstance(value, list | Records), path
         assert value, path
         for each in value:
             check_shape(each, shape[0], path)
@@ -135,7 +136,7 @@ def test_numbers_are_finite_and_never_minus_zero(frame: str) -> None:
         if isinstance(leaf, float):
             assert math.isfinite(leaf)
             assert leaf != 0 or math.copysign(1, leaf) > 0
-    json.dumps(document, allow_nan=False)
+    json.dumps(document, allow_nan=False, default=list)
 
 
 # --------------------------------------------------------------------- photos and points belong together, anywhere

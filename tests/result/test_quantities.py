@@ -7,13 +7,15 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
+from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.result.columns import photos_csv, points_csv, rejected_csv, reliability_csv
 from photostrip.result.description import Quantity, described, quantity_at
-from photostrip.result.quantities import rounded_as
+from photostrip.result.quantities import Records, rounded_as
 from photostrip.result.reading import faults_of
 from photostrip.simulation import Models, simulate
 from tests.loops import nonempty
@@ -46,9 +48,9 @@ def leaves(value: object, path: str = "") -> Iterator[tuple[str, object, str]]:
 
 def faults(document: Document) -> set[str]:
     """Give the keys that are not described, and those that are not written as they are described."""
-    again = json.loads(json.dumps(document))
+    again = json.loads(to_json(document))
     found = {f"{fault.key} could not be read again: {fault}" for fault in faults_of(again, "result.json")}
-    for path, value, unit in leaves(document):
+    for path, value, unit in leaves(again):
         quantity = quantity_at(path)
         if value in (None, [], {}):  # a part that is missing
             continue
@@ -125,3 +127,38 @@ def test_ratios_of_given_points_have_two_decimals() -> None:
     summary = [document["summary"][role]["normalised"] for role in ("control", "check")]
     for values in (ratios, [each for each in summary if each is not None]):
         assert [round(value, 2) for value in nonempty(values)] == values
+
+
+# -------------------------------------------------------------------------------------------- records as columns
+
+
+COLUMNS: dict[str, list[Any]] = {
+    "id": ["a", 'b"], [', "§\x85"],
+    "x": [1.5, None, -2.0],
+    "rays": [1, 2, 3],
+    "used": [True, False, True],
+    "strips": [["1"], [], ["2", '"], ["']],
+    "sigma": [[0.1, None], [], [3.0]],
+    "parts": [{"x": 1}, {}, {"x": [None, "}, {"]}],
+}
+
+
+def test_records_are_written_as_a_list_of_them() -> None:
+    records = Records(COLUMNS)
+    for document in ({"a": records}, {"a": {"b": records, "c": "d" * 200}}, {"a": {"b": records[:1]}}):
+        plain = json.loads(json.dumps(document, default=list))
+        assert to_json(document) == to_json(plain)
+        assert json.loads(to_json(document)) == plain
+    with pytest.raises(ValueError, match="JSON"):
+        to_json({"a": Records({"x": [1.0, float("nan")]})})
+
+
+def test_records_are_a_list_of_what_stands_beside_each_other() -> None:
+    records = Records(COLUMNS)
+    assert records[1] == list(records)[1] == {key: column[1] for key, column in COLUMNS.items()}
+    assert len(records) == 3
+    assert records == list(records)
+    assert records[1:] == list(records)[1:]
+    assert records.taken(np.array([2, 0])) == [records[2], records[0]]
+    assert Records.joined([records, records[:1]]) == [*records, records[0]]
+    assert not Records.joined([])

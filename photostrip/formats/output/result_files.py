@@ -9,6 +9,7 @@ from photostrip.formats.output.result_json import to_json
 from photostrip.result import columns as tables
 from photostrip.result.numbers import PER_RADIAN, Document
 from photostrip.result.points.image_coordinates import refined_rows
+from photostrip.result.quantities import Records
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -87,8 +88,11 @@ def _checked_rays(residuals: Iterable[Document]) -> Iterator[Document]:
 
 def _table(columns: Sequence[Column], rows: Iterable[Document]) -> str:
     """Write a table; an empty cell is a number that does not exist."""
-    listed = list(rows)
-    cells = [_cells(column.quantity, [row.get(column.key) for row in listed]) for column in columns]
+    if not isinstance(rows, Records):
+        listed = list(rows)
+        rows = Records({column.key: [row.get(column.key) for row in listed] for column in columns})
+    nothing = [None] * len(rows)
+    cells = [_cells(column.quantity, rows.columns.get(column.key, nothing)) for column in columns]
     line = ",".join(form for form, _ in cells)
     return "\n".join([_header(columns), *(line % row for row in zip(*(each for _, each in cells), strict=True))]) + "\n"
 

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import json
+from math import isfinite
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
+from photostrip.result.quantities import Records
 from photostrip.result.reading import faults_of, located
 from photostrip.visible import visible_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from photostrip.result.numbers import Document, Plain
 
 LARGEST_RESULT = 1000 * MEGABYTE
 SCHEMA = 1
+LINES = 1000  # that are written at a time
 LINE = 160  # characters up to which a dictionary stands on one line
 
-_encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
-_encode_ascii = json.JSONEncoder(ensure_ascii=True, allow_nan=False).encode
+_encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False, default=list).encode
+_encode_ascii = json.JSONEncoder(ensure_ascii=True, allow_nan=False, default=list).encode
 
 
 def to_json(document: Document, *, ascii_only: bool = False) -> str:
@@ -34,15 +38,50 @@ def to_json(document: Document, *, ascii_only: bool = False) -> str:
 
 
 def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
-    text = encode(value)
+    if isinstance(value, Records) and len(value):
+        return "[\n" + ",\n".join(_lines(value, encode)) + "\n]"
     if isinstance(value, list) and value and isinstance(value[0], dict):
         # One call for the whole list, lines broken afterwards, in front of the first key of each record. Inside a
         # string these signs cannot stand, its quotation marks being escaped; between records a line feed is a blank.
         begin = f"{{{encode(next(iter(value[0])))}: "
-        return "[\n" + text[1:-1].replace(f"}}, {begin}", f"}},\n{begin}") + "\n]"
-    if isinstance(value, dict) and len(text) > LINE:
-        return "{\n" + ",\n".join(f"  {encode(key)}: {encode(each)}" for key, each in value.items()) + "\n}"
-    return text
+        return "[\n" + encode(value)[1:-1].replace(f"}}, {begin}", f"}},\n{begin}") + "\n]"
+    if isinstance(value, dict):
+        parts = [f"{encode(key)}: {_text(each, encode)}" for key, each in value.items()]
+        if sum(map(len, parts)) + 2 * len(parts) > LINE:
+            return "{\n" + ",\n".join(f"  {part}" for part in parts) + "\n}"
+    return _text(value, encode)
+
+
+def _text(value: Plain, encode: Callable[[Plain], str]) -> str:
+    """Write a value on one line."""
+    if isinstance(value, Records):
+        return f"[{', '.join(_lines(value, encode))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{encode(key)}: {_text(each, encode)}' for key, each in value.items())}}}"
+    return encode(value)
+
+
+def _lines(records: Records, encode: Callable[[Plain], str]) -> Iterator[str]:
+    """Write records from their columns, so many at a time that they take no memory to speak of."""
+    line = f"{{{', '.join(f'{encode(key)}: %s' for key in records.columns)}}}"
+    for start in range(0, len(records), LINES):
+        some = records[start : start + LINES]
+        yield from (line % row for row in zip(*(_cells(each, encode) for each in some.columns.values()), strict=True))
+
+
+def _cells(column: Sequence[Plain], encode: Callable[[Plain], str]) -> Iterable[Plain]:
+    """Write the values of a column; numbers stay, being written in JSON as Python writes them."""
+    kinds = set(map(type, column))
+    if kinds <= {float, int, NoneType} and isfinite(sum(filter(None, column))):
+        return column if NoneType not in kinds else ["null" if value is None else value for value in column]
+    if kinds <= {str, bool}:
+        written = {value: encode(value) for value in set(column)}
+        return map(written.__getitem__, column)
+    for kind, begin, end in ((list, "[", "]"), (dict, "{", "}")):
+        cells = encode(column)[2:-2].split(f"{end}, {begin}") if kinds == {kind} else ()
+        if len(cells) == len(column):  # no cell holds these signs within it
+            return (f"{begin}{cell}{end}" for cell in cells)
+    return map(encode, column)
 
 
 def parsed(file: str) -> Any:  # noqa: ANN401 (any JSON)

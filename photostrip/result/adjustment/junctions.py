@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.result.quantities import records
+from photostrip.result.quantities import Records, records
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def junctions_of(result: Result) -> list[Document]:
     return [junction for strip in result.photo_strips for junction in _junctions(strip, ids)]
 
 
-def _junctions(strip: StripResult, ids: Sequence[str]) -> list[Document]:
+def _junctions(strip: StripResult, ids: Sequence[str]) -> Records:
     photos, joined = strip.strip.photos, strip.of_photos.formed.junctions
     count, gap = len(joined.factor), discrepancies(strip)
     known = joined.used & ~np.isnan(gap[:, 0])  # points left out later, for their rays, have no place in the models

@@ -10,7 +10,7 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.pipeline.strips.model_notes import far_ends
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import Document, rms
-from photostrip.result.quantities import grouped, record, records
+from photostrip.result.quantities import Records, grouped, record, records
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
@@ -41,7 +41,7 @@ def models_of(result: Result) -> list[Document]:
     return [model for strip in result.model_strips for model in _models(strip)]
 
 
-def _models(strip: StripResult) -> list[Document]:
+def _models(strip: StripResult) -> Records:
     formed, models, photos = strip.of_models.formed, strip.of_models.formed.models, strip.strip.photos
     point = models.node < models.points
     used = np.bincount(models.model[point & formed.used], minlength=models.count)

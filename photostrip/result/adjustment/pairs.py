@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.result.quantities import grouped, records
+from photostrip.result.quantities import Records, grouped, records
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 
@@ -59,7 +59,7 @@ def models_of(result: Result) -> list[Document]:
     return [model for strip in result.photo_strips for model in _models(strip, ids)]
 
 
-def _models(strip: StripResult, ids: Sequence[str]) -> list[Document]:
+def _models(strip: StripResult, ids: Sequence[str]) -> Records:
     stages, photos, sums = strip.of_photos, strip.strip.photos, Parallaxes.of(strip)
     oriented, formed, used = stages.orientation, stages.formed, stages.orientation.points_used
     columns = {

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.result.numbers import Document, natural, rms
 from photostrip.result.points.given import PARTS, differences, size_columns
-from photostrip.result.points.own_precision import chances, normalised
+from photostrip.result.points.own_precision import chances
 from photostrip.result.points.precision import INSIDE, point_columns
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.quantities import record, records
@@ -49,8 +49,7 @@ def cross_validation_of(result: Result) -> Document:
         "p": len(known) / sum(1 / max(chance, LEAST) for chance in known) if known else None,
         **{part: summed.get(part, dict.fromkeys(("count", "rms", "rms_um", "inside_95", "ratio"))) for part in PARTS},
     }
-    rows = records("cross_validation.points", columns) if columns else []
-    rows.sort(key=lambda row: natural(row["id"]))
+    rows = sorted(records("cross_validation.points", columns) if columns else (), key=lambda row: natural(row["id"]))
     return {"cross_validation": record("cross_validation", block) | {"points": rows}}
 
 
@@ -62,7 +61,8 @@ def _joint(result: Result) -> float | None:
 
 def _left_out(result: Result, fold: int) -> dict[str, Sequence[object]]:
     """Return the columns of the points that were left out in a fold."""
-    found, (rows, over) = differences(result), normalised(result)
+    found = differences(result)
+    rows, over = found.checks
     at = result.control_rows[rows]
     sigma = {key: column for key, column in point_columns(result).items() if key.startswith("sigma")}
     differ = size_columns(found.axes[rows], found.plan[rows], found.height[rows], found.scale[rows])

@@ -15,10 +15,10 @@ from photostrip.points import locate
 from photostrip.result.numbers import Document, natural_rank
 from photostrip.result.points.own_precision import chances, normalised
 from photostrip.result.points.standing_out import stand_out
-from photostrip.result.quantities import records
+from photostrip.result.quantities import Records, records
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline import Result
 
@@ -37,6 +37,7 @@ class Differences:
     # coordinate and of a point of one model together
     sigma: Floats
     normalised: Floats  # (c,): the largest difference of a point in units of that standard deviation
+    checks: tuple[Numbers, Floats]  # check points, and their differences over standard deviations (``normalised``)
     chance: Floats  # (c, 2): probability of a larger difference in plan, in height
     scale: Floats  # (c,): denominator of the photo scale at the point; NaN where it has no coordinates
     strips: tuple[tuple[str, ...], ...]
@@ -68,8 +69,8 @@ def differences(result: Result) -> Differences:
         if len(rows):
             place = result.points.cartesian[result.control_rows[rows]]
             found = result.control_differences[rows]
-            level = frame.level_axes_at(place)
-            parts[rows] = found if frame.kind != "geocentric" else _turned(found, frame, place, level)
+            level = frame.kind != "geocentric"
+            parts[rows] = found if level else _turned(found, frame, place, frame.level_axes_at(place))
             same = (frame.kind == "geocentric") == (result.output.kind == "geocentric")
             axes[rows] = found if same else _turned(found, frame, place, result.output.axes_at(place))
     held = _held(result)
@@ -77,12 +78,14 @@ def differences(result: Result) -> Differences:
     with np.errstate(invalid="ignore"):
         ratio = np.abs(result.control_differences) / sigma
     ratios = np.where(np.isnan(ratio).all(axis=1), np.nan, np.nan_to_num(ratio).max(axis=1, initial=0.0))
-    rejected, chance = rejected_control(result), _likely(result, ratios)
+    rejected, checks = rejected_control(result), normalised(result)
+    chance = _likely(ratios, *checks)
     return Differences(
         axes=result.output.user_from_internal(axes),
         parts=parts,
         sigma=sigma,
         normalised=ratios,
+        checks=checks,
         chance=chance,
         scale=_scale(result, held),
         strips=tuple(tuple(s.strip.id for s, yes in zip(result.strips, row, strict=True) if yes) for row in held.T),
@@ -91,13 +94,12 @@ def differences(result: Result) -> Differences:
     )
 
 
-def _likely(result: Result, ratio: Floats) -> Floats:
+def _likely(ratio: Floats, rows: Numbers, values: Floats) -> Floats:
     """Return the probability (c, 2) of a larger difference in plan and in height at every given point.
 
     At check points from the precision of the point itself, where it is known; elsewhere from the ratio of the
     difference to its standard deviation.
     """
-    rows, values = normalised(result)
     found = np.array([[erfc(each / sqrt(2.0))] * 2 for each in ratio.tolist()]).reshape(-1, 2)
     own = chances(values)
     for part, column in zip(PARTS, found.T, strict=True):
@@ -205,8 +207,7 @@ def control_of(result: Result, found: Differences) -> list[Document]:
         "list": control.frame + 1,
         "strips": [list(strips) for strips in found.strips],
     }
-    rows = records("control", columns)
-    return [rows[row] for row in np.argsort(natural_rank(control.ids))]
+    return list(records("control", columns).taken(np.argsort(natural_rank(control.ids))))
 
 
 def _in_list_order(result: Result, enu: Floats) -> Floats:
@@ -235,7 +236,7 @@ def size_columns(axes: Floats, plan: Floats, height: Floats, scale: Floats) -> D
     }
 
 
-def misclosures_of(result: Result) -> list[Document]:
+def misclosures_of(result: Result) -> Records:
     """Return the list ``misclosures``: strip minus control after the similarity, before any polynomial.
 
     Beside them, how far each coordinate is checked by all others, and its share in its own polynomial.
@@ -259,6 +260,5 @@ def misclosures_of(result: Result) -> list[Document]:
             "detectable": dict(zip(GROUND_AXES, detectable.T, strict=True)),
             "leverage": dict(zip("xyz", leverage, strict=True)),
         }
-        rows = records("misclosures", columns)
-        found += [rows[row] for row in np.argsort(natural_rank(strip.control.ids))]
-    return found
+        found.append(records("misclosures", columns).taken(np.argsort(natural_rank(strip.control.ids))))
+    return Records.joined(found)

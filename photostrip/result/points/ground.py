@@ -9,9 +9,11 @@ import numpy as np
 from photostrip.result.numbers import Document, natural_rank, rounded
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns
-from photostrip.result.quantities import coordinate_decimals, records
+from photostrip.result.quantities import Records, coordinate_decimals, records
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline import Result
@@ -40,7 +42,7 @@ def frame_of(result: Result) -> Document:
     }
 
 
-def points_of(result: Result, image_rms: Floats, rank: Numbers) -> list[Document]:
+def points_of(result: Result, image_rms: Floats, rank: Numbers) -> Records:
     """Return the list ``points``, in natural order of their ids.
 
     image_rms: (n,), root mean square image residual of each point as numbered in the observations, mm.
@@ -59,11 +61,10 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> list[Document
         "models": models[points.number],
         "image_rms_um": image_rms[points.number] * 1000.0,
     }
-    rows = records("points", columns)
-    return [rows[row] for row in np.argsort(rank[points.number])]
+    return records("points", columns).taken(np.argsort(rank[points.number]))
 
 
-def ties_of(result: Result, rank: Numbers) -> list[Document]:
+def ties_of(result: Result, rank: Numbers) -> Sequence[Document]:
     """Return the list ``ties``: points of two strips with their differences, second minus first."""
     ties, ids = result.ties, result.refined.observations.point_ids
     if not len(ties.number):
@@ -76,8 +77,7 @@ def ties_of(result: Result, rank: Numbers) -> list[Document]:
         "strips": [[names[first], names[second]] for first, second in ties.strips],
         **size_columns(axes, np.hypot(level[:, 0], level[:, 1]), level[:, 2], scale),
     }
-    rows = records("ties", columns)
-    return [rows[row] for row in np.lexsort((ties.strips[:, 1], ties.strips[:, 0], rank[ties.number]))]
+    return records("ties", columns).taken(np.lexsort((ties.strips[:, 1], ties.strips[:, 0], rank[ties.number])))
 
 
 def _level_ties(result: Result) -> Floats:

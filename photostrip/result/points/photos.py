@@ -12,7 +12,7 @@ from photostrip.geometry.rotation import angles
 from photostrip.result.numbers import PER_RADIAN, Document, Plain, rounded
 from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns
-from photostrip.result.quantities import angle_decimals, grouped, records
+from photostrip.result.quantities import Records, angle_decimals, grouped, records
 from photostrip.triangulation.resection.collinearity import project
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def photos_of(result: Result, images: Sequence[ImageResiduals]) -> list[Document
     return found + _single_photos(result, images[len(result.photo_strips) :])
 
 
-def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> list[Document]:
+def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> Records:
     photos, resection = strip.strip.photos, strip.of_photos.resection
     centers = strip.intermediate.cartesian_from_intermediate(resection.centers)
     rotations = result.output.axes_at(centers) @ strip.intermediate.cartesian_rotations(resection.rotations)
@@ -164,7 +164,7 @@ def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Doc
     }
     head = {"id": photos, "strip": [single.strip.id for single in singles], **coordinates(result.output, ground)}
     sigmas = photo_columns(result, centers, rotations, result.bundle.photo_covariances[rows])
-    return records("photos", head | _turned(result, rotations) | sigmas | columns)
+    return list(records("photos", head | _turned(result, rotations) | sigmas | columns))
 
 
 def _turned(result: Result, rotations: Floats) -> Document:

@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
 from photostrip.result.numbers import PER_RADIAN, Document, rms
-from photostrip.result.points.own_precision import chances, normalised, turned
+from photostrip.result.points.own_precision import chances, turned
 from photostrip.result.quantities import Records, record, records
 from photostrip.statistics import binomial_p_value, chi2_quantile, normal_quantile
 
@@ -48,10 +48,9 @@ def ellipses(level: Floats) -> tuple[Floats, Floats]:
 
 def point_columns(result: Result) -> Document:
     """Return columns of ``points``: standard deviations, empty when unknown, covariances, error ellipse in plan."""
-    precision, frame, place = result.precision, result.output, result.points.cartesian
-    if precision is None:
+    precision, level, frame = result.precision, result.level_covariances, result.output
+    if precision is None or level is None:
         return dict.fromkeys(("sigma_x", "sigma_y", "sigma_z"))
-    level = turned(precision.points, frame.level_axes_at(place))
     order = list(frame.order)
     covariances = (precision.points if frame.kind == "geocentric" else level)[:, order][:, :, order]
     with np.errstate(invalid="ignore"):
@@ -119,10 +118,10 @@ def precision_of(result: Result, found: Differences) -> Document:
 
     It says what the covariances rest on, how large they are, and how they change along the strips.
     """
-    precision = result.precision
-    if precision is None:
+    precision, level = result.precision, result.level_covariances
+    if precision is None or level is None:
         return {}
-    sigma = plan_and_height(turned(precision.points, result.output.level_axes_at(result.points.cartesian)))
+    sigma = plan_and_height(level)
     names = [result.refined.observations.point_ids[number] for number in result.points.number]
     block = {
         "basis": [
@@ -131,10 +130,8 @@ def precision_of(result: Result, found: Differences) -> Document:
         ]
         or _basis_of_singles(result),
         "points": {name: _summed(column, names) for name, column in zip(("plan", "height"), sigma.T, strict=True)},
-        "along": Records(
-            row
-            for strip, photos in zip(result.strips, precision.photos, strict=True)
-            for row in _along(result, strip, sigma, photos)
+        "along": Records.joined(
+            _along(result, strip, sigma, photos) for strip, photos in zip(result.strips, precision.photos, strict=True)
         ),
     }
     check = _check(result, found)
@@ -159,12 +156,12 @@ def _summed(sigma: Floats, names: list[str]) -> Document:
     return {"rms": rms(sigma), "max": sigma[worst], "worst": names[worst]}
 
 
-def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) -> list[Document]:
+def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) -> Records:
     """Precision along a strip: of the points nearest to each photo, and of its perspective centre."""
     centers = strip.centers.copy()
     known, places = np.isfinite(centers[:, 0]), np.arange(len(centers))
     if not known.any():
-        return []
+        return Records({})
     for column in centers.T:  # a photo without a centre stands at the others' mean distance
         column[~known] = np.interp(places[~known], places[known], column[known])
     along = centers[:, 0]
@@ -197,7 +194,7 @@ def _check(result: Result, found: Differences) -> Document:
     strip: the test of all of them is made with their joint covariance, and points that lie outside are counted as so
     many as are independent. Points that stand out take no part in these tests: they have been named.
     """
-    rows, values = normalised(result)
+    rows, values = found.checks
     if result.precision is None or np.isnan(values).all():
         return {}
     ids = [result.inputs.control.ids[row] for row in rows]

@@ -233,7 +233,8 @@ def images_with_components(errors: StripErrors, rows: ErrorRows) -> Floats:
     new = np.flatnonzero(np.concatenate([[True], (item[1:] != item[:-1]) | (photo[1:] != photo[:-1])]))
     components = errors.images.components[rows.image[order]].reshape(len(order), SPAN * COMPONENTS, 2)
     products = rows.by_image[order] @ components.transpose(0, 2, 1)
-    by_photo = np.add.reduceat(products, new, axis=0).reshape(len(new), size, SPAN, COMPONENTS)
+    summed = products if len(new) == len(order) else np.add.reduceat(products, new, axis=0)
+    by_photo = summed.reshape(len(new), size, SPAN, COMPONENTS)
     row, place = item[new], photo[new] - rows.first[item[new]]
     for slot in range(SPAN):
         inside = (place + slot >= 0) & (place + slot < slots + 2 * REACH)

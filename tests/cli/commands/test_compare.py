@@ -33,7 +33,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     document = case().document
     (tmp_path / "result").mkdir()
     (tmp_path / "result" / "result.json").write_text(to_json(document), encoding="utf-8")
-    baseline: dict[str, Any] = json.loads(json.dumps(baseline_of(document)))
+    baseline: dict[str, Any] = json.loads(json.dumps(baseline_of(document), default=list))
     (tmp_path / "same.json").write_text(to_json(baseline), encoding="utf-8")
     baseline["points"][5]["z"] += 0.05
     baseline["models"][1]["scale_factor"] *= 1 + 1e-5

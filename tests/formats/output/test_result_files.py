@@ -18,6 +18,7 @@ from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.pipeline import triangulate
 from photostrip.result.document import document_of
+from photostrip.result.quantities import Records
 from tests.loops import nonempty
 from tests.results import FRAMES, case, solved
 from tests.source_tree import ROOT
@@ -255,7 +256,7 @@ def keys(value: object) -> Iterator[str]:
         for key, each in value.items():
             yield key
             yield from keys(each)
-    elif isinstance(value, list):
+    elif isinstance(value, list | Records):
         for each in value[:50]:
             yield from keys(each)
 
