@@ -34,7 +34,7 @@ class Result:
 
     def __init__(self, document: Document, *, computed: Computed | None = None, resolved: str = "") -> None:
         self.document = document
-        """The content of result.json: plain dictionaries, lists, texts and numbers."""
+        """The content of result.json: dictionaries, lists, texts and numbers; long lists of a new run are sequences."""
         self.computed = computed
         """Every stage of the run that found it, with numbers that are not rounded; None where it was read."""
         self._resolved = resolved
