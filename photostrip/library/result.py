@@ -11,6 +11,7 @@ import numpy as np
 from photostrip.errors import Fault, InputError
 from photostrip.library.table import Table
 from photostrip.notes import named
+from photostrip.result.quantities import as_lists
 from photostrip.result.tables import table_of
 
 if TYPE_CHECKING:
@@ -33,31 +34,35 @@ class Result:
     """
 
     def __init__(self, document: Document, *, computed: Computed | None = None, resolved: str = "") -> None:
-        self.document = document
-        """The content of result.json: dictionaries, lists, texts and numbers; long lists of a new run are sequences."""
+        self._document = document
         self.computed = computed
         """Every stage of the run that found it, with numbers that are not rounded; None where it was read."""
         self._resolved = resolved
 
+    @cached_property
+    def document(self) -> Document:
+        """The content of result.json: plain dictionaries, lists, texts and numbers."""
+        return dict(as_lists(self._document))
+
     @property
     def name(self) -> str:
         """Name of the project."""
-        return str(self.document["name"])
+        return str(self._document["name"])
 
     @property
     def status(self) -> str:
         """The verdict in one word: good, unverified, look or failed."""
-        return str(self.document["status"])
+        return str(self._document["status"])
 
     @property
     def accuracy(self) -> str:
         """How good the points are, in one sentence."""
-        return str(self.document["verdict"]["accuracy"])
+        return str(self._document["verdict"]["accuracy"])
 
     @property
     def summary(self) -> Document:
         """Sigma0, scales, and the differences at control and check points."""
-        return dict(self.document["summary"])
+        return dict(self._document["summary"])
 
     @cached_property
     def points(self) -> Table:
@@ -110,7 +115,7 @@ class Result:
         return self._table("notes")
 
     def _table(self, name: str) -> Table:
-        return Table(name, table_of(self.document, name))
+        return Table(name, table_of(self._document, name))
 
     def covariance_of(self, ids: Sequence[str] | str) -> Floats:
         """Return the covariances of points, in the order of the ids, along x, y, z of the frame.
@@ -147,20 +152,20 @@ class Result:
         if form == "json":
             from photostrip.formats.output.result_json import to_json
 
-            return to_json(self.document)
+            return to_json(self._document)
         if unknown := sorted(set(sections) - set(SectionName)):
             message = f"the report has no section {', '.join(unknown)}"
             raise InputError(Fault(message, "section", expected=f"one of {', '.join(SectionName)}"))
-        require_complete(self.document, self.name)
+        require_complete(self._document, self.name)
         with faults_instead(self.name, "reported"):
             if form == "html":
                 from photostrip.report.html import check_html, to_html
 
                 check_html("report")
-                return to_html(self.document, everything=everything)
+                return to_html(self._document, everything=everything)
             names = [SectionName(each) for each in sections]
-            chosen = chosen_sections(self.document, names=names, everything=everything, width=layout.USUAL)
-            title = "" if sections else title_of(self.document)
+            chosen = chosen_sections(self._document, names=names, everything=everything, width=layout.USUAL)
+            title = "" if sections else title_of(self._document)
             return text.to_markdown(title, chosen) if form == "md" else text.to_text(title, chosen, layout.USUAL)
 
     def trace(self, form: str = "text") -> str:
@@ -188,7 +193,7 @@ class Result:
 
         pages = {"report.html": self.report("html", everything=everything)} if html else {}
         refined = refined_csv(self.computed) if self.computed is not None else ""
-        return pages | result_files(self.document, self._resolved, refined)
+        return pages | result_files(self._document, self._resolved, refined)
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> None:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none."""
@@ -206,7 +211,7 @@ class Result:
         """Return the verdict and the differences at given points for a notebook."""
         rows = []
         for role in ("control", "check"):
-            found = self.document["summary"].get(role) or {}
+            found = self._document["summary"].get(role) or {}
             for part in ("plan", "height"):
                 each = found.get(part)
                 if each and each.get("count"):

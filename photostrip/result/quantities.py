@@ -62,6 +62,13 @@ class Records(Sequence[Document]):
         return cls(columns)
 
 
+def as_lists(value: Plain) -> Plain:
+    """Return a document with lists of records in place of columns, as it is read again."""
+    if isinstance(value, dict):
+        return {key: as_lists(each) for key, each in value.items()}
+    return list(value) if isinstance(value, Records) else value
+
+
 def rounded_as(entry: Quantity, value: ArrayLike, unit: str = "") -> Plain:
     """Return a value, or an array of them, as its key is written; None for a number that is not finite."""
     decimals = DECIMALS_BY_UNIT[unit] if entry.unit_key else entry.decimals

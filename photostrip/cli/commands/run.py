@@ -78,7 +78,8 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         )
         waiting.at(f"adjusting {counted(len(read.photos), 'photo')}")
         result = read.run()
-        messages.step(f"adjusted {counted(len(result.document['points']), 'point')}")
+        if result.computed is not None:
+            messages.step(f"adjusted {counted(len(result.computed.points.number), 'point')}")
         waiting.at("writing the result")
         if trace is not None:
             write_text(trace, result.trace(form_of(trace, "--trace").value))
