@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.result.numbers import Document, natural_rank
-from photostrip.result.quantities import Records, record, records
+from photostrip.result.quantities import record, records
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
@@ -44,7 +44,7 @@ def _block(strip: StripResult, found: CovarianceAdjustment) -> Document:
     return record("covariance", block)
 
 
-def _control(strip: StripResult, found: CovarianceAdjustment) -> Records:
+def _control(strip: StripResult, found: CovarianceAdjustment) -> list[Document]:
     """Return the test values of the control coordinates, in natural order of the points."""
     ids = strip.control.ids
     order = np.lexsort((found.control.axis, natural_rank(ids)[found.control.point]))
@@ -54,4 +54,4 @@ def _control(strip: StripResult, found: CovarianceAdjustment) -> Records:
         "test": found.tested.normalised[order],
         "size": found.tested.size[order],
     }
-    return records("covariance.control", columns)
+    return list(records("covariance.control", columns))
