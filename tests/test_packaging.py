@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import email
+import os
+import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
 from typing import TYPE_CHECKING
 
 import pytest
+import yaml
 
 import photostrip
 from tests.loops import nonempty
@@ -62,3 +66,60 @@ def test_the_source_archive_holds_what_builds_the_wheel(tmp_path: Path) -> None:
         "PKG-INFO",
         ".gitignore",  # hatchling always adds it
     }
+
+
+def test_what_is_installed_from_the_source_archive_runs_alone(tmp_path: Path) -> None:
+    """The wheel of the source archive, beside the libraries of this environment and away from the clone."""
+    with tarfile.open(build("sdist", tmp_path / "sdist")) as archive:
+        archive.extractall(tmp_path, filter="data")
+    (source,) = tmp_path.glob("photostrip-*")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path / "wheel")],
+        cwd=source,
+        check=True,
+        capture_output=True,
+    )
+    (wheel,) = (tmp_path / "wheel").iterdir()
+    shutil.unpack_archive(wheel, tmp_path / "installed", "zip")
+    shutil.rmtree(source)
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "installed")}
+
+    def run(*command: str) -> str:
+        done = subprocess.run(
+            [sys.executable, *command], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+        )
+        return done.stdout
+
+    assert run("-c", "import photostrip; print(photostrip.__file__)").startswith(str(tmp_path / "installed"))
+    sample = str(ROOT / "sample_data/simulated-20")
+    run("-m", "photostrip", "run", f"{sample}/project.yaml", "-o", "result", "--html", "-q")
+    assert "SAME" in run("-m", "photostrip", "compare", "result", f"{sample}/baseline.json")
+    assert "[001]" in run("-m", "photostrip", "sources")  # reads its tables
+
+
+def needs() -> dict[str, str]:
+    """Give the libraries that pyproject.toml asks for, with their lower bounds."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return dict(each.split(">=") for each in nonempty(project["dependencies"]))
+
+
+def test_the_recipe_asks_for_the_same_libraries() -> None:
+    recipe = yaml.safe_load((ROOT / "conda.recipe/meta.yaml").read_text(encoding="utf-8"))
+    listed = dict(each.split(" >=") for each in recipe["requirements"]["run"])
+    assert listed.pop("python") == "3.11"
+    assert listed == needs()
+    assert recipe["package"]["version"] == photostrip.__version__
+    assert recipe["build"]["entry_points"] == ["photostrip = photostrip.cli.main:main"]
+
+
+def test_the_image_is_made_of_what_builds_the_package() -> None:
+    lines = (ROOT / "Dockerfile").read_text(encoding="utf-8").splitlines()
+    copied = [name for line in lines if line.startswith("COPY") for name in line.split()[1:-1]]
+    assert nonempty(copied) == ["pyproject.toml", "README.md", "LICENSE", "photostrip"]
+    assert [name for name in copied if not (ROOT / name).exists()] == []
+    assert 'RUN pip install --no-cache-dir "/source[report]"' in lines  # the libraries are those of pyproject.toml
+
+
+def test_the_citation_is_of_this_version() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert (citation["title"], citation["version"]) == ("photostrip", photostrip.__version__)
