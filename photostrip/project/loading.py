@@ -24,7 +24,7 @@ from photostrip.project.resolved import completed, text_of
 from photostrip.project.schema.cameras import Camera as CameraBlock
 from photostrip.project.schema.ground import CameraPositions as CameraPositionsBlock
 from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
-from photostrip.project.schema.project_file import ProjectFile, json_schema
+from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.tables import Tables, check_tables, read_tables
 from photostrip.project.yaml.document import COMMAND_LINE, Node, at_own_key
 from photostrip.project.yaml.reading import Reading
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding, Note
     from photostrip.pipeline import Result
 
-__all__ = ["Project", "adjust_project", "json_schema", "load_project"]
+__all__ = ["Project", "adjust_project", "load_project"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,6 @@ from photostrip.formats.text.numbers import shown
 from photostrip.frozen import dataclass
 from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.schema.cameras import Distortion
-from photostrip.project.schema.for_editors import described
 from photostrip.project.schema.ground import CRS, UNDULATION, Ellipsoid
 from photostrip.project.schema.measurements import Unit
 from photostrip.project.schema.values import (
@@ -240,11 +239,6 @@ def load_specification(path: Path, overrides: Sequence[str] = ()) -> Specificati
     """Read the specification of a simulation, or raise every fault of it."""
     given, reading = read_file(SimulationFile, str(path), overrides)
     return Specification(_spec(given), reading)
-
-
-def simulation_schema() -> dict[str, Any]:
-    """JSON Schema of the specification."""
-    return described(SimulationFile, "photostrip simulation")
 
 
 def _spec(given: SimulationFile) -> simulation.Spec:

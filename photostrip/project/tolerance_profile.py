@@ -10,7 +10,6 @@ from pydantic import PlainValidator, WithJsonSchema
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.text.numbers import NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
-from photostrip.project.schema.for_editors import described
 from photostrip.project.schema.values import Flag, Section, Words, key, schema_number, wrong
 from photostrip.project.yaml.reading import read_file
 
@@ -101,10 +100,6 @@ class ToleranceFile(Section):
     choices: Members = key("Degrees, terms, roles, verdicts", _usual(Members, USUAL.choices))
     rejected: Members = key("Measurements taken out", _usual(Members, USUAL.rejected))
     findings: Members = key("Notes, points without coordinates", _usual(Members, USUAL.findings))
-
-
-def tolerance_schema() -> dict[str, Any]:
-    return described(ToleranceFile, "photostrip tolerance profile")
 
 
 def load_tolerances(path: Path) -> tuple[Tolerances, Sequence[str]]:

@@ -34,9 +34,7 @@ def schema(
     import json
 
     from photostrip.formats.text.writing import write_text
-    from photostrip.project.plans.schemas import plan_schema
-    from photostrip.project.schema.project_file import json_schema
-    from photostrip.project.simulation import simulation_schema
+    from photostrip.project.editors import schema_of
 
     if result:
         from photostrip.result.schema import result_page, result_schema
@@ -45,12 +43,9 @@ def schema(
             write_text(output, result_page())
             return
         found = result_schema()
-    elif tolerances:
-        from photostrip.project.tolerance_profile import tolerance_schema
-
-        found = tolerance_schema()
     else:
-        found = plan_schema(plan) if plan else simulation_schema() if simulation else json_schema()
+        kind = "tolerances" if tolerances else plan or ("simulation" if simulation else "project")
+        found = schema_of(kind)
     text = json.dumps(found, indent=2, ensure_ascii=True) + "\n"
     if output is None:
         typer.echo(text, nl=False)

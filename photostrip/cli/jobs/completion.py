@@ -29,9 +29,9 @@ def answer(instruction: str) -> int:
 
 def keys(incomplete: str) -> list[str]:
     """Return the keys of the project file that an assignment of ``--set`` may begin with, each with ``=`` behind it."""
-    from photostrip.project.schema.project_file import json_schema
+    from photostrip.project.editors import schema_of
 
-    schema = json_schema()
+    schema = schema_of("project")
     return [f"{path}=" for path in _paths(schema, schema) if path.startswith(incomplete)]
 
 

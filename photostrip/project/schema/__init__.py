@@ -2,6 +2,5 @@
 
 - ``values``: single values, from text to type, and what is wrong with them;
 - ``cameras``, ``measurements``, ``ground``, ``processing``: the blocks of the project file;
-- ``project_file``: the whole of it;
-- ``for_editors``: the same as JSON Schema.
+- ``project_file``: the whole of it.
 """

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.project.schema.cameras import Camera, Strip
-from photostrip.project.schema.for_editors import described
 from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
 from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
 from photostrip.project.schema.processing import Processing
@@ -90,9 +89,3 @@ class ProjectFile(Section):
         "Findings that were looked at and are accepted: codes, or `code/id` for one photo, point or strip",
         [],
     )
-
-
-def json_schema() -> dict[str, Any]:
-    """JSON Schema of the project file; the same on every call."""
-    measured = {"anyOf": [{"required": ["cameras", "observations"]}, {"required": ["models"]}]}
-    return described(ProjectFile, "photostrip project") | measured

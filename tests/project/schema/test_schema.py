@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.pipeline import Settings
-from photostrip.project.loading import json_schema
+from photostrip.project.editors import schema_of
 from photostrip.project.schema.ground import Output
 from photostrip.project.schema.processing import Processing
 from photostrip.project.schema.project_file import ProjectFile, Tolerances
@@ -36,7 +36,7 @@ def keys(schema: dict[str, Any], definitions: dict[str, Any]) -> Iterator[tuple[
 
 
 def every_key() -> list[tuple[str, dict[str, Any]]]:
-    schema = json_schema()
+    schema = schema_of("project")
     return list(keys(schema, schema["$defs"]))
 
 
@@ -55,7 +55,7 @@ def test_units_stand_in_the_description_and_by_themselves() -> None:
 
 
 def test_editors_are_told_what_is_read() -> None:
-    schema = json_schema()
+    schema = schema_of("project")
     definitions = schema["$defs"]
     assert schema["required"] == ["photostrip", "strips"]
     assert schema["anyOf"] == [{"required": ["cameras", "observations"]}, {"required": ["models"]}]
@@ -71,7 +71,7 @@ def test_editors_are_told_what_is_read() -> None:
 
 
 def test_the_schema_is_the_same_on_every_call() -> None:
-    assert json.dumps(json_schema()) == json.dumps(json_schema())
+    assert json.dumps(schema_of("project")) == json.dumps(schema_of("project"))
 
 
 def _bundle() -> dict[str, object]:

@@ -1,21 +1,37 @@
-"""JSON Schemas for editors, draft 2020-12: every key, its default and its unit."""
+"""JSON Schemas of the files that users write, for editors, draft 2020-12: every key, its default and its unit."""
 
 from __future__ import annotations
 
 import warnings
+from importlib import import_module
 from typing import Any
 
 from photostrip.project.schema.values import AUTO, Section
 
+KINDS = {  # where the keys of each kind of file stand, and its title
+    "project": ("schema.project_file", "ProjectFile", "photostrip project"),
+    "simulation": ("simulation", "SimulationFile", "photostrip simulation"),
+    "tolerances": ("tolerance_profile", "ToleranceFile", "photostrip tolerance profile"),
+    "model": ("plans.model", "ModelPlanFile", "photostrip plan model"),
+    "strip": ("plans.strip", "StripPlanFile", "photostrip plan strip"),
+    "camera": ("plans.cameras", "CameraPlanFile", "photostrip plan camera"),
+    "displacement": ("plans.displacement", "DisplacementPlanFile", "photostrip plan displacement"),
+    "screening": ("plans.screening", "ScreeningPlanFile", "photostrip plan screening"),
+}
+MEASURED = {"anyOf": [{"required": ["cameras", "observations"]}, {"required": ["models"]}]}  # in a project
 
-def described(kind: type[Section], title: str) -> dict[str, Any]:
-    """JSON Schema of a kind of file."""
-    _build(kind)
+
+def schema_of(kind: str) -> dict[str, Any]:
+    """Return the JSON Schema of a kind of file; the same on every call."""
+    module, name, title = KINDS[kind]
+    file: type[Section] = getattr(import_module(f"photostrip.project.{module}"), name)
+    _build(file)
     with warnings.catch_warnings():
         # defaults of nested sections are encoded twice, and the second time a tuple of words is a list
         warnings.filterwarnings("ignore", message="Pydantic serializer warnings", category=UserWarning)
-        schema = _for_editors(kind.model_json_schema())
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **schema}
+        schema = _for_editors(file.model_json_schema())
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
+    return head | schema | (MEASURED if kind == "project" else {})
 
 
 def _build(kind: type[Section]) -> None:
