@@ -59,7 +59,6 @@ class PointTable:
     xyz: Floats  # (n, 3): coordinates in the unit of the frame
 
     def __post_init__(self) -> None:
-        """Freeze the array."""
         object.__setattr__(self, "xyz", frozen(self.xyz, shape=(len(self.ids), 3)))
 
     def __len__(self) -> int:
@@ -80,7 +79,6 @@ class PhotoPoints:
     sigma: Floats  # (n, 2): their standard deviations in mm
 
     def __post_init__(self) -> None:
-        """Freeze the columns."""
         for name in ("photo", "point"):
             object.__setattr__(self, name, frozen(getattr(self, name), dtype=np.intp))
         n = len(self.photo)
@@ -94,7 +92,6 @@ class PhotoPoints:
         return cls(photo_ids=(), point_ids=point_ids, photo=none, point=none, xy=nothing, sigma=nothing)
 
     def __len__(self) -> int:
-        """Return the number of image points."""
         return len(self.photo)
 
     @cached_property
@@ -125,7 +122,6 @@ class ControlPoints:
     frame: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
 
     def __post_init__(self) -> None:
-        """Freeze the columns."""
         n = len(self.ids)
         object.__setattr__(self, "enu", frozen(self.enu, shape=(n, 3)))
         object.__setattr__(self, "use", frozen(self.use, dtype=np.bool_, shape=(n, 3)))
@@ -162,7 +158,6 @@ class ModelPoints:
     sigma: Floats  # (n, 3): their standard deviations in mm
 
     def __post_init__(self) -> None:
-        """Freeze the columns."""
         for name in ("model", "node"):
             object.__setattr__(self, name, frozen(getattr(self, name), dtype=np.intp))
         n = len(self.model)
@@ -170,7 +165,6 @@ class ModelPoints:
             object.__setattr__(self, name, frozen(getattr(self, name), shape=(n, 3)))
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return len(self.model)
 
     def name(self, node: int) -> str:

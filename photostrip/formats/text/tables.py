@@ -51,7 +51,6 @@ class Table:
     _source: TableText = field(repr=False)
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return len(self.lines)
 
     def column(self, name: str) -> Floats:

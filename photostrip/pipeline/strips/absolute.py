@@ -36,15 +36,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
 
 
-class StripDerivatives(Protocol):
-    """Derivatives of a strip on the ground by what was measured."""
-
-    @property
-    def origin(self) -> Floats:
-        """Common origin of all similarities, shape (3,)."""
-
-
-Errors = TypeVar("Errors", bound=StripDerivatives)
+Errors = TypeVar("Errors")  # derivatives of a strip on the ground by what was measured
 
 
 class StripStage(Protocol[Errors]):

@@ -46,7 +46,7 @@ LEAST_SOLID = 4  # points that can tell a body from its mirror image
 
 @dataclass(frozen=True, eq=False)
 class LinkedModels:
-    """A strip of independent models before it meets its control."""
+    """A strip of independent models before it meets its control, a ``StripStage``."""
 
     strip: ModelStrip
     measured: ModelPoints  # model coordinates of the whole project
@@ -54,7 +54,6 @@ class LinkedModels:
 
     @property
     def point_ids(self) -> Sequence[str]:
-        """Ids of the points as they are numbered."""
         return self.measured.point_ids
 
     def point_precision(self, scale: float) -> tuple[float, float]:
@@ -67,7 +66,6 @@ class LinkedModels:
         return float(np.sqrt(plan)), float(np.sqrt(height))
 
     def extent(self, similarity: Similarity) -> tuple[float, float]:
-        """Mean base and half width of the strip, metres."""
         xyz = similarity(self.formed.xyz)
         base = np.linalg.norm(np.diff(similarity(self.formed.centers), axis=0), axis=1)
         length = np.ptp(xyz[:, 0]) / self.formed.models.count
@@ -75,16 +73,13 @@ class LinkedModels:
         return spacing, max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
 
     def differentiate(self, similarity: Similarity) -> model_errors.ModelErrors:
-        """Differentiate the strip on the ground by the model coordinates."""
         return model_errors.differentiate_models(self.formed, similarity)
 
     def misclosures(self, oriented: Oriented) -> Misclosures:
-        """Control coordinates that count, with the derivatives of the strip there."""
         targets, xyz = oriented.targets, oriented.at_control
         return model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, oriented.errors.origin)
 
     def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
-        """Covariance of any misclosures at the control, strip and control together, metres^2."""
         rows, factor = oriented.control_rows, self.formed.links.factor
         return lambda some: model_misclosures.covariance(oriented.errors, oriented.misclosures.take(some), rows, factor)
 
@@ -93,7 +88,6 @@ class LinkedModels:
         return ()
 
     def screens_control(self, settings: Settings) -> bool:
-        """Whether wrong control is looked for."""
         return settings.links.screening != "none"
 
     def turned_over(self, refusal: InputError) -> LinkedModels:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FormedPhotos:
-    """A strip of photos before it meets its control."""
+    """A strip of photos before it meets its control, a ``StripStage``."""
 
     strip: Strip
     observations: PhotoPoints  # ideal image coordinates of the whole project
@@ -57,7 +57,6 @@ class FormedPhotos:
 
     @property
     def point_ids(self) -> tuple[str, ...]:
-        """Ids of the points as they are numbered."""
         return self.observations.point_ids
 
     def point_precision(self, scale: float) -> tuple[float, float]:
@@ -77,26 +76,22 @@ class FormedPhotos:
         return plan, plan * float(np.sqrt(2.0)) * depth_mean / float(length[good].mean())
 
     def extent(self, similarity: Similarity) -> tuple[float, float]:
-        """Mean base and half width of the strip, metres."""
         centers, xyz = similarity(self.formed.centers), similarity(self.formed.xyz)
         spacing = float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean())
         return spacing, max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
 
     def differentiate(self, similarity: Similarity) -> strip_errors.StripErrors:
-        """Differentiate the strip on the ground by the image coordinates."""
         position = self.strip.positions(self.observations)
         return strip_errors.differentiate_strip(
             self.orientation, self.formed, similarity, position, self.observations.sigma
         )
 
     def misclosures(self, oriented: Oriented) -> control_errors.Misclosures:
-        """Control coordinates that count, with the derivatives of the strip there."""
         targets, xyz = oriented.targets, oriented.at_control
         rows = oriented.control_rows
         return control_errors.misclosures(oriented.errors.points, targets.turned(xyz), rows, targets.axes(xyz))
 
     def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
-        """Covariance of any misclosures at the control, strip and control together, metres^2."""
         # image coordinates are taken as good as stated, or as bad as the pairs have proved
         factor = max(1.0, float(np.median(self.screened.scatter.by_pair)) ** 2 / (2 * self.sigma**2))
         errors = oriented.errors.with_doubt(self.formed.junctions.doubt / np.sqrt(factor))
@@ -109,7 +104,6 @@ class FormedPhotos:
         return of
 
     def control_rays(self, oriented: Oriented) -> list[ControlRay]:
-        """Rays of the control points that stand on two photos."""
         rays, centers = self._rays_in_use(), oriented.absolute.similarity(self.formed.centers)
         point = np.searchsorted(self.formed.point, self.observations.point[rays.rows])
         found = []
@@ -122,7 +116,6 @@ class FormedPhotos:
         return found
 
     def screens_control(self, settings: Settings) -> bool:
-        """Whether wrong control is looked for."""
         return settings.relative.screening != "none"
 
     def turned_over(self, refusal: InputError) -> FormedPhotos:
