@@ -112,7 +112,6 @@ def _solve(excess: Callable[[float], float], start: float, low: float, high: flo
 
 @lru_cache(maxsize=4096)
 def normal_quantile(probability: float) -> float:
-    """Quantile of the standard normal distribution."""
     return NormalDist().inv_cdf(probability)
 
 
@@ -129,7 +128,6 @@ def t_p_value(t: float, dof: float) -> float:
 
 @lru_cache(maxsize=4096)
 def t_quantile(probability: float, dof: float) -> float:
-    """Quantile of Student's t."""
     tail = min(probability, 1 - probability)
     if tail == 0.5:  # noqa: PLR2004  the median
         return 0.0

@@ -177,7 +177,6 @@ def _renumbered(ids: Sequence[str], codes: Numbers) -> tuple[tuple[str, ...], Nu
 
 
 def frame_spec(given: GivenList) -> FrameSpec:
-    """Return the frame of a list of ground coordinates."""
     return FrameSpec(
         crs=str(given.crs),
         axes=given.axes or CARTESIAN_AXES,

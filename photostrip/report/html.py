@@ -43,7 +43,6 @@ def to_html(document: Document, *, everything: bool = False) -> str:
 
 
 def methods_html(document: Document) -> str:
-    """Return a comparison of methods as one HTML file."""
     return _page(f"Methods: {document['name']}", document["version"], methods_sections(document), [])
 
 

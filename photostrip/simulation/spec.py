@@ -124,8 +124,6 @@ class Control:
 
 @dataclass(frozen=True)
 class Image:
-    """The measurement of image coordinates."""
-
     sigma_um: float = 5.0  # standard deviation of each coordinate, micrometres; 0 is free of errors
     unit: str = "mm"  # ``mm``, ``um`` or ``px`` in the files
     y_axis: str = "up"  # ``up`` or ``down`` in the files
@@ -146,8 +144,6 @@ class Film:
 
 @dataclass(frozen=True)
 class GrossError:
-    """One or more gross errors of a kind."""
-
     # ``image``: an image coordinate; ``control``: a given coordinate; ``swap``: two points exchanged on a photo
     kind: str
     count: int = 1

@@ -55,7 +55,6 @@ def cores() -> int:
 
 
 def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool) -> int:
-    """Run a batch and print its summary."""
     stop, folder = Stop(), None
     with ExitStack() as stack:
         stack.enter_context(on_signals(stop))

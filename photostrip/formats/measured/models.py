@@ -29,8 +29,6 @@ MODEL_CENTERS = (MODEL, PHOTO, *COORDINATES)
 
 @dataclass(frozen=True, eq=False)
 class ModelTable:
-    """Model coordinates as the table has them."""
-
     table: Table
     target: str  # what is measured: ``point`` or ``photo``, for its perspective centre
     model_ids: tuple[str, ...]

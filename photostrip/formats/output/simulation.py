@@ -107,7 +107,6 @@ def _project(simulation: Simulation) -> str:
 
 
 def _of_models(simulation: Simulation, measured: ModelPoints) -> list[str]:
-    """Lines of strips and models."""
     lines = ["strips:"]
     listed = simulation.spec.models is not None and not simulation.spec.models.centers
     for strip in _flights(simulation, measured):

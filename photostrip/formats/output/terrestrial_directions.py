@@ -289,7 +289,6 @@ def _sighted(sightings: Sightings, found: PhotoOrientation) -> list[Document]:
 
 
 def camera_list(cameras: dict[str, Phototheodolite]) -> Document:
-    """Return the cameras that can be named."""
     document = head("cameras")
     document["cameras"] = []
     for name, each in cameras.items():

@@ -155,7 +155,6 @@ def _rms_um(values: Floats) -> float | None:
 
 
 def _camera(result: Monitoring, state: CameraState) -> Document:
-    """Return the turn of one camera in one epoch."""
     row: Document = {"epoch": result.series.epochs[state.epoch], "side": state.side, "determined": False}
     turn = state.turn
     if turn is None:

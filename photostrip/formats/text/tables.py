@@ -22,8 +22,6 @@ CONTROL_CHARACTER = re.compile(r"[\x00-\x1f\x7f]")
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of a table as the format defines it."""
-
     name: str
     number: bool = False  # whether its cells are numbers; otherwise they are ids
     required: bool = True

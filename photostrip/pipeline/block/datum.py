@@ -146,8 +146,6 @@ def _by_control(xyz: Floats, every: Floats, control: ControlPoints, known: Known
 
 
 class _OrientedPhotos(NamedTuple):
-    """Photos with their orientations in the frame of a block."""
-
     names: tuple[str, ...]
     centers: Floats
     rotations: Floats

@@ -109,7 +109,6 @@ def _scatter(summary: Document) -> str:
 
 
 def _camera_section(document: Document) -> Section:
-    """Table of the turns of the cameras."""
     heads = {"right": "right", "up": "up", "counter_clockwise": "ccw"}
     turns = {f"{name}_arcsec": head for name, head in heads.items()}
     sigmas = [f"sigma_{name}" for name in turns]

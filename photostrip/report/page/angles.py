@@ -46,6 +46,5 @@ UNITS = {
 
 
 def angle_unit(document: Document) -> AngleUnit:
-    """Return the unit of the angles of the photos of a result."""
     photos = document["photos"]
     return UNITS[photos[0]["angles"]["unit"] if photos else "deg"]

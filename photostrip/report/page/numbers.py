@@ -20,7 +20,6 @@ def metres(value: Number) -> str:
 
 
 def signed(value: Number) -> str:
-    """Give metres with their sign."""
     return DASH if value is None else f"{value:+z.3f}"
 
 
@@ -30,7 +29,6 @@ def micrometres(value: Number) -> str:
 
 
 def ratio(value: Number) -> str:
-    """Return a ratio without unit."""
     return fixed(value, 2)
 
 
@@ -44,7 +42,6 @@ def calibrated(value: Number) -> str:
 
 
 def power(value: Number, digits: int = 4) -> str:
-    """Return a number in scientific form."""
     return DASH if value is None else f"{value:.{digits}e}"
 
 

@@ -88,7 +88,6 @@ def line(start: Point, end: Point, kind: str) -> str:
 
 
 def path(points: Iterable[Point], kind: str) -> str:
-    """Return a line through points."""
     steps = " ".join(f"{number(x)},{number(y)}" for x, y in points)
     return element("polyline", points=steps, kind=kind)
 
@@ -109,7 +108,6 @@ def mark(place: Point, shape: str, kind: str, hint: str, size: float = 5.0) -> s
 
 
 def picture(name: str, size: Point, texts: Texts, content: Iterable[str]) -> Picture:
-    """Put a picture together."""
     head = element("title", escape(texts.title), id=f"picture-{name}-title") + element(
         "desc", escape(texts.description), id=f"picture-{name}-desc"
     )

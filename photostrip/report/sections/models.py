@@ -111,7 +111,6 @@ def project_rows(document: Document) -> list[tuple[str, str]]:
 
 
 def measured(document: Document) -> tuple[tuple[str, str], ...]:
-    """Return the counts of what was measured."""
     counts = document["counts"]
     centers = f"{counts['model_centers']} of perspective centres"
     points = f"{counts['model_points']} of points, {counts['model_points_used']} used; {centers}"

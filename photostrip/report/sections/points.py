@@ -182,7 +182,6 @@ def image_section(document: Document) -> Section:
 
 
 def rejected_section(document: Document, *, everything: bool) -> Section:
-    """Measurements that were rejected."""
     rejected = standing_rejections(document)
     if not rejected:
         return Section("Rejected", (Words("Nothing was rejected."),))

@@ -27,8 +27,6 @@ SAME_ELEMENTS = 1e-6  # radians
 
 @dataclass(frozen=True, eq=False)
 class PairStep:
-    """One step of the relative orientation of a pair."""
-
     elements: Floats  # (5,): alpha1', kappa1', alpha2', omega2', kappa2' before the step, radians
     squares: float  # [w q q], sum of weighted squares of the y parallaxes before the step, mm^2
     step: Floats  # (5,): what is added, radians
@@ -45,8 +43,6 @@ class PairRound:
 
 @dataclass(frozen=True, eq=False)
 class SimilarityStep:
-    """One step of the absolute orientation."""
-
     similarity: Similarity
     squares: float
     step: Floats  # (7,): three shifts, three rotations and the scale, metres at the end of the strip

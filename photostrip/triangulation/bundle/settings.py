@@ -13,8 +13,6 @@ CALIBRATION = ("principal_distance", "principal_point", "k1", "k2", "k3", "p1", 
 
 @dataclass(frozen=True)
 class BundleSettings:
-    """What is asked of the bundle adjustment."""
-
     # how gross errors are searched for: ``"snooping"`` (one after the other, by the largest test value), ``"robust"``
     # (re-weighted first, then tested) or ``"none"``
     screening: str = "snooping"

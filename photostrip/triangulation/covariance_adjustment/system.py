@@ -185,8 +185,6 @@ class BlockMatrix:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The solved system of a strip."""
-
     errors: StripErrors
     conditions: Conditions
     layout: SystemLayout

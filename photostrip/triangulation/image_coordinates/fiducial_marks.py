@@ -45,7 +45,6 @@ class Marks:
         return np.asarray((self.weights > 0).sum(1), np.intp)
 
     def take(self, rows: Flags) -> Marks:
-        """Return the marks of some photos."""
         return take_rows(self, rows, ("photos", "measured", "weights"))
 
     def on_photo(self, row: int) -> tuple[str, ...]:

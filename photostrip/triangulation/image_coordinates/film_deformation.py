@@ -24,8 +24,6 @@ FLAT = 0.01  # ratio of the extents of the marks below which they stand on one l
 
 @dataclass(frozen=True, eq=False)
 class Deformation:
-    """Residual film deformation of photos."""
-
     # (m, 2): transformed coordinates of the marks of each photo, mm; none where they do not show a deformation
     nodes: tuple[Floats, ...]
     shifts: tuple[Floats, ...]  # (m, 2): corrections there, calibrated minus transformed, mm

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
 
 def camera_sections(document: Document) -> tuple[Section, ...]:
-    """Show a comparison of cameras."""
     facts = Facts(
         (
             ("fewest photos", f"{document['fewest_photos']}, at equal standard deviations of heights"),

@@ -278,7 +278,6 @@ def _long(value: float) -> str:
 
 
 def source_example_sections(document: Document) -> tuple[Section, ...]:
-    """Make the sections of the worked example of the source."""
     rows = document["rows"]
     table = tabulated(
         rows,

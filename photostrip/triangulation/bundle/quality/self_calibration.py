@@ -44,8 +44,6 @@ INSEPARABLE = 0.9999  # correlations of what cannot be told apart
 
 @dataclass(frozen=True)
 class Parameter:
-    """One calibration parameter after the adjustment."""
-
     # camera, name, unit: which it is
     camera: str
     name: str
