@@ -30,8 +30,8 @@ def schema_of(kind: str) -> dict[str, Any]:
         # defaults of nested sections are encoded twice, and the second time a tuple of words is a list
         warnings.filterwarnings("ignore", message="Pydantic serializer warnings", category=UserWarning)
         schema = _for_editors(file.model_json_schema())
-    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
-    return head | schema | (MEASURED if kind == "project" else {})
+    needed = MEASURED if kind == "project" else {}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **schema, **needed}
 
 
 def _build(kind: type[Section]) -> None:
