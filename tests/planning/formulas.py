@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.planning.model.deformation import parallax_error
+from photostrip.triangulation.relative_orientation import six_points
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -120,3 +122,13 @@ def intersected(xyz: Array, base: float, elements: Array, focal: float = 120.0) 
     scale2 = (scale1 * ray1[:, 2] - bz) / ray2[:, 2]
     y = (scale1 * ray1[:, 1] + by + scale2 * ray2[:, 1]) / 2
     return np.column_stack([scale1 * ray1[:, 0], y, scale1 * ray1[:, 2]])
+
+
+def orientation_factors(xy: ArrayLike, focal: float, width: float, base: float) -> Array:
+    """Variance of c from the relative orientation, in units of the variance of a y parallax, shape (n,).
+
+    The cofactors are those of six standard points; `width` is the distance a of the side points from the middle ones.
+    """
+    place = np.asarray(xy, float)
+    rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
+    return np.asarray(np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows), float)

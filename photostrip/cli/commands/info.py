@@ -44,7 +44,7 @@ def sources(
     Lists every misprint, and the command and the function for every equation.
     """
     with failures_as(form):
-        from photostrip.cli.jobs.sources import sources_document, with_tables
+        from photostrip.cli.jobs.sources.tables import sources_document, with_tables
         from photostrip.formats.output.csv_text import to_csv
         from photostrip.report.commands.sources import sources_report
 

@@ -78,16 +78,6 @@ def assumed_constants() -> dict[str, Constants]:
     }
 
 
-def orientation_factors(xy: ArrayLike, focal: float, width: float, base: float) -> Floats:
-    """Variance of c from the relative orientation, in units of the variance of a y parallax, shape (n,).
-
-    The cofactors are those of six standard points; `width` is the distance a of the side points from the middle ones.
-    """
-    place = np.asarray(xy, float)
-    rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
-    return np.asarray(np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows), float)
-
-
 def rigorous_covariance(xy: ArrayLike, focal: float, width: float, base: float, sigma: float) -> Floats:
     """Covariance (n, 3, 3) of new points, mm² at photo scale, from six standard points and the measuring of the point.
 

@@ -1,4 +1,4 @@
-"""Six standard points: relative orientation in closed form to the first order and its precision.
+"""Six standard points: the precision of their relative orientation, to the first order.
 
 The points, in the left photo: 1 (0, 0), 2 (b, 0), 3 (0, a), 4 (b, a), 5 (0, -a), 6 (b, -a) with the photo base b.
 Elements are those of ``relative``: alpha1', kappa1', alpha2', omega2', kappa2'.
@@ -12,41 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
-
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from photostrip.arrays import Floats
-
-SHARES = np.array([2.0, -2.0, -1.0, 1.0, -1.0, 1.0])  # of the six parallaxes in the closing error
-
-
-@dataclass(frozen=True, eq=False)
-class SixPoints:
-    """First-order orientation of six standard points."""
-
-    elements: Floats  # (5,): elements in radians
-    closing_error: float  # W, the one check that six points give, mm
-    sigma: float  # standard deviation of a y parallax from the closing error, mm
-    residuals: Floats  # (6,): y parallaxes that remain, mm
-
-
-def orient_six_points(parallax: ArrayLike, focal: float, width: float, base: float) -> SixPoints:
-    """Elements from the y parallaxes q of the six standard points, least squares linearised at zero.
-
-    `focal` is the principal distance f, `width` the distance a of the side points from the middle ones, `base` b.
-    """
-    q1, q2, q3, q4, q5, q6 = q = np.asarray(parallax, float)
-    omega2 = focal * (q3 + q4 + q5 + q6 - 2 * q1 - 2 * q2) / (4 * width**2)
-    tilted = omega2 * (focal + 2 * width**2 / (3 * focal))
-    alpha1, alpha2 = (focal * dq / (2 * width * base) for dq in (q6 - q4, q5 - q3))
-    kappa1, kappa2 = ((tilted - total / 3) / base for total in (q2 + q4 + q6, q1 + q3 + q5))
-    closing = float(SHARES @ q)
-    elements = np.array([alpha1, kappa1, alpha2, omega2, kappa2])
-    return SixPoints(
-        elements=elements, closing_error=closing, sigma=abs(closing) / np.sqrt(12.0), residuals=SHARES * closing / 12
-    )
 
 
 def cofactors(focal: float, width: float, base: float) -> Floats:

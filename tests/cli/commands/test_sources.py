@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli.jobs.sources import with_tables
+from photostrip.cli.jobs.sources.tables import with_tables
 from photostrip.cli.main import main
 from tests.loops import nonempty
 from tests.source_tree import ROOT

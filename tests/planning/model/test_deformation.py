@@ -19,7 +19,6 @@ from photostrip.planning.model.deformation import (
     base_frame_elements,
     determines_paraboloid,
     fit_paraboloid,
-    orientation_factors,
     paraboloid_rows,
     parallax_error,
     rigorous_covariance,
@@ -28,7 +27,7 @@ from photostrip.planning.model.deformation import (
 from photostrip.planning.model.plan import source_example
 from photostrip.triangulation.relative_orientation import six_points
 from tests.draws import orthogonal_normal
-from tests.planning.formulas import ground_errors, relative_differentials
+from tests.planning.formulas import ground_errors, orientation_factors, relative_differentials
 from tests.vectors import cases
 
 if TYPE_CHECKING:

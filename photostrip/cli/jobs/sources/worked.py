@@ -1,28 +1,16 @@
-"""What the sources print: every worked number computed again, every misprint, and where each equation is computed.
-
-The tables stand in ``equations.csv`` and ``misprints.csv``; docs/sources.md is made from them.
-"""
+"""Every worked number of the sources, computed again."""
 
 from __future__ import annotations
 
-import csv
-import io
-import re
-from importlib import resources
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from photostrip.errors import Fault, InputError
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, compare, source_cameras
 from photostrip.planning.model.plan import source_example
-from photostrip.result.numbers import rounded
 from photostrip.terrestrial.accuracy import EXAMPLES, worked
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
-EQUATIONS = "## From an equation to a command"
-DIGITS = 3  # decimals
 # [004a]: errors that were put in, found by the residual parallax, found by Grubbs' test, missed; good points rejected
 # and good points altogether
 COUNTS = {"errors": 44, "parallax": 21, "Grubbs": 20, "missed": 3, "rejected": 8, "good": 500}
@@ -139,53 +127,3 @@ def _screening() -> Iterator[Worked]:
 def worked_numbers() -> list[Worked]:
     """Compute every worked number of every source again; [000], [001] and [004c] have none."""
     return [*_directions(), *_model(), *_screening(), *_cameras()]
-
-
-def rows_of(name: str) -> list[dict[str, str]]:
-    """Read ``equations`` or ``misprints``."""
-    text = resources.files("photostrip.cli.jobs").joinpath(f"{name}.csv").read_text(encoding="utf-8")
-    return list(csv.DictReader(io.StringIO(text)))
-
-
-def sources_document() -> dict[str, Any]:
-    """Return worked numbers, misprints and equations as a plain document."""
-    return {
-        "kind": "sources",
-        "worked": [
-            {
-                **each._asdict(),
-                "printed": rounded(each.printed, DIGITS),
-                "formula": rounded(each.formula, DIGITS),
-                "correct": rounded(each.correct, DIGITS),
-            }
-            for each in worked_numbers()
-        ],
-        "misprints": rows_of("misprints"),
-        "equations": rows_of("equations"),
-    }
-
-
-def with_tables(page: str, name: str) -> str:
-    """Return a page with the tables below its headings made anew: of equations, and of the errata of each source."""
-    equations = [
-        (row["equation"], row["what"], f"`{row['command']}`", f"`{row['function']}`") for row in rows_of("equations")
-    ]
-    tables: dict[str, list[tuple[str, ...]]] = {EQUATIONS: [*equations]}
-    for row in rows_of("misprints"):
-        cells = (row["place"], row["printed"], row["correct"], *([row["shows"]] if _is_long(row["source"]) else []))
-        tables.setdefault(f"## Errata of {row['source']}", []).append(cells)
-    for heading, rows in tables.items():
-        before, found, after = page.partition(f"\n{heading}")
-        table = TABLE.search(after)
-        if not found or table is None:
-            message = f"{name} has no table below the heading {heading}"
-            raise InputError(Fault(message, "page", file=name, fix="write into docs/sources.md"))
-        head = "".join(table[0].splitlines(keepends=True)[:2])
-        lines = "".join(f"| {' | '.join(cells)} |\n" for cells in rows)
-        page = before + found + after[: table.start()] + head + lines + after[table.end() :]
-    return page
-
-
-def _is_long(source: str) -> bool:
-    """Whether the table of a source has a column that says how a misprint shows."""
-    return any(row["shows"] for row in rows_of("misprints") if row["source"] == source)
