@@ -10,21 +10,26 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+from unittest.mock import patch
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
 from benchmarks import plausibility
-from photostrip.errors import InputError
+from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geometry.rotation import angles, from_angles
+from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
+from photostrip.pipeline.plausibility import gate
 from photostrip.points import locate
 from photostrip.simulation import (
     DIGITAL,
@@ -46,6 +51,7 @@ from photostrip.triangulation.bundle.settings import BundleSettings
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from photostrip.notes import Finding
     from photostrip.pipeline import Inputs, Settings
     from photostrip.simulation.simulation import Simulation
 
@@ -417,6 +423,19 @@ def dense(seed: int) -> Sound:
     return sound_of(made(rng, seed, draw), "bundle")
 
 
+def large_block(seed: int) -> Sound:
+    """Make blocks of ten strips of forty photos, held by GNSS and control in the corners."""
+    rng = np.random.default_rng([25, seed])
+
+    def draw(rng: Rng) -> Spec:
+        spec = in_block(rng)
+        return replace(spec, flight=replace(spec.flight, photos=40, strips=10, side_lap_percent=30.0))
+
+    simulation = made(rng, seed, draw)
+    inputs = at_corners(simulation, with_gnss(simulation))
+    return Sound(inputs, replace(settings_of(simulation), adjustment="bundle"), simulation.spec)
+
+
 LAYOUTS: dict[str, Callable[[int], Sound]] = {
     "strips of 4-8 photos": short,
     "6-60 photos, bands every 3-20, polynomial": bands(6, 60, "polynomial"),
@@ -438,6 +457,7 @@ LAYOUTS: dict[str, Callable[[int], Sound]] = {
     "two lists in two zones": two_lists,
     "given orientations": given_orientations,
     "dense points": dense,
+    "GNSS blocks of 10 strips of 40 photos": large_block,
 }
 
 
@@ -448,6 +468,30 @@ def examine(sound: Sound) -> tuple[dict[str, set[str]], str]:
     return {code: ids for code, ids in named.items() if code not in sound.allowed}, told.refusal
 
 
+def shares(name: str, make: Callable[[int], Sound], seeds: range) -> None:
+    """Print what share of the processor time of its runs the gate takes in a layout, and the longest gate."""
+    spent = whole = longest = 0.0
+    examine_result = gate.of_result
+
+    def timed(*given: Any) -> tuple[Finding, ...]:  # noqa: ANN401
+        nonlocal spent, longest
+        begin = time.process_time()
+        found = examine_result(*given)
+        taken = time.process_time() - begin
+        spent, longest = spent + taken, max(longest, taken)
+        return found
+
+    with patch.object(gate, "of_result", timed):
+        for seed in seeds:
+            sound = make(seed)
+            begin = time.process_time()
+            with suppress(PhotostripError):
+                triangulate(sound.inputs, sound.settings)
+            whole += time.process_time() - begin
+    run = whole / len(seeds)
+    print(f"{name:<46} {run:6.3f} {spent / len(seeds):6.3f} {100 * spent / whole:5.1f} % {longest:6.3f}", flush=True)
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -455,7 +499,14 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("-v", action="store_true", dest="verbose")
     parser.add_argument("words", nargs="*")
+    parser.add_argument("--shares", action="store_true", help="the gate's share of the seconds of a run instead")
     asked = parser.parse_args()
+    if asked.shares:
+        print(f"{'layout':<46} {'run s':>6} {'gate s':>6} {'share':>7} {'most s':>6}")
+        for name, make in LAYOUTS.items():
+            if not asked.words or any(word in name for word in asked.words):
+                shares(name, make, range(asked.first, asked.first + asked.count))
+        return
     done = wrong = 0
     print(f"{'layout':<46} {'sound':>5} {'alarms':>6}  codes")
     for name, make in LAYOUTS.items():

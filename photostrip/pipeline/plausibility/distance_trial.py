@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
     Compare = Callable[[EvidenceStrip], HeightStretch | None]
 
+# sigma0 of the pairs over what is stated, from which they ask for it: in strips with the distance of another lens whose
+# control shows no stretch it is 3 and more, in sound ones below 1.8
+ASKING_SIGMA0 = 2.0
 LEAST_MISFIT = 2.5  # times what makes sense: heights that fit better need no other principal distance
 LEFT_SHARE = 0.4  # of that misfit, left with another principal distance that is reported
 MOST_SIGMA0_RATIO = 1.1  # times the sigma0 of the pairs
@@ -61,25 +64,26 @@ def find_wrong_distance(
     observations: PhotoPoints,
     settings: Settings,
     compare: Compare,
+    *,
+    stretched: bool,
 ) -> list[Finding]:
     """Try other principal distances on a strip that does not fit the heights of its control (P105, at most one).
 
+    It is tried where something asks for it: all control together, a misfit larger than a strip bends, or the pairs.
+
     as_given: how the strip fits those heights as it was formed, where that is known.
     `compare` compares a formed strip with them.
+    stretched: whether all control of the strip together shows that its heights are stretched.
     """
     if len(formed.strip.photos) > MOST_PHOTOS:
         return []
     # of a badly wrong distance, most control may have been dropped
     first = as_given or compare(formed) or compare(formed.whole)
-    if first is None or first.misfit_at_most < LEAST_MISFIT:
+    if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
         return []
     sigma0, stated = _middle_sigma0(formed), formed.strip.median_sigma(observations)
-    most_bend = len(formed.strip.photos) ** BEND_POWER
-    no_bend = first.misfit_at_most > most_bend and first.misfit > most_bend
-    bend_fits = first.in_relief_at_most * LEFT_SHARE < 1.0 or first.in_relief * LEFT_SHARE < 1.0
-    if not no_bend and bend_fits and sigma0 * BETTER_SIGMA0_RATIO < stated:
-        return []  # neither heights nor pairs could be so much better
-    if first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
+    no_bend = first.misfit > len(formed.strip.photos) ** BEND_POWER
+    if not (stretched or no_bend or sigma0 > ASKING_SIGMA0 * stated):
         return []
     for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(formed.strip, observations)]:
         trial = _followed(formed.strip, observations, settings, compare, start)

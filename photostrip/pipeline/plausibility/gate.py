@@ -27,21 +27,23 @@ from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images
 from photostrip.points import locate
 from photostrip.triangulation.plausibility import accepted
+from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
 from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, tied_strips
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
     from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
     from photostrip.pipeline.frames import GroundFrames
-    from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
+    from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
     from photostrip.pipeline.results import Result, StripResult
     from photostrip.points import PhotoPoints
+    from photostrip.triangulation.independent_models.formation import FormedModels
 
 STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give
 OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
@@ -50,13 +52,13 @@ OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
 def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None) -> tuple[Finding, ...]:
     """Find what the data say against themselves before anything is adjusted."""
     if inputs.models is not None:
-        return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
+        return _of_unadjusted_models(inputs, inputs.models, settings, directory)
     images = of_images(inputs, settings)
     findings = [*images.findings, *_of_ids(images.strips, images)]
     findings += given_cameras.centers(inputs, images.observations, images.strips, directory)
     unformed = [None] * len(images.strips)
     control = _given_control(inputs, directory)
-    findings += _of_control(control, images, images.strips, unformed, trials=False)
+    findings += _of_control(control, images, images.strips, unformed, tried={})
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     return accepted(findings, settings.accept)
 
@@ -65,13 +67,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     """Find what the data say against themselves, the adjustment being done."""
     inputs, settings = result.inputs, result.settings
     if inputs.models is not None:
-        of_models = _of_models(inputs, inputs.models, settings, directory)
-        given = _given_control(inputs, directory)
-        if given is not None and result.precision is not None:
-            predicted = slips.predict(result)
-            of_models = [each for each in of_models if each.code != slips.CODE]
-            of_models += slips.of_models(result, inputs.models, predicted, given)
-        return accepted(of_models, settings.accept)
+        return _of_adjusted_models(result, inputs.models, directory)
     points = result.refined.observations
     photo = PhotoCoordinates(result.measured, result.interior)
     images = replace(of_images(inputs, settings, photo), observations=points)
@@ -83,7 +79,9 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     predicted = slips.predict(result)
     doubtful = [each for each in formed if slips.is_doubtful(each, result, predicted)]
     strips = tuple(each.strip for each in doubtful)  # a photo that is a strip of its own forms nothing
-    of_control = _of_control(control, images, strips, doubtful, trials=not slips.fits_measurements(result))
+    stretched = {stage.strip.id: isinstance(stage.shared, StretchedHeights) for stage in stages}
+    tried = {} if slips.fits_measurements(result) else stretched
+    of_control = _of_control(control, images, strips, doubtful, tried)
     findings = [*images.findings, *(of_control if control is None else slips.confirmed(of_control, predicted, control))]
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each in formed:
@@ -113,13 +111,14 @@ def of_failure(
     """
     try:
         if inputs.models is not None:
-            return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
+            return _of_unadjusted_models(inputs, inputs.models, settings, directory)
         images = of_images(inputs, settings, photo)
         points = evidence.ideal(images.observations, images.cameras, settings)
         formed = [evidence.form(strip, points, settings) for strip in images.strips]
         frames = () if ground is None else _plain_frames(settings, ground.control)
         control = _given_control(inputs, directory, frames)
-        findings = [*images.findings, *_of_control(control, images, images.strips, formed)]
+        tried = dict.fromkeys([strip.id for strip in images.strips], True)
+        findings = [*images.findings, *_of_control(control, images, images.strips, formed, tried)]
         findings += control_layout.weak_layout(inputs, settings, images, control, directory)
         whole = [each for each in formed if each is not None]
         for each in whole:
@@ -157,24 +156,51 @@ def _of_control(
     images: ImageEvidence,
     strips: Sequence[Strip],
     formed: Sequence[EvidenceStrip | None],
-    *,
-    trials: bool = True,
+    tried: Mapping[str, bool],
 ) -> list[Finding]:
-    """Look at given coordinates: where they lie, how they go with each strip."""
+    """Look at given coordinates: where they lie, how they go with each strip.
+
+    tried: ids of the strips that may be formed anew with other principal distances, and whether all their control
+        shows stretched heights.
+    """
     if control is None:
         return []
-    return [*control.findings, *given_control.by_strip(control, images, strips, formed, trials=trials)]
+    return [*control.findings, *given_control.by_strip(control, images, strips, formed, tried)]
 
 
-def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, directory: Path | None) -> list[Finding]:
-    """Look at strips of models: given points by themselves and in each strip, perspective centres."""
-    from photostrip.pipeline.plausibility import model_evidence  # strips of photos need none of it
-
+def _of_unadjusted_models(
+    inputs: Inputs, models: MeasuredModels, settings: Settings, directory: Path | None
+) -> tuple[Finding, ...]:
+    """Look at strips of models of which there is no result."""
     control = _given_control(inputs, directory)
     if control is None:
-        return []
+        return ()
+    from photostrip.pipeline.plausibility import model_evidence  # strips of photos need none of it
+
+    return accepted(_of_models(model_evidence.form_strips(models, settings), models, control), settings.accept)
+
+
+def _of_adjusted_models(result: Result, models: MeasuredModels, directory: Path | None) -> tuple[Finding, ...]:
+    """Look at strips of models as they were adjusted."""
+    control = _given_control(result.inputs, directory)
+    if control is None:
+        return ()
+    strips = [(each.of_models.strip, each.of_models.formed) for each in result.strips]
+    findings = _of_models(strips, models, control)
+    if result.precision is not None:
+        findings = [each for each in findings if each.code != slips.CODE]
+        findings += slips.of_models(result, models, slips.predict(result), control)
+    return accepted(findings, result.settings.accept)
+
+
+def _of_models(
+    strips: Iterable[tuple[ModelStrip, FormedModels]], models: MeasuredModels, control: GivenControl
+) -> list[Finding]:
+    """Look at strips of models: given points by themselves and in each strip, perspective centres."""
+    from photostrip.pipeline.plausibility import model_evidence
+
     findings = [*control.findings]
-    for held in model_evidence.model_strips(models, control.points, settings):
+    for held in model_evidence.model_strips(strips, models.points.point_ids, control.points):
         for part in evidence.stretches(
             held.rows, held.on_strip, longest=STRETCH_MODELS, photos=STRETCH_MODELS, most=len(held.photos)
         ):

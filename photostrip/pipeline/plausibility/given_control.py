@@ -17,7 +17,7 @@ from photostrip.triangulation.plausibility.control import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from photostrip.arrays import Numbers
@@ -84,22 +84,23 @@ def by_strip(
     images: ImageEvidence,
     strips: Sequence[Strip],
     formed: Sequence[EvidenceStrip | None],
-    *,
-    trials: bool = True,
+    tried: Mapping[str, bool],
 ) -> list[Finding]:
     """Compare given coordinates with each strip: the formed one, or else the mosaic of its photos.
 
     formed: the same strips, as far as they could be formed.
-    trials: whether strips may be formed anew with other principal distances.
+    tried: ids of the strips that may be formed anew with other principal distances, and whether all their control
+        shows stretched heights.
     """
     findings: list[Finding] = []
     for strip, each in zip(strips, formed, strict=True):
         readings = _of_strip(strip, each, images, control)
         of_strip = [finding for reading in readings for finding in reading.findings]
-        if trials and not any(finding.is_error for finding in of_strip):
+        if strip.id in tried and not any(finding.is_error for finding in of_strip):
             whole = readings[0].heights if len(readings) == 1 and not control.as_written else None
             # where the distance is wrong, single points prove nothing
-            of_strip = _of_distance(strip, each, control_heights.stretch_of(whole), images, control) or of_strip
+            stretch = control_heights.stretch_of(whole)
+            of_strip = _of_distance(strip, each, stretch, images, control, stretched=tried[strip.id]) or of_strip
         findings += of_strip
     return findings
 
@@ -120,10 +121,14 @@ def _of_distance(
     stretch: control_heights.HeightStretch | None,
     images: ImageEvidence,
     control: GivenControl,
+    *,
+    stretched: bool,
 ) -> list[Finding]:
     compare = partial(_compared_in_height, images=images, control=control)
     if formed is not None:
-        return distance_trial.find_wrong_distance(formed, stretch, images.observations, images.settings, compare)
+        return distance_trial.find_wrong_distance(
+            formed, stretch, images.observations, images.settings, compare, stretched=stretched
+        )
     if images.findings:
         return []
     return distance_trial.find_distance_without_pairs(strip, images.observations, images.settings, compare)

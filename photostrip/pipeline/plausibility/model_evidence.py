@@ -13,7 +13,7 @@ from photostrip.pipeline.strips.models import form_models
 from photostrip.triangulation.plausibility.control.control_strip import StripPoints
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
@@ -38,15 +38,22 @@ class ModelStripEvidence:
     breadth: float  # half breadth of the strip over its length
 
 
-def model_strips(models: MeasuredModels, control: ControlPoints, settings: Settings) -> Iterator[ModelStripEvidence]:
-    """Form the strips that can be formed and have two perspective centres, for evidence alone."""
+def form_strips(models: MeasuredModels, settings: Settings) -> Iterator[tuple[ModelStrip, FormedModels]]:
+    """Form the strips that can be formed, for evidence alone."""
     for strip in models.strips:
         try:
-            formed = form_models(strip, models.points, settings)
+            yield strip, form_models(strip, models.points, settings)
         except (GeometryError, np.linalg.LinAlgError):
             continue
+
+
+def model_strips(
+    strips: Iterable[tuple[ModelStrip, FormedModels]], point_ids: Sequence[str], control: ControlPoints
+) -> Iterator[ModelStripEvidence]:
+    """Collect what the gate looks at in strips that have two perspective centres."""
+    for strip, formed in strips:
         if np.isfinite(formed.centers[:, 0]).sum() > 1:
-            yield _evidence(strip, formed, control, models.points.point_ids)
+            yield _evidence(strip, formed, control, point_ids)
 
 
 def _evidence(

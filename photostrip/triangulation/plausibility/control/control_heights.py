@@ -130,19 +130,6 @@ class HeightStretch:
         """The same of what is left when the strip may bend."""
         return self._left(self._fit(self.heights.whole).residual, len(self.heights.whole))
 
-    @cached_property
-    def in_relief_at_most(self) -> float:
-        """The same with the bend that the heights need: no larger bend leaves more."""
-        fit = self.heights.as_given
-        return self._left(fit.residual, len(fit.coefficient))
-
-    @cached_property
-    def misfit_at_most(self) -> float:
-        """The misfit with the tilt of that fit, which is not the best one without a bend."""
-        h = self.heights
-        tilt = h.as_given.coefficient[:LEAST_POINTS]
-        return self._left(h.value - h.columns[:, :LEAST_POINTS] @ tilt, LEAST_POINTS)
-
     @property
     def _tilt(self) -> list[Floats]:
         return self.heights.whole[:LEAST_POINTS]
