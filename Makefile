@@ -10,7 +10,7 @@ WORKERS ?= 2
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 unexport PYTHONDONTWRITEBYTECODE # or each of the hundreds of processes that the tests start compiles the program anew
 
-.PHONY: demo test check lint types lowest bench mutations docs golden regress man clean
+.PHONY: demo test check lint types lowest bench mutations docs site golden regress man clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/photostrip.installed ## run the main job on every sample project and print its accuracy report
@@ -55,6 +55,10 @@ mutations: $(VENV)/dev.installed ## change the program in 120 places, one at a t
 docs: $(VENV)/dev.installed ## rewrite the printed output in README.md and docs/ by running the commands there
 	$(BIN)/python -m tests.renew_docs
 
+site: ## the documentation as a site with search, in build/site
+	test -d .venv-site || { $(PYTHON) -m venv .venv-site && .venv-site/bin/python -m pip install --quiet zensical==0.1.2; }
+	.venv-site/bin/zensical build --clean --strict
+
 regress: $(VENV)/photostrip.installed ## adjust the sample projects that changed and compare them with their baselines
 	$(MAKE) --no-print-directory -f configs/Makefile.example STRIPS=sample_data OUT=build/regress PHOTOSTRIP=$(BIN)/photostrip check
 
@@ -65,7 +69,7 @@ man: $(VENV)/photostrip.installed ## write the manual pages into build/man/man1
 	$(BIN)/photostrip man -o build/man/man1
 
 clean: ## remove everything that make has made
-	rm -rf $(VENV) .venv-lowest build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) .venv-lowest .venv-site build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # One install per change of pyproject.toml; the package itself is installed editable and follows every change.

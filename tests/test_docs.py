@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.loops import nonempty
 from tests.pages import FRESH_CLONE, blocks, faults_of_page, matches, pages, renewed, steps
 from tests.source_tree import ROOT, modules
 
@@ -39,6 +40,20 @@ def test_console_blocks_are_run_or_say_why_not(page: Path) -> None:
     assert [block.place for block in found if not block.kind] == [], "say what the block is (text, console, yaml, ...)"
     assert [command for command in commands if FRESH_CLONE.search(command)] == [], "this belongs in a sh block"
     assert [block.place for block in silent if not block.above.startswith("<!--")] == [], "say above why it is not run"
+
+
+def test_the_site_has_every_page_in_its_menu() -> None:
+    menu = re.findall(r'"([\w/-]+\.md)"', (ROOT / "zensical.toml").read_text(encoding="utf-8"))
+    assert len(menu) == len(set(menu))
+    assert sorted(menu) == sorted(
+        page.relative_to(ROOT / "docs").as_posix() for page in pages() if page.name != "README.md"
+    )
+
+
+def test_no_page_of_the_site_links_out_of_it() -> None:
+    for page in nonempty(pages()[1:]):
+        for target in LINK.findall(page.read_text(encoding="utf-8")):
+            assert (page.parent / target).resolve().is_relative_to(ROOT / "docs"), f"{page.name}: {target}"
 
 
 @cache
