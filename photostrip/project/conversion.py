@@ -257,6 +257,11 @@ def _control_points(read: ControlTable, given: Control, number: int) -> ControlP
     )
 
 
+def ground_columns(given: GivenList) -> list[int]:
+    """Which of the columns x, y, z of a list is east, which north, which up (or X, Y, Z)."""
+    return _columns(frame_spec(given))
+
+
 def _columns(spec: FrameSpec) -> list[int]:
     """Which of the columns x, y, z is east, which north, which up (or X, Y, Z)."""
     names = CARTESIAN_AXES if "x" in spec.axes else GROUND_AXES

@@ -25,7 +25,7 @@ from photostrip.project.schema.cameras import Camera as CameraBlock
 from photostrip.project.schema.ground import CameraPositions as CameraPositionsBlock
 from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
 from photostrip.project.schema.project_file import ProjectFile
-from photostrip.project.tables import Tables, check_tables, read_tables
+from photostrip.project.tables import Tables, check_tables, in_one_zone, read_tables
 from photostrip.project.yaml.document import COMMAND_LINE, Node, at_own_key
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.references import check_references
@@ -208,6 +208,7 @@ def _inputs(
     control = [read for read in tables.control if read is not None]
     if len(control) != len(project.control):
         raise InputError("a table of the project is missing")
+    control, joined = in_one_zone(control, project.control, root)
     frames = tuple(conversion.frame_spec(each) for each in project.control)
     first = conversion.first_frame(project)
     output = conversion.output_spec(project.output, first)
@@ -226,7 +227,7 @@ def _inputs(
         orientations=conversion.given_orientations(tables.orientations, project.orientations, photos),
         models=models,
     )
-    return inputs, [*hints(project, tables, root), *derived]
+    return inputs, [*hints(project, tables, root), *derived, *joined]
 
 
 def _observations(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints:

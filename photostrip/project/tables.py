@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.errors import InputError
 from photostrip.formats.measured.control import ControlTable, read_control, refuse_repeated
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable, read_orientations, read_positions
 from photostrip.formats.measured.observations import Manner, read_measurements
@@ -16,8 +18,10 @@ from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.frozen import dataclass
+from photostrip.geodesy.zones import FEWEST, join_zones
 from photostrip.geometry.rotation import SYSTEMS
-from photostrip.notes import listed
+from photostrip.notes import Note, listed
+from photostrip.project.conversion import ground_columns
 from photostrip.project.models import ModelTables, model_tables, read_model_points
 from photostrip.project.yaml.document import Node, fault_at
 from photostrip.project.yaml.references import ListedPhoto, listed_photos, marks_of
@@ -27,6 +31,7 @@ if TYPE_CHECKING:
 
     from photostrip.errors import Fault
     from photostrip.formats.measured.measurements import Measurements
+    from photostrip.project.schema.ground import Control
     from photostrip.project.yaml.reading import Reading
 
 LOOK_ALIKES = str.maketrans("авеѕіјкмнорстухoil", "abes1jkmh0pctyx011")  # after folding the case
@@ -218,3 +223,49 @@ def rays(read: Measurements, photos: set[str]) -> dict[str, int]:
     kept = np.array([name in photos for name in read.photo_ids], bool)[read.photo]
     count = np.bincount(read.target[kept], minlength=len(read.target_ids))
     return {name: int(number) for name, number in zip(read.target_ids, count, strict=True) if number}
+
+
+def in_one_zone(
+    tables: Sequence[ControlTable], lists: Sequence[Control], root: Node
+) -> tuple[list[ControlTable], list[Note]]:
+    """Bring lists with `other_zone` into the zone of the first list, through the points that stand in both.
+
+    These may have ``use: off`` in either; check points join nothing. Heights stay as they are.
+    Raises InputError where a list has fewer than two such points.
+    """
+    found, notes, faults = list(tables), [], []
+    for number, (read, given) in enumerate(zip(tables, lists, strict=True)):
+        if not given.other_zone:
+            continue
+        place = ("control", number, "other_zone")
+        if number == 0:
+            message = "the other lists are brought into the zone of the first one"
+            faults.append(fault_at(root, place, message, "zone-joint", fix="put another list first"))
+            continue
+        first, columns, first_columns = tables[0], ground_columns(given)[:2], ground_columns(lists[0])[:2]
+        rows = {name: row for row, name in enumerate(first.ids) if not first.check[row]}
+        pairs = [(row, rows[name]) for row, name in enumerate(read.ids) if name in rows and not read.check[row]]
+        here, there = np.array(pairs, np.intp).reshape(-1, 2).T
+        both = read.xyz[here][:, columns], first.xyz[there][:, first_columns]
+        known = np.isfinite(both[0]).all(axis=1) & np.isfinite(both[1]).all(axis=1)
+        if len(np.unique(both[0][known], axis=0)) < FEWEST:
+            message = f"{int(known.sum())} points of this list stand in the first one too, and join the two zones"
+            expected = f"{FEWEST} or more, with `use: off` in one of the lists; 4 for the third power"
+            faults.append(fault_at(root, place, message, "zone-joint", expected=expected))
+            continue
+        joint = join_zones(both[0][known], both[1][known])
+        xyz = read.xyz.copy()
+        xyz[:, columns] = joint(read.xyz[:, columns])
+        found[number] = replace(read, xyz=xyz)
+        names = [read.ids[row] for row in here[known].tolist()]
+        off = np.linalg.norm(joint.residuals, axis=1)
+        left = f"rms {np.sqrt((off**2).mean()):.3f} m, largest {off.max():.3f} m at {names[int(off.argmax())]}"
+        checked = left if joint.redundancy else "nothing checks them"
+        message = (
+            f"list {number + 1} of the control is brought into the zone of the first by {len(names)} points of both,"
+            f" {listed(names, 6)}, with powers up to {joint.degree}: {checked}"
+        )
+        notes.append(Note("zones-joined", message, severity="note"))
+    if faults:
+        raise InputError(faults)
+    return found, notes

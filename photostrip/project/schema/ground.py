@@ -11,6 +11,7 @@ from photostrip.pipeline import Settings
 from photostrip.project.schema.measurements import COLUMNS, ControlColumns
 from photostrip.project.schema.values import (
     Axes,
+    Flag,
     Height,
     Number,
     Positive,
@@ -66,6 +67,17 @@ class Control(GivenList):
     file: Words = key("Table `point,x,y,z[,use][,role][,sx,sy,sz]`, .csv or .csv.gz")
     columns: ControlColumns = key(COLUMNS, {})
     sigma: Sigma3 | None = key(SIGMA, None, unit="m")
+    other_zone: Flag | None = key(
+        "Plane map coordinates, given as `local`, of another zone than the first list: joined by the points of both",
+        None,
+    )
+
+    @model_validator(mode="after")
+    def _zones_are_local(self) -> Self:
+        if self.other_zone and self.crs != "local":
+            message = "zones of a known projection are tied by their formulas"
+            raise wrong(message, at="other_zone", fix="remove it")
+        return self
 
 
 class CameraPositions(GivenList):
