@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import calibrated, fixed, short
-from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words, numbered
 from photostrip.report.page.tables import number, over_plane, tabulated, words
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def _misprints(document: Document) -> tuple[Part, ...]:
     first, second = document["examples"]
     small = [100 * (1 - row["vertical_eq6_arcsec"] / row["vertical_eq5_arcsec"]) for row in (first, second)]
     z = short(first["z_mm"])
-    texts = (
+    return numbered(
         (
             "Eq. 3 computes beta with sec(lambda') = sqrt(1 + x²/f²); it must be cos(lambda'). Put back into eq. 2, the"
             f" printed form returns z = {fixed(first['z_returned_by_printed_eq3_mm'], 1)} mm for z = {z} mm with"
@@ -176,7 +176,6 @@ def _misprints(document: Document) -> tuple[Part, ...]:
             f" its own formula gives {fixed(second['horizontal_exact_arcsec'], 2)}″."
         ),
     )
-    return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
 
 
 def _orientation(document: Document) -> tuple[Section, ...]:

@@ -39,6 +39,11 @@ class Words:
     mark: str = ""  # what stands before it: a number or a bullet; lines after the first are indented below the text
 
 
+def numbered(*texts: str) -> tuple[Words, ...]:
+    """Return paragraphs with numbers, from 1."""
+    return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
+
+
 Part = Table | Facts | Words
 
 

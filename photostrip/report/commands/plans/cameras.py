@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from photostrip.report.page.numbers import calibrated, fixed, short
-from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import Document, Facts, Part, Section, Table, numbered
 from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def source_table_sections(document: Document) -> tuple[Section, ...]:
 def _misprints(document: Document) -> tuple[Part, ...]:
     first, last = document["cameras"][0], document["cameras"][-1]
     f = short(last["principal_distance_mm"])
-    texts = (
+    return numbered(
         (
             "Eq. 2 gives a ratio of areas with the scale to the first power; an area goes with its square. Between f ="
             f" {short(first['principal_distance_mm'])} and {f} mm the printed form gives"
@@ -132,4 +132,3 @@ def _misprints(document: Document) -> tuple[Part, ...]:
             f" {fixed(last['printed_height_ratio'] * last['sigma_um'] / 1000, 0)} mm."
         ),
     )
-    return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import fixed, metres, micrometres, short, signed
-from photostrip.report.page.parts import Column, Document, Facts, Section, Table, Words
+from photostrip.report.page.parts import Column, Document, Facts, Section, Table, Words, numbered
 from photostrip.report.page.tables import number, over_plane, tabulated, words
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from photostrip.report.page.tables import Shown
 
 USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}
@@ -57,8 +59,8 @@ def model_sections(document: Document) -> tuple[Section, ...]:
     )
     return (
         Section("", (facts,)),
-        Section("Standard deviation in plan (both coordinates), m", (_grid(document, "sigma_plan_m"),)),
-        Section("Standard deviation in height, m", (_grid(document, "sigma_z_m"),)),
+        Section("Standard deviation in plan (both coordinates), m", (_grid(document["points"], "sigma_plan_m"),)),
+        Section("Standard deviation in height, m", (_grid(document["points"], "sigma_z_m"),)),
         Section("What each source of errors does alone", (_sources(document),)),
         Section("At the control", (_at_control(document),)),
         Section("The simple formulas, relative orientation and measuring only", (_simple(document),)),
@@ -77,9 +79,8 @@ def _control(document: Document) -> str:
     return f"{given}; given to {sigma} m along, across and in height"
 
 
-def _grid(document: Document, name: str) -> Table:
-    corner = Column("y \\ x", "mm")
-    return over_plane(document["points"], ("x_mm", "y_mm"), name, corner, metres, lambda at: fixed(at, 0))
+def _grid(points: list[Document], name: str, form: Callable[[float], str] = metres) -> Table:
+    return over_plane(points, ("x_mm", "y_mm"), name, Column("y \\ x", "mm"), form, lambda at: fixed(at, 0))
 
 
 def _sources(document: Document) -> Table:
@@ -216,7 +217,7 @@ def _bent(document: Document) -> tuple[Section, ...]:
     """Show the deformation by given errors of the elements, on the grid."""
     if "bent" not in document:
         return ()
-    bent = document["bent"]
+    bent, points = document["bent"], document["bent"]["points"]
     surface = tabulated(
         bent["surface"], (words("term", "term"), number("value", "value", short), words("unit", "unit"))
     )
@@ -224,17 +225,12 @@ def _bent(document: Document) -> tuple[Section, ...]:
         f"dZ = E0 + A x + B y + C x y + D x². Twist C moves a corner by {metres(bent['twist_at_corner_m'])} m against"
         f" the middle, bending D by {metres(bent['bending_at_corner_m'])} m; E0, A, B go into the absolute orientation."
     )
-
-    def heights(name: str) -> Table:
-        corner = Column("y \\ x", "mm")
-        return over_plane(bent["points"], ("x_mm", "y_mm"), name, corner, signed, lambda at: fixed(at, 0))
-
     return (
         Section("The model bent by the given elements", (surface, corner)),
-        Section("Height errors before levelling, dZ, m", (heights("raised_z_m"),)),
-        Section("Height errors that the absolute orientation leaves, m", (heights("left_z_m"),)),
-        Section("Errors along the flight that it leaves, m", (heights("left_x_m"),)),
-        Section("Errors across the flight that it leaves, m", (heights("left_y_m"),)),
+        Section("Height errors before levelling, dZ, m", (_grid(points, "raised_z_m", signed),)),
+        Section("Height errors that the absolute orientation leaves, m", (_grid(points, "left_z_m", signed),)),
+        Section("Errors along the flight that it leaves, m", (_grid(points, "left_x_m", signed),)),
+        Section("Errors across the flight that it leaves, m", (_grid(points, "left_y_m", signed),)),
     )
 
 
@@ -294,7 +290,7 @@ def source_example_sections(document: Document) -> tuple[Section, ...]:
     )
     central = next(row for row in rows if (row["place"], row["quantity"]) == ("central", "plan"))
     side = next(row for row in rows if (row["place"], row["quantity"]) == ("side", "height"))
-    texts = (
+    wrong = numbered(
         (
             f"The text says {fixed(central['printed_um'], 0)} µm in plan at the middle; the constant of the same text"
             f" gives {fixed(central['formula_um'], 0)} µm."
@@ -310,5 +306,4 @@ def source_example_sections(document: Document) -> tuple[Section, ...]:
             f" height, not {fixed(side['printed_um'], 0)}."
         ),
     )
-    wrong = tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
     return (Section("", (table,)), Section("What is wrong in print", wrong))
