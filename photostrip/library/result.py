@@ -11,7 +11,7 @@ import numpy as np
 from photostrip.errors import Fault, InputError
 from photostrip.library.table import Table
 from photostrip.notes import named
-from photostrip.result.quantities import as_lists
+from photostrip.result.records import as_lists
 from photostrip.result.tables import table_of
 
 if TYPE_CHECKING:

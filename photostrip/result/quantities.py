@@ -4,69 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photostrip.result.description import Quantity, Table, table_at
 from photostrip.result.numbers import DEGREES, GEOGRAPHIC, GROUND, IMAGE, RADIANS, Document, Plain, rounded, significant
+from photostrip.result.records import Records, as_records
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
     from numpy.typing import ArrayLike
 
-    from photostrip.arrays import Numbers
 
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
 DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES, "gon": DEGREES, "rad": RADIANS}
-
-
-class Records(Sequence[Document]):
-    """Records as they are written, kept as columns of equal length: a record is made when it is asked for."""
-
-    def __init__(self, columns: Mapping[str, Sequence[Plain]]) -> None:
-        self.columns = dict(columns)
-
-    def __len__(self) -> int:
-        return len(next(iter(self.columns.values()), ()))
-
-    def __iter__(self) -> Iterator[Document]:
-        return iter(as_records(self.columns))
-
-    @overload
-    def __getitem__(self, place: int) -> Document: ...
-    @overload
-    def __getitem__(self, place: slice) -> Records: ...
-    def __getitem__(self, place: int | slice) -> Document | Records:
-        found = {key: column[place] for key, column in self.columns.items()}
-        return Records(found) if isinstance(place, slice) else found
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Sequence) and list(self) == list(other)
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def taken(self, order: Numbers) -> Records:
-        """Return the records in another order."""
-        places = order.tolist()
-        return Records({key: [column[place] for place in places] for key, column in self.columns.items()})
-
-    @classmethod
-    def joined(cls, parts: Iterable[Records]) -> Records:
-        """Return records of the same keys one after the other."""
-        columns: dict[str, list[Plain]] = {}
-        for part in parts:
-            for key, column in part.columns.items():
-                columns.setdefault(key, []).extend(column)
-        return cls(columns)
-
-
-def as_lists(value: Plain) -> Plain:
-    """Return a document with lists of records in place of columns, as it is read again."""
-    if isinstance(value, dict):
-        return {key: as_lists(each) for key, each in value.items()}
-    return list(value) if isinstance(value, Records) else value
 
 
 def rounded_as(entry: Quantity, value: ArrayLike, unit: str = "") -> Plain:
@@ -114,11 +65,6 @@ def records(block: str, columns: Mapping[str, Any]) -> Records:
     """
     size = next(len(column) for column in columns.values() if isinstance(column, list | tuple | np.ndarray))
     return Records({key: _cells(table_at(block)[key], column, size) for key, column in columns.items()})
-
-
-def as_records(columns: Mapping[str, Sequence[Plain]]) -> list[Document]:
-    """Make records of columns of equal length."""
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _cells(entry: Quantity | Table, column: Any, size: int) -> Sequence[Plain]:  # noqa: ANN401 (any column)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
 from photostrip.notes import before, listed
-from photostrip.result.verification import verification_of
 from photostrip.statistics import TEST_LEVEL, chi2_quantile, f_p_value
 
 if TYPE_CHECKING:
@@ -49,9 +48,37 @@ def verdict_of(document: Document) -> Document:
         *_rejected(document),
         *_notes(document),
     ]
-    verification = verification_of(document)
+    verification = _verification(document)
     status = FAILED if failed else LOOK if look_at else GOOD if verification["verified"] else UNVERIFIED
     return {"status": status, "accuracy": accuracy(document), **verification, "look_at": look_at}
+
+
+def _verification(document: Document) -> Document:
+    """Return whether the points are verified in plan and in height, and by what; if not, what would verify them."""
+    checks, turned = document["summary"]["check"], document.get("cross_validation", {})
+    plan, height = (checks[part]["count"] for part in ("plan", "height"))
+    if plan and height:
+        return {"verified": True, "verification": f"{_given_points(plan, 'check')} in plan and {height} in height"}
+    if turned and turned["plan"]["count"] and turned["height"]["count"]:
+        points = _given_points(turned["plan"]["count"], "control")
+        text = f"{points} in plan and {turned['height']['count']} in height, left out in turn"
+        return {"verified": True, "verification": text}
+    missing = "the heights" if plan else "the plan coordinates" if height else "the result"
+    return {"verified": False, "verification": f"no point verifies {missing}: {_cure(document)}"}
+
+
+def _given_points(number: int, role: str) -> str:
+    return f"{number} {role} point{'' if number == 1 else 's'}"
+
+
+def _cure(document: Document) -> str:
+    folds = document.get("cross_validation", {}).get("folds")
+    if folds:
+        reason = next((fold["reason"] for fold in folds if fold["reason"]), "it does not give all coordinates")
+        return f"the control left out in turn cannot ({reason}); measure check points"
+    if document["counts"]["control_points"]:
+        return "hold some given points back as check points (`role: check`), or run with --cross-validate"
+    return "measure points whose coordinates are known, and give them with `role: check`"
 
 
 def _numbers(document: Document) -> Iterator[str]:

@@ -18,7 +18,7 @@ from photostrip.report.page.layout import cells
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
 from photostrip.report.page.text import to_markdown, to_text
 from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN
-from photostrip.result.quantities import Records
+from photostrip.result.records import Records
 from tests.loops import nonempty
 from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
 from tests.results import FRAMES, case

@@ -18,7 +18,7 @@ from photostrip.notes import Note
 from photostrip.pipeline import Settings
 from photostrip.result.document import document_of
 from photostrip.result.numbers import natural, rounded, significant
-from photostrip.result.quantities import Records
+from photostrip.result.records import Records
 from photostrip.result.summary import TOLERANCES
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, GrossError

@@ -15,8 +15,9 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.result.columns import photos_csv, points_csv, rejected_csv, reliability_csv
 from photostrip.result.description import Quantity, described, quantity_at
-from photostrip.result.quantities import Records, rounded_as
+from photostrip.result.quantities import rounded_as
 from photostrip.result.reading import faults_of
+from photostrip.result.records import Records
 from photostrip.simulation import Models, simulate
 from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline

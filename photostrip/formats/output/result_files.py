@@ -9,7 +9,7 @@ from photostrip.formats.output.result_json import to_json
 from photostrip.result import columns as tables
 from photostrip.result.numbers import PER_RADIAN, Document
 from photostrip.result.points.image_coordinates import refined_rows
-from photostrip.result.quantities import Records
+from photostrip.result.records import Records
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

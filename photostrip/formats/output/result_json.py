@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
-from photostrip.result.quantities import Records
 from photostrip.result.reading import faults_of, located
+from photostrip.result.records import Records
 from photostrip.visible import visible_json
 
 if TYPE_CHECKING:

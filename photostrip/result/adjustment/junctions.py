@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.result.quantities import Records, records
+from photostrip.result.quantities import records
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
+    from photostrip.result.records import Records
 
 DIRECTIONS = ("along", "across", "up")
 PPM = 1e6

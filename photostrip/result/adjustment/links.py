@@ -10,11 +10,12 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.pipeline.strips.model_notes import far_ends
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import Document, rms
-from photostrip.result.quantities import Records, grouped, record, records
+from photostrip.result.quantities import grouped, record, records
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
     from photostrip.pipeline import Result, StripResult
+    from photostrip.result.records import Records
 
 
 def sigma0(strip: StripResult) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.result.quantities import Records, grouped, records
+from photostrip.result.quantities import grouped, records
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
+    from photostrip.result.records import Records
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 

@@ -15,7 +15,8 @@ from photostrip.points import locate
 from photostrip.result.numbers import Document, natural_rank
 from photostrip.result.points.own_precision import chances, normalised
 from photostrip.result.points.standing_out import stand_out
-from photostrip.result.quantities import Records, records
+from photostrip.result.quantities import records
+from photostrip.result.records import Records
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers

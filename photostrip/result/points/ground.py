@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.result.numbers import Document, natural_rank, rounded
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns
-from photostrip.result.quantities import Records, coordinate_decimals, records
+from photostrip.result.quantities import coordinate_decimals, records
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline import Result
+    from photostrip.result.records import Records
 
 
 def coordinates(frame: GroundFrame, enu: Floats) -> Document:

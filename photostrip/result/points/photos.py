@@ -12,7 +12,7 @@ from photostrip.geometry.rotation import angles
 from photostrip.result.numbers import PER_RADIAN, Document, Plain, rounded
 from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns
-from photostrip.result.quantities import Records, angle_decimals, grouped, records
+from photostrip.result.quantities import angle_decimals, grouped, records
 from photostrip.triangulation.resection.collinearity import project
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.pipeline import Result, Strip, StripResult
+    from photostrip.result.records import Records
 
 
 @dataclass(frozen=True, eq=False)

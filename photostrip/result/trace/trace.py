@@ -11,7 +11,7 @@ import numpy as np
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.geometry.similarity import pair_scales
 from photostrip.result.numbers import EXACT, PER_RADIAN, Document, rounded, significant
-from photostrip.result.quantities import as_records
+from photostrip.result.records import as_records
 from photostrip.result.trace.departures import departures_of
 from photostrip.result.trace.replay import PairRound, SimilarityStep, pair_rounds, similarity_steps
 from photostrip.triangulation import absolute_orientation

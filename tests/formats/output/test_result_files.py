@@ -18,7 +18,7 @@ from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.pipeline import triangulate
 from photostrip.result.document import document_of
-from photostrip.result.quantities import Records
+from photostrip.result.records import Records
 from tests.loops import nonempty
 from tests.results import FRAMES, case, solved
 from tests.source_tree import ROOT

@@ -1,0 +1,64 @@
+"""Records of the document of a result, kept as columns; read without mathematics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, overload
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from photostrip.arrays import Numbers
+    from photostrip.result.numbers import Document, Plain
+
+
+class Records(Sequence[dict[str, Any]]):
+    """Records as they are written, kept as columns of equal length: a record is made when it is asked for."""
+
+    def __init__(self, columns: Mapping[str, Sequence[Plain]]) -> None:
+        self.columns = dict(columns)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), ()))
+
+    def __iter__(self) -> Iterator[Document]:
+        return iter(as_records(self.columns))
+
+    @overload
+    def __getitem__(self, place: int) -> Document: ...
+    @overload
+    def __getitem__(self, place: slice) -> Records: ...
+    def __getitem__(self, place: int | slice) -> Document | Records:
+        found = {key: column[place] for key, column in self.columns.items()}
+        return Records(found) if isinstance(place, slice) else found
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and list(self) == list(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def taken(self, order: Numbers) -> Records:
+        """Return the records in another order."""
+        places = order.tolist()
+        return Records({key: [column[place] for place in places] for key, column in self.columns.items()})
+
+    @classmethod
+    def joined(cls, parts: Iterable[Records]) -> Records:
+        """Return records of the same keys one after the other."""
+        columns: dict[str, list[Plain]] = {}
+        for part in parts:
+            for key, column in part.columns.items():
+                columns.setdefault(key, []).extend(column)
+        return cls(columns)
+
+
+def as_lists(value: Plain) -> Plain:
+    """Return a document with lists of records in place of columns, as it is read again."""
+    if isinstance(value, dict):
+        return {key: as_lists(each) for key, each in value.items()}
+    return list(value) if isinstance(value, Records) else value
+
+
+def as_records(columns: Mapping[str, Sequence[Plain]]) -> list[Document]:
+    """Make records of columns of equal length."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
