@@ -16,7 +16,7 @@ from photostrip.frozen import dataclass
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from photostrip.formats.output.terrestrial_directions import Attitude, Grid
+    from photostrip.formats.output.terrestrial_directions import Attitude, Grid, Theodolite
     from photostrip.terrestrial.frame import Phototheodolite
 
 HELP_NAMES = {"help_option_names": ["--help", "-h"]}
@@ -54,14 +54,6 @@ ImageTable = Annotated[str | None, typer.Argument(metavar="TABLE", help="Table `
 DirectionTable = Annotated[
     str | None, typer.Argument(metavar="TABLE", help="Table `point,lambda,beta` (CSV).", show_default=False)
 ]
-SigmaArcsec = Annotated[
-    float, typer.Option("--sigma-arcsec", metavar="SEC", help="Standard error of a direction in one round, both faces.")
-]
-VerticalArcsec = Annotated[
-    float | None,
-    typer.Option("--vertical-arcsec", metavar="SEC", help="The same of a vertical one; default: as horizontal."),
-]
-Rounds = Annotated[int, typer.Option("--rounds", min=1, help="Rounds measured.")]
 
 
 @dataclass(frozen=True)
@@ -95,6 +87,32 @@ class CameraByFormat(CameraOptions):
     photo_format: Annotated[
         str | None, typer.Option("--photo-format", metavar="W,H", help="Width and height of the photo in mm, likewise.")
     ] = None
+
+
+@dataclass(frozen=True)
+class DirectionOptions:
+    """Options that say how well directions are measured."""
+
+    theodolite: Annotated[
+        str | None,
+        typer.Option("--theodolite", metavar="NAME", help="Theo 010, 020 or 080 of Jena, instead of --sigma-arcsec."),
+    ] = None
+    sigma_arcsec: Annotated[
+        float | None,
+        typer.Option("--sigma-arcsec", metavar="SEC", help="Standard error of a direction in one round, both faces."),
+    ] = None
+    vertical_arcsec: Annotated[
+        float | None,
+        typer.Option("--vertical-arcsec", metavar="SEC", help="The same of a vertical one; default: as horizontal."),
+    ] = None
+    rounds: Annotated[int, typer.Option("--rounds", min=1, help="Rounds measured.")] = 1
+
+    def sigmas(self, usual: float | None = None) -> Theodolite:
+        """Return the standard errors in one round, and the rounds; `usual` stands where nothing is given."""
+        from photostrip.project.terrestrial.options import direction_sigma, theodolite_sigmas
+
+        horizontal = direction_sigma(self.theodolite, self.sigma_arcsec, usual)
+        return theodolite_sigmas(horizontal, self.vertical_arcsec, self.rounds)
 
 
 @dataclass(frozen=True)
@@ -204,12 +222,10 @@ def accuracy(
         _over_the_photo(camera, document, step, level=looking.level, plot=plot, draw=accuracy_plot, form=form)
 
 
-@_command("theodolite", '--camera "UMK 10/1318" --sigma-arcsec 2 --rounds 4')
-def theodolite(  # noqa: PLR0913 (an argument for each option)
+@_command("theodolite", '--camera "UMK 10/1318" --theodolite "Theo 010" --rounds 4')
+def theodolite(
     *,
-    sigma_arcsec: SigmaArcsec,
-    rounds: Rounds = 1,
-    vertical_arcsec: VerticalArcsec = None,
+    measuring: DirectionOptions,
     camera: CameraByFormat,
     sigma_um: Annotated[
         float | None,
@@ -223,11 +239,11 @@ def theodolite(  # noqa: PLR0913 (an argument for each option)
     """Tell which image accuracy a theodolite can vouch for, all over the photo."""
     with failures_as(form):
         from photostrip.formats.output.terrestrial_directions import theodolite_accuracy
-        from photostrip.project.terrestrial.options import image_sigma, theodolite_sigmas
+        from photostrip.project.terrestrial.options import image_sigma
         from photostrip.report.pictures.terrestrial import theodolite_plot
 
         attitude = looking.attitude()
-        measured = theodolite_sigmas(sigma_arcsec, vertical_arcsec, rounds)
+        measured = measuring.sigmas()
         wanted = None if sigma_um is None else image_sigma(sigma_um)
 
         def document(chosen: Phototheodolite, grid: Grid) -> dict[str, Any]:
@@ -299,9 +315,7 @@ def orient(  # noqa: PLR0913 (an argument for each option)
     unit: Unit = "mm",
     angles: AngleUnit = "deg",
     sigma_um: Annotated[float, typer.Option("--sigma-um", metavar="UM", help="Standard error of x and z.")] = 5.0,
-    sigma_arcsec: SigmaArcsec = 2.0,
-    vertical_arcsec: VerticalArcsec = None,
-    rounds: Rounds = 1,
+    measuring: DirectionOptions,
     screening: Annotated[
         Literal["deletion", "stated", "none"],
         typer.Option(
@@ -330,7 +344,7 @@ def orient(  # noqa: PLR0913 (an argument for each option)
             screening=screening,
             significance=within("--significance", significance, SIGNIFICANCE),
         )
-        measured = options.theodolite_sigmas(sigma_arcsec, vertical_arcsec, rounds)
+        measured = measuring.sigmas(usual=2.0)
         given = options.SightingOptions(
             unit=unit, angles=angles, sigma=options.image_sigma(sigma_um), theodolite=measured
         )

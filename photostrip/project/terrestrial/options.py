@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from photostrip.project.schema.values import Range
 
 STEEPEST = np.radians(89.9999)
+KILOMETRE = 1e6  # mm
+# Theodolites of Carl Zeiss Jena have in their names the lateral error, in mm at 1 km, of a direction observed once in
+# both faces [Pollmer 1976].
+THEODOLITES = {"Theo 010": 10.0, "Theo 020": 20.0, "Theo 080": 80.0}
 GIMBAL = 1e-6  # cosine of the elevation of the camera below which azimuth and roll are one
 
 
@@ -65,6 +69,26 @@ def required_format(camera: Phototheodolite) -> tuple[float, float]:
 def image_sigma(sigma_um: float) -> float:
     """Return the standard deviation of an image coordinate in mm."""
     return ranges.within("--sigma-um", sigma_um, ranges.IMAGE_SIGMA_UM) / 1000
+
+
+def direction_sigma(theodolite: str | None, given: float | None, usual: float | None) -> float:
+    """Return the standard error of a direction, arcseconds: as given, of a theodolite by its name, or the usual one."""
+    if theodolite is None:
+        found = usual if given is None else given
+        if found is None:
+            message = "nothing says how well directions are measured"
+            expected = f"arcseconds, or --theodolite with one of {', '.join(THEODOLITES)}"
+            raise InputError(Fault(message, "no-theodolite", key="--sigma-arcsec", expected=expected))
+        return found
+    if given is not None:
+        message = "the theodolite and its standard error are both given"
+        raise InputError(Fault(message, "two-keys", key="--sigma-arcsec", fix="leave out one of them"))
+    name = " ".join(theodolite.split())
+    if name not in THEODOLITES:
+        expected, fix = f"one of {', '.join(THEODOLITES)}", suggestion(name, THEODOLITES)
+        message = f"there is no theodolite `{shown(name)}`"
+        raise InputError(Fault(message, "unknown-theodolite", key="--theodolite", expected=expected, fix=fix))
+    return THEODOLITES[name] / KILOMETRE * ARCSECONDS
 
 
 def theodolite_sigmas(horizontal: float, vertical: float | None, rounds: int) -> Theodolite:

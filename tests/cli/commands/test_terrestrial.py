@@ -7,6 +7,7 @@ import csv
 import gzip
 import io
 import json
+import math
 import os
 import re
 import subprocess
@@ -155,6 +156,14 @@ def test_theodolite_of_two_seconds_in_four_rounds(capsys: pytest.CaptureFixture[
     code, text, _ = call(capsys, *command, "--vertical-arcsec", 6)
     assert code == 0
     assert "supports in the photo  2.06 µm everywhere (horizontal 0.88, vertical 2.06)" in text
+
+
+def test_a_theodolite_has_its_standard_error_in_its_name(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "directions", "theodolite", *UMK, "--theodolite", "Theo 020")
+    assert found["theodolite"]["horizontal_arcsec"] == pytest.approx(
+        math.degrees(math.atan(0.020 / 1000)) * 3600, abs=1e-4
+    )
+    assert found == answer(capsys, "directions", "theodolite", *UMK, "--sigma-arcsec", 20e-6 * 206264.80624709636)
 
 
 def test_the_examples_are_explained(capsys: pytest.CaptureFixture[str]) -> None:
@@ -551,6 +560,10 @@ def test_nothing_but_a_picture_loads_matplotlib(tmp_path: Path) -> None:
         ("directions to-photo --principal-distance 100 behind.csv", "behind.csv:4:5: beta: the direction to point C is not below the zenith; expected an elevation between -90 and 90 degrees"),
         ("directions accuracy --principal-distance 100", "--photo-format: the camera camera has no format; expected WIDTH,HEIGHT in mm"),
         ("directions accuracy --principal-distance 100 --photo-format 0,3", "--photo-format: 0 is out of range"),
+        ("directions theodolite --principal-distance 100 --photo-format 100,80", "--sigma-arcsec: nothing says how well directions are measured; expected arcseconds, or --theodolite"),
+        ("directions theodolite --principal-distance 100 --photo-format 100,80 --theodolite T2", "--theodolite: there is no theodolite `T2`; expected one of Theo 010, Theo 020, Theo 080"),
+        ("directions theodolite --principal-distance 100 --photo-format 100,80 --theodolite T2 --sigma-arcsec 1", "--sigma-arcsec: the theodolite and its standard error are both given"),
+        ("directions theodolite --principal-distance 100 --photo-format 100,80 --sigma-arcsec 0", "--sigma-arcsec: 0 is out of range"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --step 0", "--step: 0 is out of range"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --step 0.1", "--step: a step of 0.1 mm gives more than 20000 points; expected a larger step"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --sigma-um 0", "--sigma-um: 0 is out of range; expected 0.001 to 10000 µm"),
@@ -600,7 +613,6 @@ def test_wrong_usage_and_data_are_told_with_exit_2(
 def test_wrong_options_are_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for command, word in [
         (("directions", "accuracy", "--angles", "grad"), "grad"),
-        (("directions", "theodolite"), "--sigma-arcsec"),
         (("directions", "theodolite", "--sigma-arcsec", 2, "--rounds", 0), "rounds"),
         (("directions", "nothing"), "nothing"),
         (("displacement",), "PROJECT"),
