@@ -148,9 +148,9 @@ def test_make_adjusts_what_changed_and_nothing_else(tmp_path: Path, forked: Path
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_make_names_a_table_that_is_gone_and_keeps_the_result(tmp_path: Path) -> None:
+def test_make_names_a_table_that_is_gone_and_keeps_the_result(tmp_path: Path, forked: Path) -> None:
     two_strips(tmp_path)
-    folder = Folder(tmp_path)
+    folder = Folder(tmp_path, forked)
     assert folder.make("-j2").returncode == 0
     before = (tmp_path / "build/a/result.json").read_bytes()
     (tmp_path / "a/control.csv").unlink()
