@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+HELP_NAMES = {"help_option_names": ["--help", "-h"]}
+
 
 class Entry(NamedTuple):
     """Where a command stands and what ``--help`` says of it.

@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, TextIO, cast
 
 from photostrip import __version__
-from photostrip.cli.command_table import COMMANDS, COMPLETION, usage
+from photostrip.cli.command_table import COMMANDS, COMPLETION, HELP_NAMES, usage
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ def _parser(name: str, target: Callable[..., object]) -> Command:
     app = target
     if not isinstance(app, typer.Typer):
         app = typer.Typer(add_completion=False, rich_markup_mode=None)
-        app.command(name, context_settings={"help_option_names": ["--help", "-h"]})(target)
+        app.command(name, context_settings=HELP_NAMES)(target)
     command = typer.main.get_command(app)
     command.epilog = f"\b\nExample:\n  {COMMANDS[name].example}"  # \b: typer keeps the line breaks
     return command

@@ -1,4 +1,4 @@
-"""Groups of options that several commands have: declared once as a dataclass, one parameter of each command."""
+"""Commands of commands, and groups of options: declared once as a dataclass, one parameter of each command."""
 
 from __future__ import annotations
 
@@ -8,13 +8,27 @@ from functools import wraps
 from inspect import Parameter
 from typing import TYPE_CHECKING, Any, get_type_hints
 
+import typer
+
+from photostrip.cli.command_table import HELP_NAMES
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     Command = Callable[..., None]
 
 
-def with_groups(command: Command) -> Command:
+def command_group(text: str) -> typer.Typer:
+    """Make a command that has commands, with its help."""
+    return typer.Typer(add_completion=False, rich_markup_mode=None, context_settings=HELP_NAMES, help=text)
+
+
+def subcommand(of: typer.Typer, name: str, epilog: str) -> Callable[[Command], Command]:
+    """Register a command of a command, whose groups of options are its own; the epilog stands below its help."""
+    return lambda command: of.command(name, context_settings=HELP_NAMES, epilog=epilog)(_with_groups(command))
+
+
+def _with_groups(command: Command) -> Command:
     """Let a command that takes groups of options show typer every option of its own.
 
     A parameter whose type is a dataclass stands for the fields of it, in their order and with their defaults.

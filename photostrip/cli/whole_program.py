@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.command_table import COMMANDS
+from photostrip.cli.command_table import COMMANDS, HELP_NAMES
 
 
 def whole_program(*, completing: bool = False) -> typer.Typer:
@@ -29,5 +29,5 @@ def whole_program(*, completing: bool = False) -> typer.Typer:
         if isinstance(target, typer.Typer):
             app.add_typer(target, name=name)
         else:
-            app.command(name, context_settings={"help_option_names": ["--help", "-h"]})(target)
+            app.command(name, context_settings=HELP_NAMES)(target)
     return app

@@ -9,7 +9,7 @@ import typer
 
 from photostrip.cli.documents import FORMS, Form, Rendering, require_target
 from photostrip.cli.failures import failures_as
-from photostrip.cli.option_groups import with_groups
+from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import Silent
 from photostrip.frozen import dataclass
 
@@ -18,14 +18,7 @@ if TYPE_CHECKING:
 
     from photostrip.report.page.parts import Document
 
-HELP_NAMES = {"help_option_names": ["--help", "-h"]}
-
-step = typer.Typer(
-    add_completion=False,
-    rich_markup_mode=None,
-    context_settings=HELP_NAMES,
-    help="Single steps of the method, from a table of points: for teaching and checking.",
-)
+step = command_group("Single steps of the method, from a table of points: for teaching and checking.")
 
 Table = Annotated[Path, typer.Argument(metavar="FILE", help="Table of points (CSV).", show_default=False)]
 Focal = Annotated[float, typer.Option("--principal-distance", "-f", metavar="MM", min=1e-6, help="Principal distance.")]
@@ -71,11 +64,7 @@ class Delivery:
 
 def _command(name: str, columns: str, example: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     text = f"\b\nColumns of FILE: {columns}\n\b\nExample:\n  photostrip step {name} {example}"
-
-    def register(command: Callable[..., None]) -> Callable[..., None]:
-        return step.command(name, context_settings=HELP_NAMES, epilog=text)(with_groups(command))
-
-    return register
+    return subcommand(step, name, text)
 
 
 @_command("interior", "mark, x, y, x_photo, y_photo", "marks.csv --transform conformal")

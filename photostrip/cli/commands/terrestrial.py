@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from photostrip.cli.commands.terrestrial_directions import (
-    HELP_NAMES,
     CameraByPoint,
     Format,
     Looking,
@@ -17,18 +16,15 @@ from photostrip.cli.commands.terrestrial_directions import (
 )
 from photostrip.cli.documents import Rendering, require_target, say, write_rule
 from photostrip.cli.failures import failures_as
-from photostrip.cli.option_groups import with_groups
+from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import Silent
 from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from photostrip.project.terrestrial.survey import Survey
 
-terrestrial = typer.Typer(
-    add_completion=False,
-    rich_markup_mode=None,
-    context_settings=HELP_NAMES,
-    help="Computations of a phototheodolite: directions of photo points, displacements between epochs.",
+terrestrial = command_group(
+    "Computations of a phototheodolite: directions of photo points, displacements between epochs."
 )
 terrestrial.add_typer(directions, name="directions")
 
@@ -63,8 +59,7 @@ class TableOptions:
     ] = None
 
 
-@terrestrial.command("displacement", epilog=EXAMPLE)
-@with_groups
+@subcommand(terrestrial, "displacement", EXAMPLE)
 def displacement(  # noqa: PLR0913 (an argument for each option)
     *,
     source: Annotated[
@@ -113,8 +108,7 @@ def displacement(  # noqa: PLR0913 (an argument for each option)
         Rendering(displacement_report, displacements_csv).show(document, form)
 
 
-@terrestrial.command("one-station", epilog=ONE_STATION)
-@with_groups
+@subcommand(terrestrial, "one-station", ONE_STATION)
 def one_station(  # noqa: PLR0913 (an argument for each option)
     *,
     table: Annotated[

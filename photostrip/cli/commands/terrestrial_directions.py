@@ -9,7 +9,7 @@ import typer
 
 from photostrip.cli.documents import Form, Rendering, say
 from photostrip.cli.failures import failures_as
-from photostrip.cli.option_groups import with_groups
+from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import Silent
 from photostrip.frozen import dataclass
 
@@ -19,25 +19,17 @@ if TYPE_CHECKING:
     from photostrip.formats.output.terrestrial_directions import Attitude, Grid, Theodolite
     from photostrip.terrestrial.frame import Phototheodolite
 
-HELP_NAMES = {"help_option_names": ["--help", "-h"]}
 MOST_POINTS = 20_000  # of a table over the photo
 COMMAND = "photostrip terrestrial directions"
 
-directions = typer.Typer(
-    add_completion=False,
-    rich_markup_mode=None,
-    help="Directions of a phototheodolite: from photos and back, their accuracy, the orientation of a photo by them.",
+directions = command_group(
+    "Directions of a phototheodolite: from photos and back, their accuracy, the orientation of a photo by them."
 )
 
 
 def _command(name: str, example: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     arguments = f" \\\n      {example}" if example else ""  # a page is 80 characters wide
-    epilog = f"\b\nExample:\n  {COMMAND} {name}{arguments}"
-
-    def register(command: Callable[..., None]) -> Callable[..., None]:
-        return directions.command(name, context_settings=HELP_NAMES, epilog=epilog)(with_groups(command))
-
-    return register
+    return subcommand(directions, name, f"\b\nExample:\n  {COMMAND} {name}{arguments}")
 
 
 CameraName = Annotated[str | None, typer.Option("--camera", metavar="NAME", help="Camera of a list; see `cameras`.")]

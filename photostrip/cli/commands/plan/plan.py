@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import typer
-
 from photostrip.cli.commands.plan.camera import camera
 from photostrip.cli.commands.plan.displacement import displacement
 from photostrip.cli.commands.plan.model import model
 from photostrip.cli.commands.plan.screening import screening
 from photostrip.cli.commands.plan.strip import strip
-from photostrip.cli.option_groups import with_groups
+from photostrip.cli.option_groups import command_group, subcommand
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-HELP_NAMES = {"help_option_names": ["--help", "-h"]}
 COMMANDS: dict[Callable[..., None], tuple[str, ...]] = {  # examples
     model: (
         "--camera film --overlap 60 --scale 10000 --control corners",
@@ -30,13 +27,10 @@ COMMANDS: dict[Callable[..., None], tuple[str, ...]] = {  # examples
     displacement: ("--camera 'UMK 10/1318' --base 30 --distances 50,100,200", "--stations 1 --distances 80"),
 }
 
-plan = typer.Typer(
-    add_completion=False,
-    rich_markup_mode=None,
-    context_settings=HELP_NAMES,
-    help="Expected accuracy of a model, of a strip with its control, of displacements; which camera is the better one.",
+plan = command_group(
+    "Expected accuracy of a model, of a strip with its control, of displacements; which camera is the better one."
 )
 for command, examples in COMMANDS.items():
     name = command.__name__
     text = "\b\nExamples:\n" + "\n".join(f"  photostrip plan {name} {example}" for example in examples)
-    plan.command(name, context_settings=HELP_NAMES, epilog=text)(with_groups(command))
+    subcommand(plan, name, text)(command)
