@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from os import PathLike
 
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline import Result as Computed
     from photostrip.result.numbers import Document
 
@@ -117,11 +117,14 @@ class Result:
     def _table(self, name: str) -> Table:
         return Table(name, table_of(self._document, name))
 
-    def covariance_of(self, ids: Sequence[str] | str) -> Floats:
+    def covariance_of(self, ids: Sequence[str] | str, *, joint: bool = False) -> Floats:
         """Return the covariances of points, in the order of the ids, along x, y, z of the frame.
 
-        Returns square metres, shape (n, 3, 3); shape (3, 3) for a single id. NaN where none was computed.
-        Raises InputError for a point that the result does not have.
+        joint: of all points with each other, for distances and differences of points; of a run by ``covariance`` or
+            ``bundle`` only, not of a saved result.
+        Returns square metres, shape (n, 3, 3), joint (n, 3, n, 3); shape (3, 3) for a single id. NaN where none was
+            computed.
+        Raises InputError for a point that the result does not have, and where joint covariances cannot be had.
         """
         names = [ids] if isinstance(ids, str) else list(ids)
         points = self.points
@@ -129,6 +132,8 @@ class Result:
         if unknown := [name for name in names if name not in rows]:
             message = f"the result has no {named('point', unknown)}"
             raise InputError(Fault(message, "unknown-point", points=tuple(unknown)))
+        if joint:
+            return self._joint(np.array([rows[name] for name in names], np.intp))
         found = np.full((len(names), 3, 3), np.nan)
         if "sigma_x" in points.columns and "cov_xy" in points.columns:
             at = [rows[name] for name in names]
@@ -137,6 +142,20 @@ class Result:
             for k, j, axes in ((0, 1, "xy"), (0, 2, "xz"), (1, 2, "yz")):
                 found[:, k, j] = found[:, j, k] = points[f"cov_{axes}"][at]
         return found[0] if isinstance(ids, str) else found
+
+    def _joint(self, rows: Numbers) -> Floats:
+        """Return the joint covariances of rows of the table of points."""
+        if self.computed is None:
+            message = "a saved result holds no covariances between points"
+            raise InputError(Fault(message, "result-saved", fix="run the project again"))
+        from photostrip.pipeline.precision.joint_points import joint_covariance
+
+        point_ids = self.computed.refined.observations.point_ids
+        place = {point_ids[number]: row for row, number in enumerate(self.computed.points.number.tolist())}
+        ids = self.points["id"][rows].tolist()
+        found = joint_covariance(self.computed, np.array([place[name] for name in ids], np.intp))
+        order = list(self.computed.output.order)
+        return found[:, order][:, :, :, order]
 
     def report(self, form: ReportForm = "text", *, sections: Sequence[str] = (), everything: bool = True) -> str:
         """Return the accuracy report as text, Markdown, HTML or JSON.

@@ -134,6 +134,44 @@ def test_covariances_are_those_of_the_table(result: photostrip.Result) -> None:
         result.covariance_of(["K07", "X1"])
 
 
+@pytest.mark.parametrize("adjustment", ["covariance", "bundle"])
+@pytest.mark.parametrize("crs", ["EPSG:32633", "geocentric"])
+def test_joint_covariances_hold_those_of_the_points(adjustment: str, crs: str) -> None:
+    axes = ["x", "y", "z"] if crs == "geocentric" else ["north", "east", "up"]
+    found = photostrip.run(SAMPLE, processing={"adjustment": adjustment}, output={"crs": crs, "axes": axes})
+    ids = ["K07", "1001-4", "K08", "1015-7", "K07"]
+    joint = found.covariance_of(ids, joint=True)
+    full = joint.reshape(15, 15)
+    np.testing.assert_allclose(full, full.T, atol=1e-12)
+    own = found.covariance_of(ids)
+    for k in range(5):
+        np.testing.assert_allclose(joint[k, :, k], own[k], atol=2e-5)
+    np.testing.assert_allclose(joint[0], joint[4])
+    assert (np.linalg.eigvalsh(full[:12, :12]) > 0).all()
+    near = joint[0, :, 0] + joint[2, :, 2] - joint[0, :, 2] - joint[2, :, 0]
+    assert np.trace(near) < np.trace(own[0] + own[2])  # neighbours err alike
+
+
+def test_the_check_test_of_the_run_is_made_of_the_same_joint_covariances(bundle: photostrip.Result) -> None:
+    assert bundle.computed is not None
+    assert bundle.computed.precision is not None
+    (tested,) = [each for each in bundle.computed.precision.checks if each is not None]
+    joint = bundle.covariance_of(tested.ids, joint=True)
+    rows = [[n for n, point in enumerate(tested.point) if point == k] for k in range(2)]
+    np.testing.assert_allclose(
+        tested.covariance[np.ix_(rows[0], rows[1])], joint[0, :, 1][: len(rows[0]), : len(rows[1])], atol=1e-9
+    )
+
+
+def test_where_there_are_no_joint_covariances_it_is_said(result: photostrip.Result, tmp_path: Path) -> None:
+    polynomial = photostrip.run(SAMPLE, processing={"adjustment": "polynomial"})
+    with pytest.raises(photostrip.InputError, match="only covariance and bundle adjustments keep joint covariances"):
+        polynomial.covariance_of(["K07", "K08"], joint=True)
+    result.write(tmp_path)
+    with pytest.raises(photostrip.InputError, match="a saved result holds no covariances between points"):
+        photostrip.read_result(tmp_path).covariance_of(["K07", "K08"], joint=True)
+
+
 def test_without_precision_covariances_are_not_known() -> None:
     found = photostrip.run(SAMPLE, processing={"precision": False, "adjustment": "polynomial"})
     assert np.isnan(found.covariance_of("K07")).all()
