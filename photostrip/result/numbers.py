@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,8 +32,11 @@ PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}  # units of an
 DIGITS = re.compile("([0-9]+)")
 
 
-def rounded(values: ArrayLike, decimals: int) -> Plain:
+def rounded(values: ArrayLike | float, decimals: int) -> Plain:
     """Round numbers, or nested lists of them, to decimals; None for what is no number (NaN, infinite), never -0."""
+    if isinstance(values, float):  # as numpy does it, in a tenth of the time
+        scaled = float(values) * 10.0**decimals
+        return round(scaled) / 10.0**decimals + 0.0 if isfinite(scaled) else None
     return plain(np.round(np.asarray(values, float), decimals) + 0.0)
 
 

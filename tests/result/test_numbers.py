@@ -1,11 +1,12 @@
-"""Natural order of ids."""
+"""Natural order of ids; rounding."""
 
 from __future__ import annotations
 
+import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from photostrip.result.numbers import natural, natural_rank
+from photostrip.result.numbers import natural, natural_rank, rounded
 
 
 @given(st.lists(st.text("ab-_. 0019\n\0é", max_size=6)))
@@ -18,3 +19,13 @@ def test_the_rank_of_many_ids_is_the_order_of_the_keys_of_single_ones(names: lis
 
 def test_numbers_count_as_numbers() -> None:
     assert natural_rank(["P10", "P2", "P02", "P1"]).tolist() == [3, 2, 1, 0]
+
+
+@given(st.floats(), st.integers(0, 12))
+@example(-0.0, 2)
+@example(-1e-9, 4)
+@example(0.285, 2)
+@example(1e308, 4)
+def test_a_single_number_is_rounded_as_one_of_many(value: float, decimals: int) -> None:
+    with np.errstate(over="ignore"):
+        assert repr(rounded(value, decimals)) == repr(rounded([value], decimals)[0])

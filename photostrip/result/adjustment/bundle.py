@@ -251,7 +251,7 @@ def _observed(found: Bundle, group: reliability.Group, at: tuple[int, int], shif
     """Return everything about one observed coordinate; errors that would be found where others check it."""
     photo, point = names_of_observation(found.screened.problem, group.kind, at[0])
     checked = group.redundancy[at] >= reliability.UNCONTROLLED
-    external = group.external(shift)[at] if checked else np.nan
+    external = float(group.external(shift, at)) if checked else np.nan
     return {
         "kind": group.kind,
         "photo": photo,
@@ -260,10 +260,10 @@ def _observed(found: Bundle, group: reliability.Group, at: tuple[int, int], shif
         "redundancy": group.redundancy[at],
         "error": group.error[at] * kind.factor,
         "standardised": group.standardised[at],
-        "detectable": group.detectable(shift)[at] * kind.factor if checked else None,
+        "detectable": float(group.detectable(shift, at)) * kind.factor if checked else None,
         "unit": kind.unit,
         "external": external,
-        "effect": _effect(found, group.kind, at[0], float(external)),
+        "effect": _effect(found, group.kind, at[0], external),
     }
 
 

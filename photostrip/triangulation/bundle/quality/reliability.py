@@ -15,6 +15,8 @@ from photostrip.frozen import dataclass
 from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
 
 if TYPE_CHECKING:
+    from types import EllipsisType
+
     from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.settings import BundleSettings
@@ -48,21 +50,21 @@ class Group:
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(self.redundancy >= UNCONTROLLED, self.error / self.redundancy, np.nan)
 
-    def detectable(self, shift: float) -> Floats:
-        """Smallest errors that are found with the wanted power, (n, k), in the unit of the observation.
+    def detectable(self, shift: float, at: tuple[int, int] | EllipsisType = ...) -> Floats:
+        """Smallest errors that are found with the wanted power, (n, k), in the unit of the observation; of one `at`.
 
         sigma shift / sqrt(r) with ``noncentrality`` as shift; infinite where it is not controlled at all.
         """
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(self.sigma * shift / np.sqrt(np.maximum(self.redundancy, 0.0)), float)
+            return np.asarray(self.sigma[at] * shift / np.sqrt(np.maximum(self.redundancy[at], 0.0)), float)
 
-    def external(self, shift: float) -> Floats:
+    def external(self, shift: float, at: tuple[int, int] | EllipsisType = ...) -> Floats:
         """How far an error that is just not found can move any coordinate, in its standard deviations.
 
         ``shift sqrt((1 - r) / r)``, (n, k): no coordinate, and no function of coordinates, moves by more.
         Source: [Baarda 1968].
         """
-        r = np.clip(self.redundancy, 0.0, 1.0)
+        r = np.clip(self.redundancy[at], 0.0, 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(shift * np.sqrt((1.0 - r) / r), float)
 
