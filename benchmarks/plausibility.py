@@ -650,6 +650,20 @@ def slip_of_a_digit(case: Case, *, check: bool) -> Planted | None:
     return with_control(case, enu=enu), frozenset({control.ids[row]})
 
 
+def digit_too_many(case: Case) -> Planted | None:
+    """Write one digit of a projected coordinate twice."""
+    control = case.inputs.control
+    if kind_of(case) != "EPSG" or not enough(case, 8):
+        return None
+    seen = np.isin(control.ids, case.inputs.observations.point_ids) & control.use.all(axis=1) & ~control.check
+    row, axis = int(case.rng.choice(np.flatnonzero(seen))), int(case.rng.integers(2))
+    text = f"{control.enu[row, axis]:.3f}"
+    place = int(case.rng.integers(text.index(".")))
+    enu = control.enu.copy()
+    enu[row, axis] = float(text[: place + 1] + text[place:])
+    return with_control(case, enu=enu), frozenset({control.ids[row]})
+
+
 def exchanged(case: Case) -> Planted | None:
     """Exchange the coordinates of two control points."""
     control = case.inputs.control
@@ -925,6 +939,7 @@ MISTAKES = (
     Mistake("heights in feet, plan in metres", heights_in_feet, ("P405",)),
     Mistake("slip of a digit, control", lambda case: slip_of_a_digit(case, check=False), ("P406",)),
     Mistake("slip of a digit, check point", lambda case: slip_of_a_digit(case, check=True), ("P406",)),
+    Mistake("a digit written twice", digit_too_many, ("P406",)),
     Mistake("slip of a digit, models", lambda case: slip_of_a_digit(case, check=False), ("P406",), of_models),
     Mistake("two control points exchanged", exchanged, ("P408",)),
     Mistake("control at one end", at_one_end, ("P501",)),

@@ -38,6 +38,8 @@ LAST_AXES_UPDATE = 2  # iteration; afterwards the directions of the ground axes 
 RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
 WEAK_LIMIT = 1 / 8  # well spread control has about 1; at an eighth errors of the control grow eightfold somewhere
 OFF_LINE = 0.1  # breadth of given coordinates on a line over that of the strip's points, as parts of their lengths
+LEAST_WITH_ONE_FAR = 3  # control points: of three none is far from two others
+FAR_OFF = 5.0  # times as far from the middle as any other control point: a strip is no longer than its control
 IDS_NAMED = 6  # in a message
 PLAN, HEIGHT = slice(0, 2), 2
 
@@ -175,8 +177,9 @@ def orient(
         if np.abs(step).max() < CONVERGED * half:
             break
     if similarity.rotation[2, 2] < 0:
-        if collinearity(targets.of(similarity(strip))) < WEAK_LIMIT**2:
-            raise _on_line(targets.control)  # a line fits upside down as well as upright
+        given = targets.of(similarity(strip))
+        if collinearity(given) < WEAK_LIMIT**2:
+            raise _on_line(given, targets.control)  # a line fits upside down as well as upright
         message = "the strip fits the control only upside down: the control coordinates are left-handed"
         expected = "the axes in the order of the columns, [north, east, up] where X is north"
         raise InputError(Fault(message, code="left-handed-control", key="control.axes", expected=expected))
@@ -216,10 +219,20 @@ def _refuse_given_on_line(strip: Floats, given: Floats, control: ControlPoints) 
     """
     spread = collinearity(given)
     if spread < RANK_LIMIT**2 < collinearity(strip) and spread < OFF_LINE**2 * collinearity(strip):
-        raise _on_line(control)
+        raise _on_line(given, control)
 
 
-def _on_line(control: ControlPoints) -> GeometryError:
+def _on_line(given: Floats, control: ControlPoints) -> GeometryError:
+    """Say that control lies on a line, or which point lies so far off that all others are one place beside it."""
+    away = np.linalg.norm(given - np.median(given, axis=0), axis=1)
+    far, others = int(away.argmax()), float(np.delete(away, away.argmax()).max(initial=0.0))
+    if len(away) > LEAST_WITH_ONE_FAR and away[far] > FAR_OFF * others:
+        times = away[far] / max(others, 1e-6)
+        message = (
+            f"absolute orientation: control point {control.ids[far]} lies {away[far] / 1000:.4g} km from the middle of "
+            f"the control, {times:.0f} times as far as any other: one of its coordinates is wrong"
+        )
+        return GeometryError(message, points=(control.ids[far],), code="control-deficient")
     message = (
         "absolute orientation: the control does not determine the rotation about the line of control points "
         f"{listed(control.ids, IDS_NAMED)}: their given coordinates lie on it"

@@ -412,6 +412,17 @@ def test_control_given_on_one_line_is_weak_geometry_and_not_left_handed(seed: in
 # ------------------------------------------------------------------------------ within a whole strip
 
 
+def test_the_one_point_far_from_all_others_is_named() -> None:
+    """Beside 4000 km the others are one place, and all of them lie on a line."""
+    one = lined(1, 0.0, "ABCDE")
+    away = np.array([4e6 if name == "C" else 0.0 for name in one.targets.control.ids])
+    wrong = one.targets.control.enu + away[:, None] * [1.0, 0.0, 0.0]
+    targets = replace(one.targets, control=replace(one.targets.control, enu=wrong))
+    with pytest.raises(GeometryError, match=r"control point C lies .* km from the middle of the control") as caught:
+        orient(one.strip, targets, np.ones((5, 3)))
+    assert caught.value.points == ("C",)
+
+
 def run(names: Sequence[str], use: Mapping[str, str] | None = None, **rest: bool) -> Result:
     flown = fly(1, 5, extra=10)
     control = control_points({name: flown.xyz[flown.at[name]] for name in names}, use)

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 CODE = "P406"
 LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)
 LEAST_OTHERS = 3  # given coordinates that tell how well the prediction is known
+BEYOND_MAP = 1e5  # metres, over which a difference on the ground is none of map coordinates; it needs no further test
 MOST_SIGMA0 = 2.0  # of a bundle, over what is stated: a principal distance of another lens leaves 4 and more
 
 
@@ -134,7 +135,8 @@ def _confirmed(finding: Finding, row: int, predicted: Predicted, control: GivenC
     axis = GROUND_AXES.index(str(finding.evidence["axis"]))
     if predicted.sound[row, axis]:
         return
-    if not np.isfinite(predicted.off[row, axis] * predicted.sigma[row, axis]):
+    off = float(predicted.off[row, axis])
+    if not np.isfinite(off * predicted.sigma[row, axis]) or abs(off) > BEYOND_MAP:
         yield finding
         return
     found = _slip(row, axis, finding.strips[0], predicted, control)

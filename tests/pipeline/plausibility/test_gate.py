@@ -262,6 +262,26 @@ def test_one_of_two_lists_in_feet_or_elsewhere(before: bool) -> None:
     assert finding.evidence["offset_east_m"] == pytest.approx(5000.0, abs=30.0 if before else 5.0)
 
 
+@pytest.mark.parametrize(
+    "wrong", [lambda east: east + 1e5, lambda east: 10 * east, lambda east: float(f"{str(east)[:3]}7{str(east)[3:]}")]
+)
+def test_a_control_point_far_from_all_others_is_named_with_the_right_coordinate(
+    wrong: Callable[[float], float],
+) -> None:
+    """100 km off, the decimal point, a digit too many: most strips cannot be laid on such control."""
+    inputs = inputs_of(simulation("utm"))
+    row = int(control_rows(inputs)[4])
+    name, right = inputs.control.ids[row], float(inputs.control.enu[row, 0])
+
+    def slip(enu: Floats) -> Floats:
+        enu[row, 0] = wrong(right)
+        return enu
+
+    (finding,) = told(with_control(inputs, slip))
+    assert (finding.code, finding.points, finding.evidence["axis"]) == ("P406", (name,), "east")
+    assert float(finding.evidence["would_fit"]) == pytest.approx(right, abs=1e-3)
+
+
 @pytest.mark.parametrize(("axis", "step"), [(0, 1000.0), (1, -20.0), (2, 30.0), (1, 5.0)])
 @pytest.mark.parametrize("role", ["control", "check"])
 def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role: str) -> None:

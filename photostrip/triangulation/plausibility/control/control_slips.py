@@ -189,22 +189,26 @@ def slip_in(
 ) -> Finding | None:
     """Name the slip of the pen that explains why a coordinate is off; None when none does.
 
-    off: given minus predicted along the axis as it is written, metres.
+    off: given (where a far point was moved to) minus predicted along the axis as it is written, metres.
     spread: its standard deviation and its largest value by chance, metres.
     """
     written, unit = float(given.written[row, axis]), float(given.steps.unit[row, axis])
     if not np.isfinite(written):
         return None
+    moved = float(given.moved[row, axis])
+    predicted, near = written - moved - off / unit, spread[1]
+    off += moved * unit
     nowhere = abs(off) > NOWHERE
-    near = spread[1] + (0.0 if nowhere or axis == HEIGHT else SCALE_CHANGE * abs(off))
+    if not nowhere and not moved and axis != HEIGHT:
+        near += SCALE_CHANGE * abs(off)
     exact = np.spacing(abs(written)) * unit < spread[0]  # whether the computer holds digits that could be compared
-    fits = slip(written, written - off / unit, spread[0] / unit, near / unit) if exact else None
+    fits = slip(written, predicted, spread[0] / unit, near / unit) if exact else None
     role = "check" if given.check[row] else "control"
     evidence: Evidence = {"axis": GROUND_AXES[axis], "given": written, "off_m": off, "standard_deviation_m": spread[0]}
     if fits is not None:
         message = (
             f"{role} point {given.ids[row]} is off by {off:+.2f} m in {GROUND_AXES[axis]}: looks like {fits.text}; "
-            f"{fits.meant:.10g} would fit within {abs(fits.meant - written + off / unit) * unit:.2g} m"
+            f"{fits.meant:.10g} would fit within {abs(fits.meant - predicted) * unit:.2g} m"
         )
         evidence["would_fit"] = fits.meant
     elif nowhere:

@@ -58,6 +58,7 @@ class GivenPoints:
     group: Numbers  # (n,): control list of each
     # (n, 3): the coordinates as they are written, east, north, up; NaN where slips of the pen cannot be sought in them
     written: Floats
+    moved: Floats  # (n, 3): what was taken from them, so that a point far from all others comes among them
     written_axes: Callable[[], WrittenAxes]  # what a step of them is; worked out for points that stand out only
     sigma: tuple[float, float]  # usual standard deviation of the given coordinates in plan and in height, metres
 

@@ -13,6 +13,7 @@ LEAST_DIGIT_SIGMAS = 2.0  # scatters that a unit of the digit must have: below, 
 MOST_DIGITS = 8  # digits of the largest coordinate
 NEAR_SHARE = 0.3  # of the correction, within which the corrected coordinate must lie at most
 MOST_DECIMALS = 4
+LEAST_DIGITS = 5  # before the point, of a coordinate in which one too many is sought: fewer fit by chance
 
 
 class Slip(NamedTuple):
@@ -61,6 +62,7 @@ def _slips(given: float, scatter: float) -> Iterator[Slip]:
             if after != digit:
                 swapped = sign * (after - digit) * (worth - worth / 10.0)
                 yield Slip(given + swapped, f"the {_ordinal(number)} and the {_ordinal(number + 1)} digit exchanged")
+    yield from _added(text, sign, point)
     for times in (10.0, 100.0, 1000.0):
         if abs(given) / times > scatter:
             yield Slip(given / times, f"the decimal point is {_places(times)} too far right")
@@ -75,6 +77,13 @@ def _lost(given: float, sign: float, length: int) -> Iterator[Slip]:
                 f"a leading {digit} is missing" if power == length else f"a leading {digit} with its zeros is missing"
             )
             yield Slip(given + sign * digit * 10.0**power, what)
+
+
+def _added(text: str, sign: float, point: int) -> Iterator[Slip]:
+    """Give coordinates that have one digit less."""
+    for number in range(point if point > LEAST_DIGITS else 0):
+        what = f"one digit too many, the {_ordinal(number)} ({text[number]})"
+        yield Slip(sign * float(text[:number] + text[number + 1 :]), what)
 
 
 def _ordinal(number: int) -> str:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     _LevelPoints = tuple[Floats, Callable[[], WrittenAxes]]  # (n, 3) in the level frame; what the written axes are
 
 USUAL_SIGMA = 0.1  # metres, of coordinates without one
+FAR = 20.0  # times as far from the middle of a list as a good half of it: strip and map say nothing of such a place
+LEAST_OF_LIST = 4  # points that tell where a list lies
 
 
 def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: bool = False) -> GivenPoints | None:
@@ -31,7 +33,8 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
     if not plan.any():
         return None
     written = np.where(control.use, control.enu, np.nan)
-    filled = _filled(written, control.frame)
+    moved = _moved(written, control.frame)
+    filled = _filled(written - moved, control.frame)
     decoded = None if as_written else _decoded(filled, control, frames, plan)
     xyz, written_axes = decoded or _plain(filled, control, frames, plan)
     known = np.column_stack([plan, plan, height])
@@ -46,6 +49,7 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
         check=control.check,
         group=control.frame,
         written=written,
+        moved=moved,
         written_axes=written_axes,
         sigma=(usual[0], usual[1]),
     )
@@ -61,6 +65,19 @@ def _plain_axes(control: ControlPoints, frames: Sequence[GroundFrame]) -> Writte
     unit = np.array([[frame.plan_factor, frame.plan_factor, frame.height_factor] for frame in frames])
     unit = np.where(unit > 0, unit, 1.0)[control.frame]
     return WrittenAxes(unit, np.tile(np.eye(3), (len(control), 1, 1)))
+
+
+def _moved(written: Floats, lists: Numbers) -> Floats:
+    """By how much coordinates in plan that lie far from all others of their list are moved to its middle (n, 3)."""
+    moved = np.zeros_like(written)
+    for number in np.unique(lists).tolist():
+        rows = np.flatnonzero((lists == number) & np.isfinite(written[:, :2]).all(axis=1))
+        if len(rows) < LEAST_OF_LIST:
+            continue
+        off = written[rows, :2] - np.median(written[rows, :2], axis=0)
+        far = np.abs(off) > FAR * np.median(np.abs(off), axis=0).max()
+        moved[rows, :2] = np.where(far, off, 0.0)
+    return moved
 
 
 def _filled(written: Floats, lists: Numbers) -> Floats:
