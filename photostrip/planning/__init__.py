@@ -1,5 +1,6 @@
 """Planning before anything is measured: cameras compared, errors all over one model, control of a strip.
 
 In come a camera, a scale, overlaps and layouts of control; out go expected standard deviations and detectable errors.
-``model`` and ``strip`` are rooms; ``camera_efficiency`` compares cameras [004b].
+``model`` and ``strip`` are rooms; ``camera_efficiency`` compares cameras [004b]; ``screening`` tries the search
+for gross errors [004a].
 """

@@ -11,6 +11,7 @@ from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.result.quantities import grouped, records
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
+from photostrip.triangulation.strip_formation.strip import base_angles
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -96,13 +97,14 @@ def _in_left_photo(oriented: Orientation) -> dict[str, object]:
     bx, by, bz = base.T
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = by / bx, bz / bx
+    tau, nu = np.degrees(base_angles(base))
     angles = np.degrees(alpha_omega_kappa(rotation))
     return {
         "unit": "deg",
         "by_bx": slopes[0],
         "bz_bx": slopes[1],
-        "tau": np.degrees(np.arctan2(by, bx)),
-        "nu": np.degrees(np.arcsin(np.clip(bz, -1.0, 1.0))),
+        "tau": tau,
+        "nu": nu,
         **dict(zip(("alpha", "omega", "kappa"), angles.T, strict=True)),
     }
 

@@ -16,7 +16,7 @@ from photostrip.result.trace.departures import departures_of
 from photostrip.result.trace.replay import PairRound, SimilarityStep, pair_rounds, similarity_steps
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
-from photostrip.triangulation.strip_formation.strip import FirstPhoto, intersect_models
+from photostrip.triangulation.strip_formation.strip import FirstPhoto, base_angles, intersect_models
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
@@ -102,8 +102,7 @@ def _in_left_photo(strip: StripResult, number: int, factor: float) -> Document:
     """Return base and right photo in the system of the left one; the base is as long as the first one."""
     formed = strip.of_photos.formed
     bases, rotations = strip.of_photos.orientation.relative
-    base = bases[number] * formed.first.base
-    angles = np.array([np.arctan2(base[1], base[0]), np.arcsin(np.clip(bases[number, 2], -1.0, 1.0))]) * factor
+    base, angles = bases[number] * formed.first.base, np.array(base_angles(bases[number])) * factor
     return {
         **dict(zip(("bx", "by", "bz"), rounded(base, MODEL), strict=True)),
         **dict(zip(("tau", "nu"), rounded(angles, ANGLE), strict=True)),

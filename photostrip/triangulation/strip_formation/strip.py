@@ -174,17 +174,19 @@ def place_models(
     base, rotation = orientation.relative
     rotations = hand_on_rotations(rotation, first.rotation)
     scale = first.base * np.concatenate([[1.0], np.cumprod(junctions.factor)])
-    bases = scale[:, None] * np.einsum("pij,pj->pi", rotations[:-1], base)
+    directions = np.einsum("pij,pj->pi", rotations[:-1], base)
+    bases = scale[:, None] * directions
     centers = np.concatenate([np.zeros((1, 3)), np.cumsum(bases, axis=0)])  # eq. 136
     pair = orientation.pairs.pair
     xyz = centers[pair] + scale[pair, None] * np.einsum("mij,mj->mi", rotations[pair], models.vectors)
     mean = mean_points(orientation.point, xyz, use)
+    tau, nu = base_angles(directions)
     return FormedStrip(
         centers=centers,
         rotations=rotations,
         scale=scale,
-        base_direction=np.arctan2(bases[:, 1], bases[:, 0]),  # eq. 128-130
-        base_inclination=np.arcsin(np.clip(bases[:, 2] / scale, -1, 1)),
+        base_direction=tau,
+        base_inclination=nu,
         model_xyz=xyz,
         vectors=models.vectors,
         gap=models.gap,
@@ -194,6 +196,12 @@ def place_models(
         junctions=junctions,
         left_ray=models.left_ray,
     )
+
+
+def base_angles(directions: Floats) -> tuple[Floats, Floats]:
+    """Direction tau and inclination nu of unit vectors of bases (..., 3), radians; [001] eq. 128-130."""
+    x, y, z = np.moveaxis(directions, -1, 0)
+    return np.asarray(np.arctan2(y, x), float), np.asarray(np.arcsin(np.clip(z, -1.0, 1.0)), float)
 
 
 def without_rows(formed: FormedStrip, orientation: Orientation, left_out: Flags) -> FormedStrip:
