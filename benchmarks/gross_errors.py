@@ -7,7 +7,8 @@ in a third of the projects one control coordinate is wrong too. Kinds: strips of
 photos by bundle (with GNSS and control at the corners of the strips, or with control along the perimeter), and strips
 of 19 independent models, with errors of their points or of their perspective centres, too. ``clean`` are projects of
 all sizes without errors, ``wrong-control`` strips with two fifths of the control wrong, ``another-spot`` strips with a
-control point identified wrongly, ``long`` a fifth as many strips of 1000 photos with 300 equal errors.
+control point identified wrongly, ``wrong-photo`` strips with a fifth of the image points of one photo wrong, ``long`` a
+fifth as many strips of 1000 photos with 300 equal errors.
 
 An error along the base moves a point that stands on two photos along its other ray, and nothing contradicts it; points
 with a wrong measurement of their own are therefore left out of the errors.
@@ -62,6 +63,8 @@ WRONG_SHARE = (0.01, 0.05)
 CONTROL_ERRORS = (0.5, 50.0)  # m
 SPOT, SLOPE = (1.0, 20.0), 0.3  # m and its sine: another spot than the control point that was meant
 MUCH_SHARE, MUCH_ERRORS, MUCH_POINTS = 0.4, (5.0, 100.0), (14, 20)  # of much wrong control; m; control points
+PHOTO_SHARE, PHOTO_ERRORS = 0.2, (0.5, 50.0)  # of the image points of one photo; mm
+EXTRA_POINTS, ORIENTED = (2, 8, 20), 1.2  # for each model; largest ratio of the errors of an oriented strip
 RUNS = ("without errors", "errors, auto", "errors, none", "errors, known")
 CLEAN, AUTO, NONE, KNOWN = RUNS
 SIZES = {6: 2, 20: 2, 60: 4, 200: 8, 1000: 20, 3000: 30}  # photos of clean projects, and strips of the blocks
@@ -334,7 +337,10 @@ class Tally:
             false = found.rejected - project.wrong_control
             self.counts.update(named=len(wrong & found.rejected), false=len(false))
             self.counts.update(misplaced=len(false & spoiled_points(project.wrong)))
-            self.counts.update(lost=len(runs[KNOWN].used - found.used) if KNOWN in runs else 0)
+            if KNOWN in runs:
+                self.counts.update(lost=len(runs[KNOWN].used - found.used))
+                unplaced = set(runs[KNOWN].point) - set(found.point) - spoiled_points(project.wrong)
+                self.counts.update(unplaced=len(unplaced))
             self.ratios += [rms[AUTO] / rms[CLEAN]] if CLEAN in runs else []
 
     def rms(self, name: str) -> Floats:
@@ -375,8 +381,9 @@ def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range, wanted: Sequence
         print(tally.row(kind))
     print("\nproject    of those placing a point, along the base of points on two photos")
     print("           of control named falsely, points with a wrong measurement of their own")
+    print("           points without a wrong measurement that lose their coordinates, and would not by knowledge")
     for kind, tally in tallies.items():
-        print(f"{kind:11s}{tally.counts['hidden']:32d}{tally.counts['misplaced']:12d}")
+        print(f"{kind:11s}{tally.counts['hidden']:32d}{tally.counts['misplaced']:12d}{tally.counts['unplaced']:12d}")
     print("\nproject    ratio of a project's rms: median, 95 % below, largest")
     for kind, tally in tallies.items():
         middle, most, largest = np.quantile(tally.ratios, (0.5, 0.95, 1.0)) if tally.ratios else 3 * (float("nan"),)
@@ -482,6 +489,37 @@ def print_another_spot(pool: Pool, seeds: range) -> None:
     print(f"too in {(plan & height).sum()}, {others.sum()} other points\n", flush=True)
 
 
+def wrong_photo_run(extra: int, seed: int) -> tuple[int, float]:
+    """Adjust a strip with a fifth of one photo wrong: image points there, errors of the others over those without."""
+    plain = project_of(simulate(replace(STRIP, points=replace(STRIP.points, extra_per_model=extra), seed=seed)))
+    rng, o = np.random.default_rng(seed), plain.inputs.observations
+    rows = np.flatnonzero(o.photo == rng.integers(len(o.photo_ids)))
+    wrong = rng.choice(rows, round(PHOTO_SHARE * len(rows)), replace=False)
+    way = rng.normal(size=(len(wrong), 2))
+    smallest, largest = np.log(PHOTO_ERRORS).tolist()
+    size = np.exp(rng.uniform(smallest, largest, len(wrong))) / np.hypot(*way.T)
+    xy = o.xy.copy()
+    xy[wrong] += way * size[:, None]
+    spoiled = replace(plain, inputs=replace(plain.inputs, observations=replace(o, xy=xy)))
+    names = [plain.names[row] for row in wrong.tolist()]
+    try:
+        clean, auto = (np.square(adjusted(each, each.settings).sound(names)).mean() for each in (plain, spoiled))
+    except PhotostripError as error:
+        print(f"wrong photo {seed}: {error}")
+        return len(rows), float("inf")
+    return len(rows), float(np.sqrt(auto / clean))
+
+
+def print_wrong_photo(pool: Pool, seeds: range) -> None:
+    """Print how many strips are oriented although a fifth of the image points of one photo is wrong."""
+    found = np.array(pool.starmap(wrong_photo_run, product(EXTRA_POINTS, seeds), 1)).reshape(len(EXTRA_POINTS), -1, 2)
+    print(f"{PHOTO_SHARE:.0%} of one photo wrong   strips   oriented   ratio: median, 95 % below, largest")
+    for count, ratio in found.transpose(0, 2, 1):
+        cells = f"{np.mean(count):10.0f} points a photo{len(ratio):8d}{(ratio < ORIENTED).sum():11d}"
+        print(cells, "{:14.3f}{:12.3f}{:9.3f}".format(*np.quantile(ratio, (0.5, 0.95, 1.0))))
+    print(flush=True)
+
+
 def long_run(seed: int) -> tuple[int, int, int]:
     """Adjust a strip of 1000 photos with many errors: wrong control, how much of it is named, sound control named."""
     project = project_of(simulate(replace(LONG_STRIP, seed=seed)))
@@ -504,6 +542,7 @@ OTHERS = {
     "clean": print_clean,
     "wrong-control": print_much_wrong,
     "another-spot": print_another_spot,
+    "wrong-photo": print_wrong_photo,
     "long": print_long,
 }
 

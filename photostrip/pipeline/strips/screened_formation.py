@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS
 from photostrip.triangulation.relative_orientation.orientation import orient_again
-from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.strip_formation import non_neighbours
 from photostrip.triangulation.strip_formation.strip import NOTHING_GIVEN, form_from_pairs, without_rows
 
@@ -86,7 +86,8 @@ def _uses(of_pairs: Orientation, found: Sequence[Rejection], *, readmit: bool) -
     """Rows of the pairs' table that orient their pair, and those of them that must not place their point.
 
     Where it cannot be told which of several rays is wrong, those pairs that found nothing wrong keep the point: its
-    y parallaxes are good, its place is not. Pairs that would lose too many points keep those of their own search.
+    y parallaxes are good, its place is not. Pairs that would have fewer than five points keep those of their own
+    search; the strip has redundancy where a pair of five has none.
     """
     wrong, unclear = np.zeros((2, int(of_pairs.rows.max()) + 1), bool)
     wrong[[each.row for each in found]] = True
@@ -95,7 +96,7 @@ def _uses(of_pairs: Orientation, found: Sequence[Rejection], *, readmit: bool) -
     used = np.where(aside | (not readmit), of_pairs.used & (aside | ~gone), ~gone)
     pairs = of_pairs.pairs
     left, had = (pairs.sums(each.astype(float)) for each in (used, of_pairs.used))
-    poor = (left < np.minimum(MINIMUM_LEFT, had))[pairs.pair]
+    poor = (left < np.minimum(MINIMUM_POINTS, had))[pairs.pair]
     return np.where(poor, of_pairs.used, used), aside
 
 

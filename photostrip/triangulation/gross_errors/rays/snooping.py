@@ -220,7 +220,9 @@ class _Search:
             return done
         for each, axis in zip(worst, axes, strict=True):
             self.out[each.kind, each.row, axis] = each
-            if each.kind == CONTROL:
+            if each.kind == IMAGE:
+                self.latest[each.row] = each
+            elif each.kind == CONTROL:
                 self.control[each.row, axis] = False
         return found
 
@@ -390,7 +392,7 @@ class _Search:
         began = {key: each for key, each in self.began.items() if key not in self.out and not holds(*key)}
         for (kind, row, axis), each in (self.out | began).items():
             found = each
-            if np.isnan(each.value) and kind == IMAGE:
+            if kind == IMAGE:
                 found = replace(self.latest.get(row, each), test=each.test)
             elif np.isnan(each.value):
                 size = tuple((-done.solution.control_residuals[row]).tolist())
