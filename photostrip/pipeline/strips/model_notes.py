@@ -8,6 +8,7 @@ import numpy as np
 
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import Note
+from photostrip.triangulation.independent_models.link_screening import LEFT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -63,6 +64,16 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
             "wrong, but it is still used; measure more common points"
         )
         yield Note("contradicting-link", text, strip=strip.id, points=tuple(points))
+    left = np.bincount(shared.link, links.used, shared.count)
+    for link in np.unique(shared.link[[each.row for each in links.rejections]]).tolist():
+        if left[link] < LEFT:  # two conditions check nine coordinates
+            names, out = strip.models[link : link + 2], shared.before[(shared.link == link) & ~links.used]
+            points = [measured.name(node) for node in models.node[out].tolist()]
+            text = (
+                f"strip {strip.id}: models {names[0]} and {names[1]} are linked by {left[link]:.0f} points alone, "
+                f"which hardly check each other: {', '.join(points)} contradict them; measure more common points"
+            )
+            yield Note("contradicting-link", text, strip=strip.id, points=tuple(points))
 
 
 def _unit_notes(strip: ModelStrip, formed: FormedModels) -> Iterator[Note]:

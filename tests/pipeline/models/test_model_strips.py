@@ -412,6 +412,22 @@ def test_mistakes_that_a_result_tells(kind: str, notes: set[str], findings: set[
     assert {finding.code for finding in result.findings} == findings
 
 
+@pytest.mark.parametrize(("model", "name", "left", "told"), [(3, "1004-2", 3, True), (7, "1007-4", 5, False)])
+def test_a_link_that_its_search_leaves_three_points_is_told(model: int, name: str, left: int, *, told: bool) -> None:
+    """With three points only two conditions say that these are the right ones."""
+    given = mistaken("nothing")
+    assert given.models is not None
+    points, xyz = given.models.points, given.models.points.xyz.copy()
+    row = np.flatnonzero((points.model == model) & (points.node == points.point_ids.index(name)))
+    xyz[row, 0] += 1.0
+    result = triangulate(with_points(given, replace(points, xyz=xyz)), PLAIN)
+    (strip,) = result.strips
+    assert strip.model_stages is not None
+    links = strip.model_stages.formed.links
+    assert links.used[links.shared.link == model - 1].sum() == left
+    assert [note.points for note in result.notes if note.code == "contradicting-link"] == [(name,)] * told
+
+
 @pytest.mark.parametrize(("kind", "finding"), [("control swapped", "P401"), ("centers below", "P401")])
 def test_mistakes_that_stop_a_run(kind: str, finding: str) -> None:
     with pytest.raises(InputError) as told:
