@@ -69,7 +69,7 @@ def interior(
 def refine(xy: ArrayLike, camera: Camera, *, flying_height: float | None = None, ground_height: float = 0.0) -> Floats:
     """Refine photo coordinates (n, 2): principal point, lens distortion, with heights in metres refraction, too.
 
-    Returns ideal image coordinates, reduced to the principal point, shape (n, 2). Source: docs/image-coordinates.md.
+    Returns ideal image coordinates, reduced to the principal point, shape (n, 2).
     """
     refraction = 0.0 if flying_height is None else refraction_constant(flying_height, ground_height)
     return undistort(_rows(xy, 2), camera, Bending(refraction=refraction))
