@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photostrip.comparison.ground import east_north_up, plan_and_height
 from photostrip.errors import Fault, InputError, incomplete
+from photostrip.result.description import Quantity, Table
+from photostrip.result.reading import MOST_FAULTS, faults_of
 from photostrip.statistics import chi2_quantile
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Floats
     from photostrip.result.numbers import Document
@@ -21,6 +25,19 @@ ROLES = ("new", "check", "control")
 PROBABLE = 0.95
 PARTS = ("plan", "height")
 COORDINATES = {"plan": 2, "height": 1}
+FIX = "simulate it again"  # for a truth that was edited
+
+_TEXT, _NUMBER = Quantity("", "text"), Quantity("", "number")
+_PLACE: Table = {"id": _TEXT, "x": _NUMBER, "y": _NUMBER, "z": _NUMBER}
+# What is compared of the truth, and the keys that must have a value.
+SHAPE: Table = {
+    "frame": {"crs": _TEXT, "axes": replace(_TEXT, many=True)},
+    "points": _PLACE,
+    "photos": {**_PLACE, "rotation": replace(_NUMBER, many=True)},
+    "errors": dict.fromkeys(("kind", "photo", "point", "other", "axis"), _TEXT)
+    | dict.fromkeys(("size_um", "size_m"), _NUMBER),
+}
+NEEDED = {"points": tuple(_PLACE), "photos": tuple(_PLACE), "errors": ("kind", "point")}
 
 
 def compare_with_truth(document: Document, truth: Document, files: tuple[str, str] = ("", "")) -> Document:
@@ -32,6 +49,7 @@ def compare_with_truth(document: Document, truth: Document, files: tuple[str, st
         which of them the result does not name, and how many measurements without one were rejected.
     Raises InputError when they are of different strips or frames, or one is not whole.
     """
+    _require_whole(truth, files[1])
     try:
         _require_same_frame(document, truth, files)
         return {
@@ -45,6 +63,38 @@ def compare_with_truth(document: Document, truth: Document, files: tuple[str, st
         }
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise incomplete(error, files[0], "compared with the truth") from None
+
+
+def _require_whole(truth: Document, file: str) -> None:
+    """Refuse a truth that was edited or is of another version, with every fault."""
+    if truth.get("photostrip_truth") != SCHEMA:
+        message = f"has the format {truth.get('photostrip_truth')!a:.40} of a truth"
+        raise InputError(Fault(message, "result-schema", file, expected=str(SCHEMA), fix=FIX))
+    faults = faults_of(truth, file, SHAPE, FIX) or [
+        Fault("is missing, or empty", "result-value", file, key=key, expected=expected, fix=FIX)
+        for key, expected in islice(_missing(truth), MOST_FAULTS)
+    ]
+    if faults:
+        raise InputError(faults)
+
+
+def _missing(truth: Document) -> Iterator[tuple[str, str]]:
+    """Return the keys that have no value, with what is expected there."""
+    frame = truth.get("frame")
+    for key in SHAPE["frame"]:
+        if not isinstance(frame, dict) or frame.get(key) is None:
+            yield f"frame.{key}", "that of the simulation"
+    for block, keys in NEEDED.items():
+        rows = truth.get(block)
+        if not isinstance(rows, list):
+            yield block, "a list"
+            continue
+        for number, row in enumerate(rows):
+            yield from ((f"{block}[{number}].{key}", "a value") for key in keys if row.get(key) is None)
+    for number, row in enumerate(truth.get("photos") or ()):
+        found = row.get("rotation") or ()
+        if len(found) != 9 or not all(isinstance(value, int | float) for value in found):
+            yield f"photos[{number}].rotation", "nine numbers, row by row"
 
 
 def _require_same_frame(document: Document, truth: Document, files: tuple[str, str]) -> None:
@@ -160,4 +210,4 @@ def _photos_of(row: Document) -> list[Any]:
 
 
 def _named(error: Document) -> Document:
-    return {key: error.get(key) for key in ("kind", "photo", "point", "axis", "size_um", "size_m")}
+    return {key: error.get(key) for key in ("kind", "photo", "point", "other", "axis", "size_um", "size_m")}

@@ -22,14 +22,16 @@ DEEPEST = 50  # lists and blocks in each other
 WORDS = {"text": "a text", "word": "a text", "count": "a whole number", "flag": "true or false", "number": "a number"}
 
 
-def faults_of(document: dict[str, Any], file: str) -> list[Fault]:
-    """Return what keeps a document from being a result: wrong kinds of values, each with its key.
+def faults_of(
+    document: dict[str, Any], file: str, table: Table | None = None, fix: str = "run the project again"
+) -> list[Fault]:
+    """Return what keeps a document from being a result, or what a table describes: wrong kinds of values, by key.
 
     Keys that are missing are not among them: a baseline holds a part of a result only.
     """
     found: list[Fault] = []
-    for key, message, expected in _wrong(document, described(), ""):
-        found.append(Fault(message, "result-value", file, key=key, expected=expected, fix="run the project again"))
+    for key, message, expected in _wrong(document, described() if table is None else table, ""):
+        found.append(Fault(message, "result-value", file, key=key, expected=expected, fix=fix))
         if len(found) == MOST_FAULTS:
             break
     return found

@@ -67,6 +67,7 @@ def _missed(error: Document) -> str:
     """Say which gross error was not found."""
     size = f"{micrometres(error['size_um'])} µm" if error["size_um"] is not None else ""
     size = size or (f"{error['size_m']:.3f} m" if error["size_m"] is not None else "")
-    where = f"photo {error['photo']}, point {error['point']}" if error["photo"] else f"point {error['point']}"
+    point = f"points {error['point']} and {error['other']}" if error["other"] else f"point {error['point']}"
+    where = f"photo {error['photo']}, {point}" if error["photo"] else point
     axis = f" in {error['axis']}" if error["axis"] else ""
     return f"not found: {error['kind']}, {where}{axis}{f', {size}' if size else ''}"

@@ -1,0 +1,200 @@
+"""A result against the truth of its simulation: true errors in every frame, and gross errors that were not found."""
+
+from __future__ import annotations
+
+import copy
+import json
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyproj
+import pytest
+from scipy.stats import chi2
+
+import photostrip
+from photostrip.cli.main import main
+from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from photostrip.arrays import Floats
+
+    Document = dict[str, Any]
+
+FRAMES: dict[str, Document] = {
+    "projected": {},
+    "north first": {"crs": "EPSG:32633", "axes": ["north", "east", "up"]},
+    "feet": {"crs": "EPSG:2263", "center_deg": [-74.0, 40.7]},
+    "geographic": {"crs": "EPSG:4326"},
+    "geocentric": {"crs": "EPSG:4978"},
+    "local": {"crs": "local"},
+}
+FOOT = 1200.0 / 3937.0  # of the US survey
+
+
+@cache
+def simulated(frame: str) -> tuple[photostrip.Simulation, photostrip.Result]:
+    simulation = photostrip.simulate({}, flight={"photos": 5}, seed=11, ground=FRAMES[frame])
+    return simulation, simulation.project.run()
+
+
+def errors_of(frame: str, now: Floats, true: Floats) -> Floats:
+    """Give errors (n, 3) along east, north, up in metres; by way of geocentric coordinates where they are no map."""
+    if frame in {"projected", "local"}:
+        return now - true
+    if frame == "north first":
+        return (now - true)[:, [1, 0, 2]]
+    if frame == "feet":  # heights of this system are metres
+        return (now - true) * (FOOT, FOOT, 1.0)
+    to_geodetic = pyproj.Transformer.from_crs("EPSG:4978", "EPSG:4979", always_xy=True)
+    if frame == "geographic":
+        now, true = (np.column_stack(to_geodetic.transform(*each.T, direction="INVERSE")) for each in (now, true))
+    longitude, latitude, _ = np.radians(to_geodetic.transform(*true.T))
+    east = np.column_stack([-np.sin(longitude), np.cos(longitude), 0.0 * longitude])
+    up = np.column_stack([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)])
+    return np.column_stack([((now - true) * axis).sum(axis=1) for axis in (east, np.cross(up, east), up)])
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_true_errors_are_those_of_another_computation(frame: str) -> None:
+    simulation, result = simulated(frame)
+    found = photostrip.compare(result, simulation.truth).document
+    assert [each["role"] for each in found["points"]] == ["new", "check", "control"]
+    for table, rows, blocks in (
+        (result.points, "points", found["points"]),
+        (result.photos, "photos", [found["photos"]]),
+    ):
+        true = {each["id"]: [each[axis] for axis in "xyz"] for each in simulation.truth[rows]}
+        for block in blocks:
+            part = table.where(role=block["role"]) if "role" in block else table
+            now = np.column_stack([part[axis] for axis in "xyz"])
+            e = errors_of(frame, now, np.array([true[name] for name in part["id"]]))
+            assert block["count"] == len(part) > 0
+            for name, sizes in (("plan", np.hypot(e[:, 0], e[:, 1])), ("height", np.abs(e[:, 2]))):
+                # result.json has 0.1 mm; the ellipsoid between two points is curved
+                assert block[name]["rms"] == pytest.approx(np.sqrt((sizes**2).mean()), abs=2e-4)
+                assert block[name]["max"] == pytest.approx(sizes.max(), abs=2e-4)
+                assert block[name]["worst"] == part["id"][sizes.argmax()]
+
+
+def test_angles_between_true_and_found_orientation() -> None:
+    simulation, result = simulated("projected")
+    truth = copy.deepcopy(simulation.truth)
+    by_id = {each["id"]: each for each in truth["photos"]}
+    turn = np.radians(0.3)
+    about = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    for photo in nonempty(result.document["photos"]):
+        by_id[photo["id"]]["rotation"] = (about @ np.reshape(photo["rotation"], (3, 3))).ravel().tolist()
+    found = photostrip.compare(result, truth).document["photos"]["rotation"]
+    assert found["rms"] == pytest.approx(0.3, abs=1e-6)
+    assert found["max"] == pytest.approx(0.3, abs=1e-6)
+
+
+@pytest.mark.parametrize("frame", ["projected", "local", "north first"])
+def test_errors_over_their_standard_deviations(frame: str) -> None:
+    simulation, result = simulated(frame)
+    found = photostrip.compare(result, simulation.truth).document
+    true = {each["id"]: [each[axis] for axis in "xyz"] for each in simulation.truth["points"]}
+    order = [1, 0, 2] if frame == "north first" else [0, 1, 2]
+    for block in found["points"]:
+        part = result.points.where(role=block["role"])
+        now = np.column_stack([part[axis] for axis in "xyz"])
+        e = errors_of(frame, now, np.array([true[name] for name in part["id"]]))
+        c = result.covariance_of(part["id"].tolist())[:, order][:, :, order]
+        plan = np.array([one[:2] @ np.linalg.inv(cov[:2, :2]) @ one[:2] for one, cov in zip(e, c, strict=True)])
+        height = e[:, 2] ** 2 / c[:, 2, 2]
+        for name, squares, number in (("plan", plan, 2), ("height", height, 1)):
+            assert block[name]["normalised"] == pytest.approx(np.sqrt(squares.mean() / number), rel=1e-6)
+            assert block[name]["inside"] == (squares <= chi2.ppf(0.95, number)).sum()
+            assert block[name]["known"] == block["count"]
+
+
+def planted(*errors: Document) -> tuple[photostrip.Simulation, photostrip.Result]:
+    simulation = photostrip.simulate({}, flight={"photos": 6}, seed=3, gross_errors=list(errors))
+    return simulation, simulation.project.run()
+
+
+IMAGE = {"kind": "image", "photo": "1003", "point": "1003-4", "axis": "y", "size_um": 300.0}
+CONTROL = {"kind": "control", "point": "G05", "axis": "z", "size_m": 3.0}
+SWAP = {"kind": "swap", "photo": "1005", "point": "1005-4"}
+
+
+def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
+    simulation, result = planted(IMAGE, CONTROL, SWAP)
+    whole = photostrip.compare(result, simulation.truth)
+    assert whole.document["errors"] == {"planted": 3, "missed": [], "sound_rejected": 0}
+    document = copy.deepcopy(result.document)
+    assert document["rejected"]
+    document["rejected"] = []
+    against = photostrip.compare(photostrip.Result(document), simulation.truth)
+    assert [each["kind"] for each in against.document["errors"]["missed"]] == ["image", "swap", "control"]
+    text = against.report()
+    assert "0 of 3 gross errors found" in text
+    for line in (
+        "not found: image, photo 1003, point 1003-4 in y, 300.0 µm",
+        "not found: control, point G05 in z, 3.000 m",
+        f"not found: swap, photo 1005, points 1005-4 and {simulation.truth['errors'][1]['other']}",
+    ):
+        assert line in text
+
+
+def test_a_rejection_without_an_error_is_sound() -> None:
+    simulation, result = planted(IMAGE, CONTROL, SWAP)
+    truth = copy.deepcopy(simulation.truth)
+    truth["errors"] = []
+    found = photostrip.compare(result, truth)
+    assert found.document["errors"] == {"planted": 0, "missed": [], "sound_rejected": len(result.rejected)}
+    assert "no gross errors put in" in found.report()
+
+
+EDITS: dict[str, tuple[Callable[[Document], object], str]] = {
+    "a list for a number": (lambda truth: truth["points"][0].update(x=[1.0]), "points[0].x"),
+    "a text for a number": (lambda truth: truth["points"][0].update(x="1.0"), "points[0].x"),
+    "nothing for a number": (lambda truth: truth["photos"][1].update(z=None), "photos[1].z"),
+    "not a number": (lambda truth: truth["points"][2].update(y=float("nan")), "points[2].y"),
+    "a number without a square": (lambda truth: truth["points"][2].update(y=1e300), "points[2].y"),
+    "a list for an id": (lambda truth: truth["points"][0].update(id=["a"]), "points[0].id"),
+    "no frame": (lambda truth: truth.pop("frame"), "frame.crs"),
+    "a list for the frame": (lambda truth: truth.update(frame=[{}]), "frame.crs"),
+    "no points": (lambda truth: truth.pop("points"), "points"),
+    "a block for points": (lambda truth: truth.update(points={}), "points"),
+    "a text for points": (lambda truth: truth.update(points="all"), "points"),
+    "a rotation of two numbers": (lambda truth: truth["photos"][0].update(rotation=[1, 0]), "photos[0].rotation"),
+    "an empty rotation": (lambda truth: truth["photos"][0].update(rotation=[None] * 9), "photos[0].rotation"),
+    "no errors": (lambda truth: truth.update(errors=None), "errors"),
+    "an error without a point": (lambda truth: truth.update(errors=[{"kind": "image"}]), "errors[0].point"),
+    "a text for a size": (lambda truth: truth.update(errors=[{**IMAGE, "size_um": "x"}]), "errors[0].size_um"),
+    "half a character": (lambda truth: truth.update(errors=[{**IMAGE, "point": "\ud800"}]), "errors[0].point"),
+    "another format": (lambda truth: truth.update(photostrip_truth=2), ""),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_an_edited_truth_is_refused_at_its_key(edit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    simulation, result = simulated("projected")
+    truth = copy.deepcopy(simulation.truth)
+    change, key = EDITS[edit]
+    change(truth)
+    result.write(tmp_path)
+    file = tmp_path / "truth.json"
+    file.write_text(json.dumps(truth), encoding="utf-8")
+    assert main(["compare", str(tmp_path), str(file), "--format", "json"]) == 2
+    finding = json.loads(capsys.readouterr().out)["findings"][0]
+    assert (finding["file"], finding["key"]) == (str(file), key)
+    with pytest.raises(photostrip.InputError):
+        photostrip.compare(result, truth)
+
+
+def test_the_truth_of_another_simulation_is_refused() -> None:
+    _, result = simulated("projected")
+    other, _ = simulated("geocentric")
+    with pytest.raises(photostrip.InputError, match=r"frame\.crs"):
+        photostrip.compare(result, other.truth)
+    strange = copy.deepcopy(simulated("projected")[0].truth)
+    for point in strange["points"]:
+        point["id"] += "x"
+    with pytest.raises(photostrip.InputError, match="no point is in both"):
+        photostrip.compare(result, strange)
