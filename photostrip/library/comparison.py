@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
 from photostrip.library.result import RESULT, Result
+from photostrip.notes import counted
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -61,7 +62,8 @@ def compare(
     result: a result, a result.json, the folder that holds one, or a folder with many such folders.
     baseline: the same; ``baseline.json``; or ``truth.json``, also as a mapping.
     tolerances: a tolerance profile (YAML); without one only the last digits may differ.
-    Raises InputError when they cannot be compared: other frames, another format, no result.
+    Raises InputError when they cannot be compared: other frames, another format, no result. Of folders, what cannot be
+    compared stands under ``refused`` in the document, beside what can.
     """
     from photostrip.comparison import Tolerances, compare_results
     from photostrip.comparison.truth import compare_with_truth
@@ -74,8 +76,11 @@ def compare(
         allowed = load_tolerances(Path(tolerances))[0]
     if not isinstance(result, Result) and not isinstance(baseline, Result | Mapping):
         one, other = Path(result), Path(baseline)
-        if one.is_dir() and other.is_dir() and not (one / RESULT).exists():
-            return Comparison(_folders(one, other, allowed))
+        if results := results_below(one):
+            return Comparison(_folders(one, results, other, allowed))
+        if one.is_dir() and not place_of(one).exists():
+            fix = "name the folder into which `photostrip run -o` or `photostrip batch -o` wrote"
+            raise InputError(Fault("holds no result.json, nor does a folder in it", "file-missing", str(one), fix=fix))
     now, named = _opened(result)
     before, other_name = _opened(baseline)
     if TRUTH in before:
@@ -103,29 +108,42 @@ def _opened(given: Result | str | PathLike[str] | Mapping[str, Any]) -> tuple[Do
     return read_document(file, TRUTH), file
 
 
-def _folders(results: Path, baselines: Path, allowed: Tolerances) -> Document:
+def results_below(folder: Path) -> dict[str, Path]:
+    """Return the results in the folders below a folder by name; none where it is a result or a baseline itself."""
+    if not folder.is_dir() or any((folder / name).exists() for name in (RESULT, BASELINE)):
+        return {}
+    return {_name(file, folder): file for file in sorted(folder.rglob(RESULT))}
+
+
+def _folders(above: Path, now: Mapping[str, Path], baselines: Path, allowed: Tolerances) -> Document:
     """Compare every result below a folder with the baseline of the same name below another."""
     from photostrip.comparison import compare_results
     from photostrip.formats.output.result_json import read_result
 
-    now = {_name(file, results): file for file in sorted(results.rglob(RESULT))}
+    if not baselines.is_dir():
+        message = f"is no folder, and {above} is one of {counted(len(now), 'result')}"
+        raise InputError(Fault(message, "file-missing", str(baselines), expected="a folder of baselines"))
     before = {_name(file, baselines): file for name in (RESULT, BASELINE) for file in sorted(baselines.rglob(name))}
-    if not now:
-        fix = "name the folder into which `photostrip batch -o` wrote"
-        raise InputError(Fault("holds no result.json, nor does a folder in it", "file-missing", str(results), fix=fix))
-    found = []
+    found, refused = [], []
     for name in sorted(now.keys() & before.keys()):
         files = (str(now[name]), str(before[name]))
-        document, other = (read_result(file) for file in files)
-        found.append({"folder": name} | compare_results(document, other, allowed, files))
+        try:
+            document, other = (read_result(file) for file in files)
+            found.append({"folder": name} | compare_results(document, other, allowed, files))
+        except InputError as error:
+            refused += [
+                {"folder": name, "file": each.file, "line": each.line, "code": each.code, "message": str(each)}
+                for each in error.faults
+            ]
     missing, new = sorted(before.keys() - now.keys()), sorted(now.keys() - before.keys())
     same = found and not missing and not new and all(each["status"] == "same" for each in found)
     return {
         "photostrip_compare_folders": 1,
-        "result": str(results),
+        "result": str(above),
         "baseline": str(baselines),
-        "status": "same" if same else "different",
+        "status": "refused" if refused else "same" if same else "different",
         "results": found,
+        "refused": refused,
         "missing": missing,
         "new": new,
     }

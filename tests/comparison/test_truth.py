@@ -119,7 +119,7 @@ def planted(*errors: Document) -> tuple[photostrip.Simulation, photostrip.Result
 
 IMAGE = {"kind": "image", "photo": "1003", "point": "1003-4", "axis": "y", "size_um": 300.0}
 CONTROL = {"kind": "control", "point": "G05", "axis": "z", "size_m": 3.0}
-SWAP = {"kind": "swap", "photo": "1005", "point": "1005-4"}
+SWAP = {"kind": "swap", "photo": "1005", "point": "1005-1"}
 
 
 def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
@@ -136,7 +136,7 @@ def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
     for line in (
         "not found: image, photo 1003, point 1003-4 in y, 300.0 µm",
         "not found: control, point G05 in z, 3.000 m",
-        f"not found: swap, photo 1005, points 1005-4 and {simulation.truth['errors'][1]['other']}",
+        f"not found: swap, photo 1005, points 1005-1 and {simulation.truth['errors'][1]['other']}",
     ):
         assert line in text
 

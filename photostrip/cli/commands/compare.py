@@ -42,7 +42,7 @@ def compare(
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.jobs import baseline as baseline_job
-    from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, faults_instead
+    from photostrip.errors import EXIT_DONE, EXIT_INPUT, EXIT_TOLERANCE, faults_instead
     from photostrip.library.comparison import compare as compared
     from photostrip.project.tolerance_profile import load_tolerances
     from photostrip.report.commands.comparisons import TRUTH
@@ -51,8 +51,8 @@ def compare(
     with failures_as(Format.TEXT if form is CompareFormat.JUNIT else Format(form.value)):
         allowed = None if tolerances is None else load_tolerances(tolerances)[0]
         if update:
-            changes = visible(baseline_job.update(result, baseline, allowed))
-            sys.stderr.write("" if quiet else f"{changes}\n")
+            for changes in baseline_job.updates(result, baseline, allowed):
+                sys.stderr.write("" if quiet else f"{visible(changes)}\n")
             return EXIT_DONE
         with baseline_job.told_how_to_write(baseline):
             found = compared(result, baseline, tolerances=allowed).document
@@ -61,7 +61,7 @@ def compare(
             raise typer.BadParameter(message, param_hint="--format")
         with faults_instead(str(result), "compared"):
             _print(found, form, width, quiet=quiet, verbose=verbose)
-    return EXIT_TOLERANCE if found.get("status") == "different" else EXIT_DONE
+    return {"refused": EXIT_INPUT, "different": EXIT_TOLERANCE}.get(found.get("status", ""), EXIT_DONE)
 
 
 def _print(found: dict[str, Any], form: CompareFormat, width: int | None, *, quiet: bool, verbose: bool) -> None:

@@ -12,7 +12,7 @@ from photostrip.comparison import Tolerances, baseline_of, compare_results
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.formats.text.writing import write_text
-from photostrip.library.comparison import place_of
+from photostrip.library.comparison import BASELINE, place_of, results_below
 from photostrip.report.commands.compare import headline
 
 if TYPE_CHECKING:
@@ -33,6 +33,12 @@ def told_how_to_write(baseline: Path) -> Iterator[None]:
             else fault
             for fault in error.faults
         ) from None
+
+
+def updates(result: Path, baseline: Path, allowed: Tolerances | None) -> Iterator[str]:
+    """Write a result, or all of a folder, as baselines; return what changes by each."""
+    for name, file in (results_below(result) or {"": result}).items():
+        yield update(file, baseline / name / BASELINE if name else baseline, allowed)
 
 
 def update(result: Path, baseline: Path, allowed: Tolerances | None) -> str:

@@ -26,6 +26,10 @@ def compare_findings(document: Document, lines_of: Callable[[str], Callable[[str
     """
     found = [each for one in document.get("results", [document]) for each in _findings(one, lines_of(one["baseline"]))]
     found += [
+        EMPTY | {key: each[key] for key in ("file", "line", "code", "message")} | {"severity": "error"}
+        for each in document.get("refused", ())
+    ]
+    found += [
         EMPTY | {"severity": "error", "code": "different", "file": folder, "message": why}
         for key, why in ALONE.items()
         for folder in document.get(key, ())
@@ -73,6 +77,7 @@ def compare_cases(document: Document) -> Iterator[Case]:
     if "results" in document:
         for one in document["results"]:
             yield from (case._replace(name=f"{one['folder']}: {case.name}") for case in compare_cases(one))
+        yield from (Case(each["folder"], error=each["message"]) for each in document["refused"])
         yield from (Case(folder, error=why) for key, why in ALONE.items() for folder in document[key])
         return
     for kind in document["kinds"]:

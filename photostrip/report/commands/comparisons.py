@@ -5,7 +5,7 @@ from __future__ import annotations
 from photostrip.notes import counted, listed
 from photostrip.report.commands.compare import compare_sections, headline
 from photostrip.report.commands.compare_truth import truth_headline, truth_sections
-from photostrip.report.page.parts import Document, Section, Words
+from photostrip.report.page.parts import Document, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 TRUTH = "photostrip_truth_comparison"
@@ -36,10 +36,12 @@ def comparison_headline(document: Document) -> str:
     names = f"{document['result']} and {document['baseline']}"
     if document["status"] == "same":
         return f"SAME: {counted(len(document['results']), 'result')} of {names} agree within the tolerances."
-    parts = [f"{counted(len(differ), 'result')} of {len(document['results'])} beyond tolerance"] if differ else []
+    refused = len({each["folder"] for each in document["refused"]})
+    parts = [f"{counted(refused, 'result')} that cannot be compared"] if refused else []
+    parts += [f"{counted(len(differ), 'result')} of {len(document['results'])} beyond tolerance"] if differ else []
     parts += [f"no result for {listed(document['missing'])}"] if document["missing"] else []
     parts += [f"no baseline for {listed(document['new'])}"] if document["new"] else []
-    return f"DIFFERENT: {names} differ: {'; '.join(parts) or 'nothing is in both'}."
+    return f"{document['status'].upper()}: {names} differ: {'; '.join(parts) or 'nothing is in both'}."
 
 
 def _folders(document: Document, *, everything: bool) -> tuple[Section, ...]:
@@ -51,8 +53,11 @@ def _folders(document: Document, *, everything: bool) -> tuple[Section, ...]:
         number("compared", lambda row: sum(kind["compared"] for kind in row["kinds"])),
         number("beyond", lambda row: len(row["differences"])),
     ]
-    head = Section("", (Words(comparison_headline(document), style), tabulated(document["results"], columns)))
-    found = [head]
+    head: list[Part] = [Words(comparison_headline(document), style)]
+    head += [Words(each["message"], "failed", mark="-") for each in document["refused"]]
+    if document["results"]:
+        head.append(tabulated(document["results"], columns))
+    found = [Section("", tuple(head))]
     for each in document["results"]:
         if each["status"] != "same":
             first, *others = compare_sections(each, everything=everything)

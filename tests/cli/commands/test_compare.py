@@ -229,6 +229,105 @@ def test_a_broken_result_never_becomes_a_baseline(files: Path) -> None:
     assert (files / "other.json").read_bytes() == before
 
 
+# ------------------------------------------------------------------------------------------- whole folders
+
+
+@pytest.fixture
+def folders(files: Path) -> Path:
+    """A folder of three results, and of their baselines, which agree."""
+    for name in ("a", "b", "deep/c"):
+        for folder, source, called in (("all", "result/result.json", "result"), ("base", "same.json", "baseline")):
+            place = files / folder / name
+            place.mkdir(parents=True)
+            (place / f"{called}.json").write_bytes((files / source).read_bytes())
+    return files
+
+
+def answer(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    assert main(["compare", "all", "base", "--format", "json"]) in {0, 1, 2}
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+@pytest.mark.usefixtures("folders")
+def test_folders_agree_when_every_result_does(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "all", "base"]) == 0
+    assert "SAME: 3 results of all and base agree" in capsys.readouterr().out
+    assert [each["folder"] for each in answer(capsys)["results"]] == ["a", "b", "deep/c"]
+    assert main(["compare", "all", "base", "-q"]) == 0
+    assert capsys.readouterr().out.count("\n") == 1
+
+
+def test_a_folder_that_differs_or_stands_alone_is_named(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folders / "base/a/baseline.json").write_bytes((folders / "other.json").read_bytes())
+    (folders / "base/b").rename(folders / "base/d")
+    assert main(["compare", "all", "base"]) == 1
+    printed = capsys.readouterr().out
+    assert "1 result of 2 beyond tolerance; no result for d; no baseline for b" in printed
+    found = answer(capsys)
+    assert (found["status"], found["missing"], found["new"]) == ("different", ["d"], ["b"])
+    assert [each["status"] for each in found["results"]] == ["different", "same"]
+    assert main(["compare", "all", "base", "--format", "junit"]) == 1
+    suite = parsed(capsys.readouterr().out)
+    bad = {each.get("name") for each in nonempty(suite) if len(each)}
+    assert {"b", "d", "a: height", "a: scale factors"} <= bad
+    assert not any(name.startswith("deep/c") for name in bad if name)
+    assert main(["compare", "all", "base", "--format", "github"]) == 1
+    assert f"::error file=base/a/baseline.json,line={1 + line_of(folders, moved())}," in capsys.readouterr().out
+
+
+def line_of(folder: Path, point: str) -> int:
+    """Give the number of lines before that of a point in the baseline."""
+    lines = (folder / "other.json").read_text(encoding="utf-8").splitlines()
+    return next(
+        number
+        for number, line in enumerate(lines)
+        if line.startswith((f'{{"id": "{point}"', f'"points": [{{"id": "{point}"')) and '"role"' in line
+    )
+
+
+def test_a_broken_baseline_does_not_hide_the_others(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folders / "base/a/baseline.json").write_text("{", encoding="utf-8")
+    (folders / "base/b/baseline.json").write_bytes((folders / "other.json").read_bytes())
+    assert main(["compare", "all", "base"]) == 2
+    printed = capsys.readouterr().out
+    assert "REFUSED: all and base differ: 1 result that cannot be compared; 1 result of 2 beyond tolerance." in printed
+    assert "- base/a/baseline.json:1:2: is not JSON" in printed
+    found = answer(capsys)
+    assert found["status"] == "refused"
+    assert [(each["folder"], each["code"]) for each in found["refused"]] == [("a", "result-json")]
+    assert [(each["folder"], each["status"]) for each in found["results"]] == [("b", "different"), ("deep/c", "same")]
+    assert main(["compare", "all", "base", "--format", "junit"]) == 2
+    cases = {each.get("name"): each for each in parsed(capsys.readouterr().out)}
+    assert cases["a"].find("error") is not None
+    assert cases["deep/c: height"].find("failure") is None
+    assert main(["compare", "all", "base", "--format", "github"]) == 2
+    assert "::error file=base/a/baseline.json,line=1,title=photostrip result-json::" in capsys.readouterr().out
+
+
+def test_update_writes_the_baselines_of_a_folder(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folders / "base/b/baseline.json").write_bytes((folders / "other.json").read_bytes())
+    assert main(["compare", "all", "new", "--update"]) == 0
+    assert capsys.readouterr().err.splitlines() == [f"wrote new/{name}/baseline.json" for name in ("a", "b", "deep/c")]
+    assert main(["compare", "all", "new"]) == 0
+    assert main(["compare", "all", "base", "--update"]) == 0
+    assert "wrote base/b/baseline.json; DIFFERENT" in capsys.readouterr().err
+    assert main(["compare", "all", "base"]) == 0
+
+
+def test_folders_without_results_are_refused(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folders / "empty").mkdir()
+    for given, words in (
+        (("empty", "base"), "empty: holds no result.json, nor does a folder in it"),
+        (("all", "none"), "none: is no folder, and all is one of 3 results"),
+        (("all", "same.json"), "same.json: is no folder, and all is one of 3 results"),
+    ):
+        assert main(["compare", *given]) == 2
+        assert words in capsys.readouterr().err
+    assert main(["compare", "all", "empty"]) == 1
+    assert "no baseline for a, b, deep/c" in capsys.readouterr().out
+
+
 # ------------------------------------------------------------------------------------------- profiles
 
 
