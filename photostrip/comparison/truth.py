@@ -29,13 +29,17 @@ FIX = "simulate it again"  # for a truth that was edited
 
 _TEXT, _NUMBER = Quantity("", "text"), Quantity("", "number")
 _PLACE: Table = {"id": _TEXT, "x": _NUMBER, "y": _NUMBER, "z": _NUMBER}
+ERROR: Table = {
+    **dict.fromkeys(("kind", "photo", "point", "other", "axis"), _TEXT),
+    **dict.fromkeys(("size_um", "size_m"), _NUMBER),
+}
+FRAME: Table = {"crs": _TEXT, "axes": replace(_TEXT, many=True)}
 # What is compared of the truth, and the keys that must have a value.
 SHAPE: Table = {
-    "frame": {"crs": _TEXT, "axes": replace(_TEXT, many=True)},
+    "frame": FRAME,
     "points": _PLACE,
     "photos": {**_PLACE, "rotation": replace(_NUMBER, many=True)},
-    "errors": dict.fromkeys(("kind", "photo", "point", "other", "axis"), _TEXT)
-    | dict.fromkeys(("size_um", "size_m"), _NUMBER),
+    "errors": ERROR,
 }
 NEEDED = {"points": tuple(_PLACE), "photos": tuple(_PLACE), "errors": ("kind", "point")}
 
@@ -81,7 +85,7 @@ def _require_whole(truth: Document, file: str) -> None:
 def _missing(truth: Document) -> Iterator[tuple[str, str]]:
     """Return the keys that have no value, with what is expected there."""
     frame = truth.get("frame")
-    for key in SHAPE["frame"]:
+    for key in FRAME:
         if not isinstance(frame, dict) or frame.get(key) is None:
             yield f"frame.{key}", "that of the simulation"
     for block, keys in NEEDED.items():

@@ -51,7 +51,10 @@ def errors_of(frame: str, now: Floats, true: Floats) -> Floats:
         return (now - true) * (FOOT, FOOT, 1.0)
     to_geodetic = pyproj.Transformer.from_crs("EPSG:4978", "EPSG:4979", always_xy=True)
     if frame == "geographic":
-        now, true = (np.column_stack(to_geodetic.transform(*each.T, direction="INVERSE")) for each in (now, true))
+        now, true = (
+            np.column_stack(to_geodetic.transform(each[:, 0], each[:, 1], each[:, 2], direction="INVERSE"))
+            for each in (now, true)
+        )
     longitude, latitude, _ = np.radians(to_geodetic.transform(*true.T))
     east = np.column_stack([-np.sin(longitude), np.cos(longitude), 0.0 * longitude])
     up = np.column_stack([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)])
