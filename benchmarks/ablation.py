@@ -32,6 +32,7 @@ limit_threads()  # as the command does, before numpy is imported
 
 
 from benchmarks.gross_errors import AUTO, CLEAN, HEAD, KNOWN, Run, Tally, loses_anything, runs_of  # noqa: E402
+from photostrip import frozen  # noqa: E402
 from photostrip.pipeline.strips.absolute import ScreenedStrip  # noqa: E402
 from photostrip.triangulation import gross_errors as search  # noqa: E402
 from photostrip.triangulation.bundle.settings import BundleSettings  # noqa: E402
@@ -70,6 +71,9 @@ def put(home: str, name: str, value: object) -> None:
     holder = pkgutil.resolve_name(home)
     before = getattr(holder, name)
     setattr(holder, name, value)
+    if name in (fields := getattr(holder, "__dataclass_fields__", {})):  # its class keeps defaults to itself
+        fields[name].default = value
+        setattr(holder, "__init__", frozen._builder(holder))  # noqa: B010, SLF001
     holders = [holder]
     for module in [each for key, each in sys.modules.items() if key.startswith("photostrip")]:
         named = hasattr(module, name) and imported(module, home, name)
