@@ -11,8 +11,8 @@ from tests.pages import pages, renewed
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.renew_docs", description=__doc__)
-    parser.add_argument("pages", nargs="*", type=Path, help="these pages; default: all")
-    for page in parser.parse_args().pages or pages():
+    parser.add_argument("--page", action="append", type=Path, help="this page, may be repeated; default: all")
+    for page in parser.parse_args().page or pages():
         with tempfile.TemporaryDirectory() as folder:
             text = renewed(page, Path(folder))
         if text != page.read_text(encoding="utf-8"):
