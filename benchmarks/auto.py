@@ -167,7 +167,9 @@ def errors_of(cell: Cell, seed: int) -> tuple[dict[str, Floats], str]:
     ground, photo = tie_ground_frames(inputs, settings, None, None), orient_interior(inputs, settings)
     observations = correct(photo, inputs, settings, ground).observations
     (formed,) = form_strips(inputs, observations, settings)
-    oriented = orient_on_control(formed, measured_control(inputs.control, observations), ground.control)
+    oriented = orient_on_control(
+        formed, measured_control(inputs.control, observations), ground.control, settings.absolute
+    )
     screened = reject_wrong_control(oriented, settings)
     adjusted = {each: adjust(screened, replace(settings, adjustment=each)) for each in (*METHODS, AUTO)}
     choice = adjusted[AUTO].choice

@@ -74,6 +74,7 @@ def oriented_of(result: Result, number: int = 0) -> OrientedStrip[StripErrors]:
         intermediate=strip.intermediate,
         absolute=strip.absolute,
         precision=strip.precision,
+        settings=result.settings.absolute,
     )
 
 

@@ -117,7 +117,7 @@ def _adjusted(
 
         return adjust_block(inputs, settings, observations, control, ground, cast("Sequence[FormedPhotos]", formed))
     # 6-7 intermediate frame, absolute orientation
-    oriented = [orient_on_control(strip, control, ground.control) for strip in formed]
+    oriented = [orient_on_control(strip, control, ground.control, settings.absolute) for strip in formed]
     screened = [reject_wrong_control(strip, settings) for strip in oriented]
     # 8 polynomials, or the strip's own covariance
     level = settings.covariance.level / max(len(screened), 1)  # all strips together keep it

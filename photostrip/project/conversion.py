@@ -341,7 +341,12 @@ def settings(project: ProjectFile) -> Settings:
             scale_weights={str(name): weight for name, weight in wanted.scale_weights.items()},
             intersection=wanted.intersection,
         ),
-        absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=radius),
+        absolute=replace(
+            usual.absolute,
+            earth_curvature=wanted.earth_curvature,
+            earth_radius=radius,
+            control_weights=wanted.control_weights,
+        ),
         polynomial=_laid_over(usual.polynomial, wanted.polynomial),
         covariance=_laid_over(usual.covariance, wanted.covariance),
         bundle=_laid_over(usual.bundle, wanted.bundle),

@@ -46,12 +46,13 @@ PLAN, HEIGHT = slice(0, 2), 2
 
 @dataclass(frozen=True)
 class AbsoluteSettings:
-    """How the Earth's shape enters."""
+    """How the Earth's shape enters, and what the control weighs."""
 
     # ``"auto"`` or ``"none"``: the frames carry it (``local`` is truly Cartesian); ``"model"``: eq. 153, for plane map
     # coordinates of unknown projection given as ``local``; ``"image"``: in image space
     earth_curvature: str = "auto"
     earth_radius: float = EARTH_RADIUS  # radius in metres for ``"model"``
+    control_weights: str = "stated"  # by standard deviations, or ``"equal"``: each coordinate that counts alike
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,14 +127,18 @@ class AbsoluteOrientation:
     iterations: int
 
 
-def weights(control: ControlPoints, precision: tuple[float, float]) -> Floats:
+def weights(control: ControlPoints, precision: tuple[float, float], kind: str = "stated") -> Floats:
     """Weights 1/(sigma_control^2 + sigma_point^2) of the control coordinates against the strip, (n, 3), metres^-2.
 
     They are 0 where a coordinate does not count. The standard deviations of the control are those along the axes
     compared (``Targets.turned``); `precision` has those of a strip point in plan and in height, a priori.
+    kind: ``"equal"``, as [001] eq. 149 has them: the mean of the variances in the place of each.
     """
     point = np.array([precision[0], precision[0], precision[1]])
-    return np.where(control.use, 1 / (control.sigma**2 + point**2), 0.0)
+    variance = control.sigma**2 + point**2
+    if kind == "equal":
+        variance = np.where(control.use, variance[control.use].mean(), np.nan)
+    return np.where(control.use, 1 / variance, 0.0)
 
 
 def orient(

@@ -73,6 +73,7 @@ processing:
     parallax_limit: auto
   scale_transfer: least_squares
   intersection: mean
+  control_weights: stated
   earth_curvature: auto
   earth_radius: 6371000.0
   precision: true

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -11,6 +12,7 @@ from photostrip.cli.main import main
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings, triangulate
 from photostrip.result.document import document_of
+from photostrip.result.records import as_lists
 from photostrip.result.schema import result_page, result_schema
 from photostrip.simulation import Models, Spec, simulate
 from tests.loops import nonempty
@@ -33,9 +35,10 @@ def faults(document: dict[str, Any]) -> list[str]:
 def results() -> Iterator[dict[str, Any]]:
     for name in ("simulated-20", "apollo15-metric-strip", "sxb-strasbourg"):
         yield json.loads((ROOT / f"sample_data/{name}/baseline.json").read_text(encoding="utf-8")) | {"version": ""}
-    yield case().document
-    yield document_of(triangulate(case("projected", 2).inputs, Settings(adjustment="bundle")))
-    yield document_of(triangulate(inputs_of(simulate(Spec(models=Models(), flight=spec().flight))), Settings()))
+    yield as_lists(case().document)
+    yield as_lists(document_of(triangulate(case("projected", 2).inputs, Settings(adjustment="bundle"))))
+    strips = inputs_of(simulate(Spec(models=Models(), flight=spec().flight)))
+    yield as_lists(document_of(triangulate(strips, Settings())))
 
 
 def test_every_result_keeps_the_schema() -> None:
@@ -59,7 +62,7 @@ def test_the_schema_is_one() -> None:
     ],
 )
 def test_an_edited_result_does_not(keys: tuple[str | int, ...], value: object, block: str) -> None:
-    document = json.loads(json.dumps(case().document))
+    document = deepcopy(as_lists(case().document))
     part = document
     for key in keys[:-1]:
         part = part[key]

@@ -13,8 +13,10 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, GeometryError, InputError
+from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import Settings, triangulate
+from photostrip.simulation import Flight, Ground, Spec, simulate
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, Targets, orient, weights
 from tests.strips import attitude, control_points, fly, project, targets
@@ -228,6 +230,32 @@ def test_weights_add_the_strip_to_the_control() -> None:
 
 
 @pytest.mark.slow
+def test_equal_weights_take_the_mean_variance_of_what_counts() -> None:
+    control = control_points({"A": (0, 0, 0), "B": (1, 1, 1)}, {"A": "xyz", "B": "xy"}, sigma=(0.1, 0.2, 0.4))
+    found = weights(control, PRECISION, "equal")
+    variances = 2 * [0.1**2 + 0.05**2, 0.2**2 + 0.05**2] + [0.4**2 + 0.1**2]
+    assert found == pytest.approx(np.array([[1, 1, 1], [1, 1, 0]]) / np.mean(variances))
+
+
+@pytest.mark.slow
+def test_a_run_with_equal_weights_lies_on_its_control_as_the_closed_form_does() -> None:
+    simulation = simulate(Spec(flight=Flight(photos=6), ground=Ground("local")))
+    given = inputs_of(simulation)
+    uneven = np.linspace(1, 9, len(given.control))[:, None] * given.control.sigma
+    inputs = replace(given, control=replace(given.control, sigma=uneven))
+    settings = replace(Settings(), adjustment="similarity")
+    equal = replace(settings, absolute=replace(settings.absolute, control_weights="equal"))
+    found = {}
+    for name, each in (("stated", settings), ("equal", equal)):
+        (strip,) = triangulate(inputs, each).strips
+        model = strip.formed.xyz[strip.control_rows]
+        ground = strip.intermediate.intermediate_from_cartesian(strip.control.enu)
+        similarity = Similarity.from_points(model, ground)
+        found[name] = float(np.abs(strip.absolute.similarity(model) - similarity(model)).max())
+    assert found["equal"] < 1e-6
+    assert found["stated"] > 0.01
+
+
 def test_with_noise_sigma0_is_one() -> None:
     rng, squares = np.random.default_rng(1), []
     for _ in range(150):

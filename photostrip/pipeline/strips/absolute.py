@@ -99,6 +99,7 @@ class OrientedStrip(Generic[Errors]):
     intermediate: IntermediateFrame
     absolute: absolute_orientation.AbsoluteOrientation
     precision: tuple[float, float]  # a-priori standard deviations in plan and height that gave the weights, metres
+    settings: absolute_orientation.AbsoluteSettings
 
     @cached_property
     def targets(self) -> absolute_orientation.Targets:
@@ -119,7 +120,8 @@ class OrientedStrip(Generic[Errors]):
     @cached_property
     def weights(self) -> Floats:
         """Weights of the control coordinates, shape (n, 3)."""
-        return absolute_orientation.weights(self.targets.turned(self.at_control), self.precision)
+        turned = self.targets.turned(self.at_control)
+        return absolute_orientation.weights(turned, self.precision, self.settings.control_weights)
 
     @cached_property
     def extent(self) -> tuple[float, float]:
@@ -147,7 +149,10 @@ class ScreenedStrip(Generic[Errors]):
 
 
 def orient_on_control(
-    stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame]
+    stage: StripStage[Errors],
+    control: ControlPoints,
+    frames: Sequence[GroundFrame],
+    settings: absolute_orientation.AbsoluteSettings,
 ) -> OrientedStrip[Errors]:
     """Lay a strip on its control: intermediate frame and absolute orientation.
 
@@ -156,9 +161,9 @@ def orient_on_control(
     """
     inside, rows = control_of(stage.formed, control, stage.point_ids)
     try:
-        oriented = to_ground(stage, inside, rows, frames)
+        oriented = to_ground(stage, inside, rows, frames, settings)
     except InputError as refusal:
-        oriented = to_ground(stage.turned_over(refusal), inside, rows, frames)
+        oriented = to_ground(stage.turned_over(refusal), inside, rows, frames, settings)
     oriented.stage.refuse_other_hand(oriented)
     return oriented
 
@@ -188,7 +193,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
         return ScreenedStrip(oriented, control_screening.not_screened(control), shared)
     screened = control_screening.screen_control(place)
     if screened.rejections:
-        oriented = to_ground(stage, screened.kept, oriented.control_rows, oriented.frames)
+        oriented = to_ground(stage, screened.kept, oriented.control_rows, oriented.frames, oriented.settings)
     return ScreenedStrip(oriented, screened)
 
 
@@ -201,7 +206,11 @@ def control_of(formed: StripShape, control: ControlPoints, point_ids: Sequence[s
 
 
 def to_ground(
-    stage: StripStage[Errors], control: ControlPoints, rows: Numbers, frames: Sequence[GroundFrame]
+    stage: StripStage[Errors],
+    control: ControlPoints,
+    rows: Numbers,
+    frames: Sequence[GroundFrame],
+    settings: absolute_orientation.AbsoluteSettings,
 ) -> OrientedStrip[Errors]:
     """Intermediate frame with X along the strip, and the similarity into it.
 
@@ -230,9 +239,8 @@ def to_ground(
         targets = absolute_orientation.Targets(control, frames, intermediate)
         cartesian = provisional_frame.cartesian_from_intermediate(provisional.similarity(formed.xyz[rows]))
         turned = targets.turned(intermediate.intermediate_from_cartesian(cartesian))
-        final = absolute_orientation.orient(
-            formed.xyz[rows], targets, absolute_orientation.weights(turned, precision), formed.xyz
-        )
+        weight = absolute_orientation.weights(turned, precision, settings.control_weights)
+        final = absolute_orientation.orient(formed.xyz[rows], targets, weight, formed.xyz)
     except GeometryError as error:
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, points=error.points, code=error.code) from error
@@ -244,6 +252,7 @@ def to_ground(
         intermediate=intermediate,
         absolute=final,
         precision=precision,
+        settings=settings,
     )
 
 

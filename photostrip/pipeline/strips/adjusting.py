@@ -33,7 +33,8 @@ def adjust_formed(
     stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
 ) -> StripResult:
     """Take a formed strip to the ground with its own control."""
-    return adjust(reject_wrong_control(orient_on_control(stage, control, frames), settings), settings)
+    oriented = orient_on_control(stage, control, frames, settings.absolute)
+    return adjust(reject_wrong_control(oriented, settings), settings)
 
 
 def _deformation(oriented: OrientedStrip[Errors], settings: Settings) -> Deformation:

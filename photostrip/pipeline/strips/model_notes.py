@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import Note
 from photostrip.triangulation.independent_models.link_screening import LEFT
+from photostrip.triangulation.independent_models.model_errors import far_ends
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from photostrip.arrays import Floats
     from photostrip.pipeline.inputs import ModelStrip
     from photostrip.points import ModelPoints
     from photostrip.triangulation.independent_models.formation import FormedModels
@@ -95,22 +94,3 @@ def _unit_notes(strip: ModelStrip, formed: FormedModels) -> Iterator[Note]:
             "are these in another unit?"
         )
         yield Note("sigma-unit", text, strip=strip.id, key="models.sigma")
-
-
-def far_ends(formed: FormedModels) -> Floats:
-    """Uncertainty of the far end of the model after each link, in standard deviations of a coordinate.
-
-    Returns (j,), largest standard deviation of a coordinate over the median one of a coordinate of the model.
-    """
-    models, solved = formed.models, formed.links.solved
-    rows = np.flatnonzero((models.model > 0) & (models.node < models.points))
-    link = models.model[rows] - 1
-    moved = solved.similarities.of(link, models.xyz[rows])
-    design = similarity_derivatives(moved - solved.centroid[link], np.zeros(3))
-    variance = np.einsum("nij,njk,nik->ni", design, solved.cofactors[link], design).max(axis=1)
-    scale = solved.similarities.scale
-    found = np.zeros(len(scale))
-    np.maximum.at(found, link, variance)
-    stated = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
-    ratio: Floats = np.sqrt(found) / np.maximum(scale * stated, 1e-300)
-    return ratio

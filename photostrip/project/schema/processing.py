@@ -173,6 +173,11 @@ class Processing(Section):
         "`mean`: Y of a model point is the mean of both rays; `left`: the point lies on the left ray, as printed",
         DEFAULTS.formation.intersection,
     )
+    control_weights: Annotated[str, *choice(("stated", "equal"))] = key(
+        "`stated`: control weighs by its standard deviations and those of the strip's points; `equal`: each coordinate"
+        " alike, as printed",
+        DEFAULTS.absolute.control_weights,
+    )
     earth_curvature: Annotated[str, *choice(("auto", "model", "image", "none"))] = key(
         "`auto` or `none`: the frames carry it, `local` is truly Cartesian; `model`: D^2/2R, for plane map"
         " coordinates of an unknown projection given as `local`; `image`: the same, photo by photo in the image",

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
-from photostrip.pipeline.strips.model_notes import far_ends
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import Document, rms
 from photostrip.result.quantities import grouped, record, records
+from photostrip.triangulation.independent_models.model_errors import far_ends
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers

@@ -14,7 +14,7 @@ class Choice(NamedTuple):
 
     subject: str
     source: str  # where the textbook decides
-    key: str  # of ``processing``; empty where nothing can be chosen
+    key: str  # of ``processing``
     textbook: tuple[str, ...]  # values of the key that follow it
     words: str  # what the textbook does
     here: dict[str, str]  # what the program does, by value of the key
@@ -54,10 +54,10 @@ CHOICES = (
     Choice(
         subject="control",
         source="eq. 149",
-        key="",
-        textbook=(),
-        words="points in full, equal weights",
-        here={"": "any coordinates, weighted by their standard deviations and those of the strip's points"},
+        key="control_weights",
+        textbook=("equal",),
+        words="equal weights",
+        here={"stated": "weighted by their standard deviations and those of the strip's points"},
     ),
     Choice(
         subject="adjustment",
@@ -80,14 +80,6 @@ CHOICES = (
         words="cubic",
         here={"auto": "1 to 3 or none, by evidence", "1": "1", "2": "2"},
     ),
-    Choice(
-        subject="longitude of the origin",
-        source="eq. 142",
-        key="",
-        textbook=(),
-        words="mean of the longitudes",
-        here={"": "mean of the directions; the same away from the 180 degree meridian"},
-    ),
 )
 
 
@@ -99,7 +91,7 @@ def departures_of(settings: Settings) -> list[Document]:
         "scale_transfer": settings.formation.scale_transfer,
         "adjustment": settings.adjustment,
         "polynomial.degree": settings.polynomial.degree,
-        "": "",
+        "control_weights": settings.absolute.control_weights,
     }
     return [
         {
@@ -107,7 +99,7 @@ def departures_of(settings: Settings) -> list[Document]:
             "source": choice.source,
             "textbook": choice.words,
             "here": choice.here[values[choice.key]],
-            "key": f"processing.{choice.key}: {choice.textbook[0]}" if choice.key else "",
+            "key": f"processing.{choice.key}: {choice.textbook[0]}",
         }
         for choice in CHOICES
         if values[choice.key] not in choice.textbook

@@ -98,7 +98,8 @@ def similarity_steps(result: Result, strip: StripResult) -> list[SimilarityStep]
     """Repeat the absolute orientation of a strip on the control that was used."""
     points = strip.formed.xyz[strip.control_rows]
     targets = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate)
-    weight = absolute_orientation.weights(targets.turned(strip.absolute.similarity(points)), strip.precision)
+    turned = targets.turned(strip.absolute.similarity(points))
+    weight = absolute_orientation.weights(turned, strip.precision, result.settings.absolute.control_weights)
     steps: list[SimilarityStep] = []
 
     def watch(similarity: Similarity, step: Floats) -> None:

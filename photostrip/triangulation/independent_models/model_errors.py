@@ -227,3 +227,22 @@ def _with_coordinates(errors: ModelErrors, place: Floats, rows: Numbers, first: 
     result = errors.by_similarity @ place @ errors.by_similarity.transpose(0, 2, 1) + cross + cross.transpose(0, 2, 1)
     np.add.at(result, item, share[:, None, None] * shares)
     return result
+
+
+def far_ends(formed: FormedModels) -> Floats:
+    """Uncertainty of the far end of the model after each link, in standard deviations of a coordinate.
+
+    Returns (j,), largest standard deviation of a coordinate over the median one of a coordinate of the model.
+    """
+    models, solved = formed.models, formed.links.solved
+    rows = np.flatnonzero((models.model > 0) & (models.node < models.points))
+    link = models.model[rows] - 1
+    moved = solved.similarities.of(link, models.xyz[rows])
+    design = similarity_derivatives(moved - solved.centroid[link], np.zeros(3))
+    variance = np.einsum("nij,njk,nik->ni", design, solved.cofactors[link], design).max(axis=1)
+    scale = solved.similarities.scale
+    found = np.zeros(len(scale))
+    np.maximum.at(found, link, variance)
+    stated = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
+    ratio: Floats = np.sqrt(found) / np.maximum(scale * stated, 1e-300)
+    return ratio
