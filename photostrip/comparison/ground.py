@@ -20,14 +20,14 @@ def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Float
     Coordinates are in the order and the units of the frame, the block ``frame`` of a result. In a geocentric frame up
     is the normal of the ellipsoid.
     """
-    if frame["kind"] == "geocentric":
-        return difference_in_plan_and_height(frame, now - before, before)
     parts = east_north_up(frame, now, before)
     return np.hypot(parts[:, 0], parts[:, 1]), np.abs(parts[:, 2])
 
 
 def east_north_up(frame: Document, now: Floats, before: Floats) -> Floats:
-    """Return how far points (n, 3) lie east, north and up of where they were, metres; not of geocentric coordinates."""
+    """Return how far points (n, 3) lie east, north and up of where they were, metres."""
+    if frame["kind"] == "geocentric":
+        return _along(level(frame, before), now - before)
     order = [list(frame["axes"]).index(axis) for axis in GROUND_AXES]
     return _in_metres(frame, now[:, order], before[:, order])
 
@@ -35,8 +35,8 @@ def east_north_up(frame: Document, now: Floats, before: Floats) -> Floats:
 def difference_in_plan_and_height(frame: Document, delta: Floats, at: Floats) -> tuple[Floats, Floats]:
     """Return the same of differences that are in metres already, at points `at`; both in the order of the axes."""
     if frame["kind"] == "geocentric":
-        parts = _turned(frame, delta, at)
-    else:
+        parts = _along(level(frame, at), delta)
+    else:  # a part that does not count stays alone without a number
         parts = delta[:, [list(frame["axes"]).index(axis) for axis in GROUND_AXES]]
     return np.hypot(parts[:, 0], parts[:, 1]), np.abs(parts[:, 2])
 
@@ -55,18 +55,23 @@ def _in_metres(frame: Document, now: Floats, before: Floats) -> Floats:
     return delta
 
 
-def _turned(frame: Document, delta: Floats, at: Floats) -> Floats:
-    """Differences of X, Y, Z along east, north and the normal of the ellipsoid, metres."""
+def level(frame: Document, at: Floats) -> Floats:
+    """Return east, north and up at points (n, 3) as unit vectors along the axes of the frame, as rows: (n, 3, 3)."""
     names = list(frame["axes"])
     order = [names.index(axis) for axis in (CARTESIAN_AXES if "x" in names else GROUND_AXES)]
-    d, p = delta[:, order], at[:, order]
+    axes = np.eye(3)[order]
+    if frame["kind"] != "geocentric":
+        return np.broadcast_to(axes, (len(at), 3, 3))
+    p = at[:, order]
     a, b = frame["ellipsoid"]
     # latitude of a point on the ellipsoid; a few kilometres above it the normal is off by 1e-6, which is nothing here
     distance = np.hypot(p[:, 0], p[:, 1])
     latitude = np.arctan2(p[:, 2] * a**2, distance * b**2)
     longitude = np.arctan2(p[:, 1], p[:, 0])
-    out = np.cos(longitude) * d[:, 0] + np.sin(longitude) * d[:, 1]
-    east = np.cos(longitude) * d[:, 1] - np.sin(longitude) * d[:, 0]
-    north = np.cos(latitude) * d[:, 2] - np.sin(latitude) * out
-    up = np.sin(latitude) * d[:, 2] + np.cos(latitude) * out
-    return np.column_stack([east, north, up])
+    (cl, sl), (cb, sb) = ((np.cos(angle), np.sin(angle)) for angle in (longitude, latitude))
+    east, north, up = (-sl, cl, np.zeros_like(sl)), (-sb * cl, -sb * sl, cb), (cb * cl, cb * sl, sb)
+    return np.stack([np.stack(each, axis=1) for each in (east, north, up)], axis=1) @ axes
+
+
+def _along(axes: Floats, delta: Floats) -> Floats:
+    return np.asarray(np.einsum("nij,nj->ni", axes, delta), float)

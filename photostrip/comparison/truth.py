@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.comparison.ground import east_north_up, plan_and_height
+from photostrip.comparison.ground import east_north_up, level, plan_and_height
 from photostrip.errors import Fault, InputError, incomplete
 from photostrip.result.description import Quantity, Table
 from photostrip.result.reading import MOST_FAULTS, faults_of
@@ -152,16 +152,13 @@ def _places(rows: Sequence[Document]) -> Floats:
 
 def _normalised(frame: Document, rows: Sequence[Document], true: Sequence[Document]) -> dict[str, Floats]:
     """Return e^T C^-1 e of the errors e in plan and in height with the covariances C of the result, where both are."""
-    if frame["kind"] == "geocentric":
-        return {}
-    e = east_north_up(frame, _places(rows), _places(true))
-    axes = [list(frame["axes"]).index(axis) for axis in ("east", "north", "up")]
+    e, axes = east_north_up(frame, _places(rows), _places(true)), level(frame, _places(true))
     c = np.full((len(rows), 3, 3), np.nan)
     for n, row in enumerate(rows):
         if row.get("sigma_x") is not None:
             xy, xz, yz = (row[f"cov_{pair}"] for pair in ("xy", "xz", "yz"))
             full = [[row["sigma_x"] ** 2, xy, xz], [xy, row["sigma_y"] ** 2, yz], [xz, yz, row["sigma_z"] ** 2]]
-            c[n] = np.array(full)[np.ix_(axes, axes)]
+            c[n] = axes[n] @ np.array(full) @ axes[n].T
     known = np.isfinite(c).all(axis=(1, 2))
     plan = np.linalg.solve(c[known, :2, :2], e[known, :2, None])[..., 0]
     return {"plan": (plan * e[known, :2]).sum(axis=1), "height": e[known, 2] ** 2 / c[known, 2, 2]}

@@ -52,14 +52,15 @@ class Comparison:
 
 
 def compare(
-    result: Result | str | PathLike[str],
+    result: Result | str | PathLike[str] | Mapping[str, Any],
     baseline: Result | str | PathLike[str] | Mapping[str, Any],
     *,
     tolerances: str | PathLike[str] | Tolerances | None = None,
 ) -> Comparison:
     """Compare a result with a baseline or another result, with the truth, or all results of a folder with their own.
 
-    result: a result, a result.json, the folder that holds one, or a folder with many such folders.
+    result: a result, also as a mapping (``Result.document``); a result.json, the folder that holds one, or a folder
+        with many such folders.
     baseline: the same; ``baseline.json``; or ``truth.json``, also as a mapping.
     tolerances: a tolerance profile (YAML); without one only the last digits may differ.
     Raises InputError when they cannot be compared: other frames, another format, no result. Of folders, what cannot be
@@ -74,15 +75,15 @@ def compare(
         from photostrip.project.tolerance_profile import load_tolerances
 
         allowed = load_tolerances(Path(tolerances))[0]
-    if not isinstance(result, Result) and not isinstance(baseline, Result | Mapping):
+    if not isinstance(result, Result | Mapping) and not isinstance(baseline, Result | Mapping):
         one, other = Path(result), Path(baseline)
         if results := results_below(one):
             return Comparison(_folders(one, results, other, allowed))
         if one.is_dir() and not place_of(one).exists():
             fix = "name the folder into which `photostrip run -o` or `photostrip batch -o` wrote"
             raise InputError(Fault("holds no result.json, nor does a folder in it", "file-missing", str(one), fix=fix))
-    now, named = _opened(result)
-    before, other_name = _opened(baseline)
+    now, named = _opened(result, "the result")
+    before, other_name = _opened(baseline, "the baseline")
     if TRUTH in before:
         return Comparison(compare_with_truth(now, before, (named, other_name)))
     return Comparison(compare_results(now, before, allowed, (named, other_name)))
@@ -96,14 +97,14 @@ def place_of(baseline: Path, *, update: bool = False) -> Path:
     return whole if whole.exists() and not update and not (baseline / BASELINE).exists() else baseline / BASELINE
 
 
-def _opened(given: Result | str | PathLike[str] | Mapping[str, Any]) -> tuple[Document, str]:
-    """Return a document with what it is called in messages."""
-    from photostrip.formats.output.result_json import read_document
+def _opened(given: Result | str | PathLike[str] | Mapping[str, Any], name: str) -> tuple[Document, str]:
+    """Return a document with what it is called in messages; a mapping has the name that is given."""
+    from photostrip.formats.output.result_json import checked, read_document
 
     if isinstance(given, Result):
         return given.document, given.name
     if isinstance(given, Mapping):
-        return dict(given), "the truth"
+        return (dict(given), "the truth") if TRUTH in given else (checked(dict(given), name), name)
     file = str(place_of(Path(given)))
     return read_document(file, TRUTH), file
 

@@ -47,12 +47,12 @@ def plan(
     overrides: keys with other values: ``plan("model", end_lap_percent=70, control={"layout": "six"})``.
     Raises InputError with every fault of the plan.
     """
-    from photostrip.project.in_memory import FILE, source_of
+    from photostrip.project.in_memory import SPECIFICATION, source_of
 
     assignments = assignments_of(overrides)
     if isinstance(specification, Mapping):
-        with reading_from(source_of(specification, {})):
-            return Plan(_document(kind, Path(FILE), assignments))
+        with reading_from(source_of(SPECIFICATION, specification, {})):
+            return Plan(_document(kind, Path(SPECIFICATION), assignments))
     return Plan(_document(kind, None if specification is None else Path(specification), assignments))
 
 

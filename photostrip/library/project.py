@@ -148,20 +148,24 @@ def _place_of(
     """Return the path of a project, and what it is read from where it has no files."""
     if not isinstance(project, Mapping):
         return Path(project), None
-    from photostrip.project.in_memory import FILE, source_of
+    from photostrip.project.in_memory import PROJECT, source_of
 
-    return Path(FILE), source_of({"photostrip": 1, **project}, tables or {})
+    return Path(PROJECT), source_of(PROJECT, {"photostrip": 1, **project}, tables or {})
 
 
 def assignments_of(overrides: Mapping[str, Any], above: str = "") -> list[str]:
-    """Return overrides as the command line gives them: ``processing.adjustment="bundle"``."""
+    """Return overrides as assignments to keys: ``processing.adjustment="bundle"``."""
     from photostrip.project.in_memory import text_of
+    from photostrip.project.yaml.document import OVERRIDE, Override
 
-    found = []
+    found: list[str] = []
     for key, value in overrides.items():
         name = key if not above or _WORD.fullmatch(key) else f'"{key}"'
         path = f"{above}.{name}" if above else name
-        found += assignments_of(value, path) if isinstance(value, Mapping) else [f"{path}={text_of(value)}"]
+        if isinstance(value, Mapping):
+            found += assignments_of(value, path)
+        else:
+            found.append(Override(f"{path}={text_of(value, OVERRIDE, path)}"))
     return found
 
 

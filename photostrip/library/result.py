@@ -122,8 +122,8 @@ class Result:
 
         joint: of all points with each other, for distances and differences of points; of a run by ``covariance`` or
             ``bundle`` only, not of a saved result.
-        Returns square metres, shape (n, 3, 3), joint (n, 3, n, 3); shape (3, 3) for a single id. NaN where none was
-            computed.
+        Returns square metres, shape (n, 3, 3), joint (n, 3, n, 3); shape (3, 3) for a single id, which is no list. NaN
+            where none was computed.
         Raises InputError for a point that the result does not have, and where joint covariances cannot be had.
         """
         names = [ids] if isinstance(ids, str) else list(ids)
@@ -133,7 +133,8 @@ class Result:
             message = f"the result has no {named('point', unknown)}"
             raise InputError(Fault(message, "unknown-point", points=tuple(unknown)))
         if joint:
-            return self._joint(np.array([rows[name] for name in names], np.intp))
+            found = self._joint(np.array([rows[name] for name in names], np.intp))
+            return found[0, :, 0] if isinstance(ids, str) else found
         found = np.full((len(names), 3, 3), np.nan)
         if "sigma_x" in points.columns and "cov_xy" in points.columns:
             at = [rows[name] for name in names]
@@ -145,6 +146,8 @@ class Result:
 
     def _joint(self, rows: Numbers) -> Floats:
         """Return the joint covariances of rows of the table of points."""
+        if not len(rows):
+            return np.zeros((0, 3, 0, 3))
         if self.computed is None:
             message = "a saved result holds no covariances between points"
             raise InputError(Fault(message, "result-saved", fix="run the project again"))

@@ -65,11 +65,11 @@ def simulate(
     Raises InputError with every fault of the specification.
     """
     from photostrip.formats.output.simulation import project_files, summary
-    from photostrip.project.in_memory import FILE, source_of
+    from photostrip.project.in_memory import SPECIFICATION, source_of
     from photostrip.project.simulation import load_specification
 
-    source = source_of({KEY: 1} | dict(specification), {}) if isinstance(specification, Mapping) else None
-    path = Path(FILE) if isinstance(specification, Mapping) else Path(specification)
+    source = source_of(SPECIFICATION, {KEY: 1, **specification}, {}) if isinstance(specification, Mapping) else None
+    path = Path(SPECIFICATION) if isinstance(specification, Mapping) else Path(specification)
     with reading_from(source):
         found = load_specification(path, assignments_of(overrides)).simulate()
     return Simulation(project_files(found), summary(found))

@@ -18,21 +18,21 @@ from photostrip.formats.text.source import Source, reading_from
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-FILE = "project"  # what the mapping is called in messages
+PROJECT, SPECIFICATION = "project", "specification"  # what mappings are called in messages
 
 
-def source_of(project: Mapping[str, Any], tables: Mapping[str, Any]) -> Source:
-    """Write a project and its tables as the files that they stand for; nothing touches the disk.
+def source_of(name: str, content: Mapping[str, Any], tables: Mapping[str, Any]) -> Source:
+    """Write a project, or a specification, and its tables as the files that they stand for; nothing touches the disk.
 
     tables: by the name under which the project names them (``file:``): a data frame, a structured array, or a mapping
-        of names of columns to values. None and NaN are empty cells.
+        of names of columns to values. None, NaN and masked values are empty cells.
     """
-    files = {name: _text(name, table).encode() for name, table in tables.items()}
-    return Source(files | {FILE: text_of(project).encode()})
+    files = {each: _text(each, table) for each, table in tables.items()} | {name: text_of(content, name)}
+    return Source({each: _encoded(text, each) for each, text in files.items()})
 
 
-def text_of(value: Any) -> str:  # noqa: ANN401 (values of a project file)
-    """Return a value as a project file has it.
+def text_of(value: Any, file: str, key: str = "") -> str:  # noqa: ANN401 (values of a project file)
+    """Return a value as a project file has it; file and key are its place.
 
     Raises InputError for what no project file can hold.
     """
@@ -40,17 +40,20 @@ def text_of(value: Any) -> str:  # noqa: ANN401 (values of a project file)
         return json.dumps(value, default=_plain, ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError) as error:
         message = f"holds a value that a project file cannot hold ({error})"
-        raise InputError(Fault(message, "type", FILE, expected="texts, numbers, lists, mappings")) from None
+        raise InputError(Fault(message, "type", file, key=key, expected="texts, numbers, lists, mappings")) from None
 
 
 @contextmanager
 def in_memory(source: Source) -> Iterator[None]:
-    """Read from memory; a fault of the mapping has its key, and no line, as it stands in no file."""
+    """Read from memory; a fault of a mapping has its key, and no line, as it stands in no file."""
     try:
         with reading_from(source):
             yield
     except InputError as error:
-        placed = InputError(replace(fault, line=0, column=0) if fault.file == FILE else fault for fault in error.faults)
+        placed = InputError(
+            replace(fault, line=0, column=0) if fault.file in {PROJECT, SPECIFICATION} else fault
+            for fault in error.faults
+        )
         placed.findings = error.findings
         raise placed from None
 
@@ -62,8 +65,14 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 (what JSON does not know)
 
 def _text(name: str, table: Any) -> str:  # noqa: ANN401 (data frames of any library)
     """Return a table as CSV."""
-    names = _names(table)
-    columns = [np.asarray(table[each]) for each in names]
+    try:
+        names = _names(table)
+        columns = [_values(table[each]) for each in names]
+    except (AttributeError, IndexError, KeyError, TypeError):
+        expected = "a data frame, a structured array, or a mapping of names of columns to values"
+        raise InputError(
+            Fault(f"is a {type(table).__name__}, no table", "table-shape", name, expected=expected)
+        ) from None
     lengths = {each: column.shape for each, column in zip(names, columns, strict=True)}
     if not names or any(len(shape) != 1 for shape in lengths.values()) or len(set(lengths.values())) > 1:
         found = ", ".join(f"{each} {shape}" for each, shape in lengths.items()) or "no columns"
@@ -76,9 +85,26 @@ def _names(table: Any) -> list[Any]:  # noqa: ANN401 (data frames of any library
     """Return the names of the columns of a data frame, a structured array or a mapping."""
     if isinstance(table, np.ndarray):
         return list(table.dtype.names or ())
-    return list(table.columns if hasattr(table, "columns") else table)
+    for names in ("column_names", "columns"):  # arrow has both, the second are its values
+        if hasattr(table, names):
+            return list(getattr(table, names))
+    return list(table.keys())
+
+
+def _values(column: Any) -> np.ndarray[Any, Any]:  # noqa: ANN401 (columns of any library)
+    """Return a column as an array; in a list every value stays what it is, as one text makes no texts of all."""
+    return np.asarray(column, object) if isinstance(column, list | tuple) else np.asanyarray(column)
 
 
 def _cell(value: object) -> object:
     """Return nothing for what is not there."""
-    return None if value is None or (isinstance(value, float) and isnan(value)) else value
+    if value is None or (isinstance(value, float) and isnan(value)) or type(value).__name__ == "NAType":  # of pandas
+        return None
+    return value.decode("utf-8", "surrogateescape") if isinstance(value, bytes) else value
+
+
+def _encoded(text: str, file: str) -> bytes:
+    try:
+        return text.encode()
+    except UnicodeEncodeError:
+        raise InputError(Fault("is not valid Unicode text", "encoding", file)) from None

@@ -26,7 +26,7 @@ from photostrip.project.schema.ground import CameraPositions as CameraPositionsB
 from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
 from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.tables import Tables, check_tables, in_one_zone, read_tables
-from photostrip.project.yaml.document import COMMAND_LINE, Node, at_own_key
+from photostrip.project.yaml.document import NO_FILES, Node, at_own_key
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.references import check_references
 from photostrip.project.yaml.validation import valid_section
@@ -143,7 +143,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
 
 def _seen_from(file: str, folder: Path) -> str:
     """Path of a file relative to a folder, with slashes on every system; as it is where there is no way."""
-    if not file or file == COMMAND_LINE:
+    if not file or file in NO_FILES:
         return file
     try:
         return seen_from(file, folder)

@@ -55,10 +55,16 @@ def errors_of(frame: str, now: Floats, true: Floats) -> Floats:
             np.column_stack(to_geodetic.transform(each[:, 0], each[:, 1], each[:, 2], direction="INVERSE"))
             for each in (now, true)
         )
-    longitude, latitude, _ = np.radians(to_geodetic.transform(*true.T))
+    return (level_axes(true) @ (now - true)[:, :, None])[:, :, 0]
+
+
+def level_axes(geocentric: Floats) -> Floats:
+    """Give east, north, up at geocentric places as rows."""
+    to_geodetic = pyproj.Transformer.from_crs("EPSG:4978", "EPSG:4979", always_xy=True)
+    longitude, latitude, _ = np.radians(to_geodetic.transform(*geocentric.T))
     east = np.column_stack([-np.sin(longitude), np.cos(longitude), 0.0 * longitude])
     up = np.column_stack([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)])
-    return np.column_stack([((now - true) * axis).sum(axis=1) for axis in (east, np.cross(up, east), up)])
+    return np.stack([east, np.cross(up, east), up], axis=1)
 
 
 @pytest.mark.parametrize("frame", FRAMES)
@@ -96,7 +102,7 @@ def test_angles_between_true_and_found_orientation() -> None:
     assert found["max"] == pytest.approx(0.3, abs=1e-6)
 
 
-@pytest.mark.parametrize("frame", ["projected", "local", "north first"])
+@pytest.mark.parametrize("frame", ["projected", "local", "north first", "geocentric"])
 def test_errors_over_their_standard_deviations(frame: str) -> None:
     simulation, result = simulated(frame)
     found = photostrip.compare(result, simulation.truth).document
@@ -105,8 +111,12 @@ def test_errors_over_their_standard_deviations(frame: str) -> None:
     for block in nonempty(found["points"]):
         part = result.points.where(role=block["role"])
         now = np.column_stack([part[axis] for axis in "xyz"])
-        e = errors_of(frame, now, np.array([true[name] for name in part["id"]]))
+        then = np.array([true[name] for name in part["id"]])
+        e = errors_of(frame, now, then)
         c = result.covariance_of(part["id"].tolist())[:, order][:, :, order]
+        if frame == "geocentric":
+            axes = level_axes(then)
+            c = axes @ c @ axes.transpose(0, 2, 1)
         plan = np.array([one[:2] @ np.linalg.inv(cov[:2, :2]) @ one[:2] for one, cov in zip(e, c, strict=True)])
         height = e[:, 2] ** 2 / c[:, 2, 2]
         for name, squares, number in (("plan", plan, 2), ("height", height, 1)):

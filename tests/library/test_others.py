@@ -30,6 +30,23 @@ def test_a_result_against_its_baseline() -> None:
     assert loose.same
 
 
+def test_results_are_compared_as_mappings() -> None:
+    result, baseline = (
+        photostrip.read_result(FOLDER / "baseline.json"),
+        json.loads((FOLDER / "baseline.json").read_text(encoding="utf-8")),
+    )
+    assert repr(photostrip.compare(result, baseline)).endswith(
+        "of simulated-20 and the baseline agree within the tolerances.>"
+    )
+    assert photostrip.compare(baseline, result).same
+    with pytest.raises(photostrip.InputError, match=r"^the baseline: has no key `photostrip_result`"):
+        photostrip.compare(result, {"points": []})
+    with pytest.raises(
+        photostrip.InputError, match=r"compared with the baseline: the CRS is EPSG:32633; expected local"
+    ):
+        photostrip.compare(result, {**baseline, "frame": {**baseline["frame"], "crs": "local"}})
+
+
 def test_a_simulation_needs_no_files(tmp_path: Path) -> None:
     simulation = photostrip.simulate(
         {}, flight={"photos": 6}, gross_errors=[{"kind": "control", "point": "G05", "axis": "z", "size_m": 3.0}]
@@ -41,8 +58,10 @@ def test_a_simulation_needs_no_files(tmp_path: Path) -> None:
     simulation.write(tmp_path)
     assert photostrip.run(tmp_path / "project.yaml").document == result.document
     assert photostrip.compare(result, tmp_path / "truth.json").document["points"] == against.document["points"]
-    with pytest.raises(photostrip.InputError, match=r"flight.photos"):
+    with pytest.raises(photostrip.InputError, match=r"^override: flight.photos"):
         photostrip.simulate({}, flight={"photos": -1})
+    with pytest.raises(photostrip.InputError, match=r"^specification: flight.photos"):
+        photostrip.simulate({"flight": {"photos": -1}})
 
 
 @pytest.mark.parametrize(

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import csv
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import yaml
 
 import photostrip
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 SAMPLE = ROOT / "sample_data/simulated-20/project.yaml"
@@ -68,6 +71,22 @@ def test_overrides_are_those_of_the_command(simulation: photostrip.Simulation) -
     assert (again.run().document["adjustment"], again.name) == ("similarity", "other")
 
 
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ({"processing": {"adjustmnt": "bundle"}}, "override: processing.adjustmnt: the key `adjustmnt` is not known"),
+        ({"strips[0].camera": "none"}, "override: strips[0].camera: there is no camera `none`"),
+        ({"strips[7].camera": "film"}, "override: strips[7].camera: there is no element 7"),
+        ({"strips[0.camera": "film"}, "override: `strips[0.camera` sets nothing; expected a path of keys"),
+        ({"name": object()}, "override: name: holds a value that a project file cannot hold"),
+    ],
+)
+def test_a_fault_of_an_override_names_it_as_it_was_written(overrides: dict[str, Any], message: str) -> None:
+    with pytest.raises(photostrip.InputError) as refused:
+        photostrip.load(SAMPLE, **overrides)
+    assert str(refused.value).startswith(message)
+
+
 def test_a_name_with_a_dot_is_one_key(simulation: photostrip.Simulation) -> None:
     project, tables = in_memory(simulation)
     project["cameras"] = {"RC 30.1": project["cameras"]["film"]}
@@ -92,10 +111,73 @@ def test_a_project_in_memory_is_that_of_the_files(simulation: photostrip.Simulat
 
 
 def test_data_frames_are_tables(simulation: photostrip.Simulation) -> None:
-    pandas = pytest.importorskip("pandas")
+    pandas, pyarrow = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
     project, tables = in_memory(simulation)
-    framed = {name: pandas.DataFrame(table) for name, table in tables.items()}
-    assert photostrip.run(project, tables=framed).document == photostrip.run(project, tables=tables).document
+    expected = photostrip.load(project, tables=tables).loaded.inputs.observations
+    for table in (pandas.DataFrame(tables["images"]), pyarrow.table(tables["images"])):
+        found = photostrip.load(project, tables=tables | {"images": table}).loaded.inputs.observations
+        np.testing.assert_array_equal(found.xy, expected.xy)
+        assert found.point_ids == expected.point_ids
+
+
+@pytest.mark.parametrize(
+    "specification",
+    [
+        {"film": {"scale_ppm": 150}},
+        {"models": {"scale": 5000}},
+        {"flight": {"photos": 5, "strips": 2, "side_lap_percent": 35}, "gnss": {"use": True}},
+        {"control": {"second_crs": "EPSG:32634"}, "image": {"unit": "px"}, "camera": {"pixel_size": 0.02}},
+    ],
+    ids=["fiducial marks", "models", "strips and positions", "two frames, pixels"],
+)  # fmt: skip
+def test_every_kind_of_input_may_come_from_memory(specification: dict[str, Any]) -> None:
+    simulation = photostrip.simulate({"flight": {"photos": 5}} | specification)
+    project = yaml.safe_load(simulation.files["project.yaml"])
+    tables = {name: columns(text) for name, text in simulation.files.items() if name.endswith(".csv")}
+    overrides = {"processing": {"adjustment": "bundle"}} if "gnss" in specification else {}
+    found = photostrip.run(project, tables=tables, **overrides)
+    assert found.document == simulation.project.overridden(**overrides).run().document
+
+
+def spoilt(value: object) -> Callable[[list[Any]], Any]:
+    return lambda column: [*column[:3], value, *column[4:]]
+
+
+@pytest.mark.parametrize(
+    ("column", "change", "message"),
+    [
+        ("x", spoilt(float("nan")), "images:5:13: x: no value is given"),
+        ("x", lambda column: np.array(spoilt(np.nan)(column)), "images:5:13: x: no value is given"),
+        ("x", lambda column: np.ma.masked_equal(column, column[3]), "images:5:13: x: no value is given"),
+        ("x", spoilt(float("inf")), "images:5:13: x: `inf` is not a measured value"),
+        ("point", spoilt(None), "images:5:6: point: the point has no id"),
+        ("point", spoilt(float("nan")), "images:5:6: point: the point has no id"),
+        ("point", spoilt("\udcff"), "images: is not valid Unicode text"),
+        ("point", lambda column: [*column[:4], column[3], *column[5:]], "is already measured on photo"),
+        ("point", lambda column: column[:2], "columns of different shapes"),
+    ],
+)  # fmt: skip
+def test_what_is_not_there_or_twice_is_found_as_in_files(
+    simulation: photostrip.Simulation, column: str, change: Callable[[list[Any]], Any], message: str
+) -> None:
+    project, tables = in_memory(simulation)
+    images = tables["images"] | {column: change(tables["images"][column])}
+    with pytest.raises(photostrip.InputError, match=re.escape(message)):
+        photostrip.load(project, tables=tables | {"images": images})
+
+
+@pytest.mark.parametrize("table", [None, "photo,point", [[1, 2]], np.zeros((3, 4))])
+def test_what_is_no_table_is_refused(simulation: photostrip.Simulation, table: object) -> None:
+    project, tables = in_memory(simulation)
+    with pytest.raises(photostrip.InputError, match=r"images: (is a \w+, no table|has columns of different shapes)"):
+        photostrip.load(project, tables=tables | {"images": table})
+
+
+def test_texts_may_be_bytes(simulation: photostrip.Simulation) -> None:
+    project, tables = in_memory(simulation)
+    as_bytes = tables["images"] | {"point": np.array(tables["images"]["point"]).astype("S12")}
+    found = photostrip.load(project, tables=tables | {"images": as_bytes}).loaded.inputs.observations
+    assert found.point_ids == photostrip.load(project, tables=tables).loaded.inputs.observations.point_ids
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import pickle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -90,6 +91,40 @@ def test_some_rows_of_a_table(result: photostrip.Result) -> None:
         _ = result.points["sigma_zz"]
 
 
+def test_rows_are_taken_as_of_an_array(result: photostrip.Result) -> None:
+    points = result.points
+    assert points[1] == list(points)[1]
+    assert points[-1] == list(points)[-1]
+    assert list(points[2:5]["id"]) == list(points["id"][2:5])
+    assert list(points[points["rays"] > 2]["id"]) == [row["id"] for row in points if row["rays"] > 2]
+    assert list(points[[3, 1]]["id"]) == [points["id"][3], points["id"][1]]
+    assert (len(points[[]]), points[:0].columns) == (0, points.columns)
+    assert set(points.where(role=("check", "control"))["role"]) == {"check", "control"}
+    with pytest.raises(IndexError):
+        _ = points[len(points)]
+
+
+def test_nobody_changes_the_table_of_another(result: photostrip.Result) -> None:
+    part = result.points[:4]
+    for column in (result.points["x"], part["x"], result.points.where(role="check")["id"]):
+        with pytest.raises(ValueError, match="read-only"):
+            column[0] = 0
+    part.units["x"] = "ft"  # type: ignore[index]
+    assert result.points.units["x"] == "m"
+    again = pickle.loads(pickle.dumps(result))  # noqa: S301 (our own)
+    assert (again.document, repr(again.points)) == (result.document, repr(result.points))
+
+
+def test_columns_without_values_keep_their_kind() -> None:
+    found = photostrip.run(SAMPLE, processing={"precision": False, "adjustment": "polynomial"})
+    assert np.isnan(found.points["sigma_x"]).all()
+    assert "nan" not in found.points._repr_html_()
+    nothing = photostrip.Result({**found.document, "findings": []}).findings
+    kinds = {name: nothing[name].dtype.kind for name in ("code", "line", "accepted", "points")}
+    assert kinds == {"code": "O", "line": "i", "accepted": "b", "points": "O"}
+    assert nothing._repr_html_().endswith("<tbody></tbody></table>")
+
+
 def test_a_table_shows_itself(result: photostrip.Result) -> None:
     assert repr(result.residuals) == "<residuals: 469 rows; strip, photo, point, vx_um [um], vy_um [um], used>"
     page = result.residuals._repr_html_()
@@ -111,6 +146,9 @@ def test_tables_become_data_frames(result: photostrip.Result) -> None:
     assert list(frame.columns) == list(result.points.columns)
     assert frame.attrs["units"]["x"] == "m"
     np.testing.assert_array_equal(frame["x"].to_numpy(), result.points["x"])
+    frame.loc[0, "x"] = 0.0  # its own copy
+    assert result.points["x"][0] > 0
+    assert result.findings.to_pandas().shape == (0, len(result.findings.columns))
 
 
 def test_tables_become_arrow_tables(result: photostrip.Result) -> None:
@@ -119,6 +157,9 @@ def test_tables_become_arrow_tables(result: photostrip.Result) -> None:
     assert table.num_rows == len(result.points)
     assert table.schema.field("x").metadata[b"unit"] == b"m"
     assert table.column("rays").to_pylist() == result.points["rays"].tolist()
+    empty = result.points.where(id="none").to_arrow()
+    assert empty.schema.types == table.schema.types
+    assert str(result.notes.to_arrow().schema.field("message").type) == "string"
 
 
 def test_covariances_are_those_of_the_table(result: photostrip.Result) -> None:
@@ -150,6 +191,8 @@ def test_joint_covariances_hold_those_of_the_points(adjustment: str, crs: str) -
     assert (np.linalg.eigvalsh(full[:12, :12]) > 0).all()
     near = joint[0, :, 0] + joint[2, :, 2] - joint[0, :, 2] - joint[2, :, 0]
     assert np.trace(near) < np.trace(own[0] + own[2])  # neighbours err alike
+    np.testing.assert_allclose(found.covariance_of("K08", joint=True), joint[2, :, 2], rtol=1e-9)
+    assert found.covariance_of([], joint=True).shape == (0, 3, 0, 3)
 
 
 def test_the_check_test_of_the_run_is_made_of_the_same_joint_covariances(bundle: photostrip.Result) -> None:

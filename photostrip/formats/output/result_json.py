@@ -106,16 +106,16 @@ def read_document(file: str, key: str) -> Document:
     document = parsed(file)
     if isinstance(document, dict) and key in document:
         return document
-    return _result(document, file)
+    return checked(document, file)
 
 
 def read_result(file: str) -> Document:
     """Read a result.json, or raise what keeps it from being one."""
-    return _result(parsed(file), file)
+    return checked(parsed(file), file)
 
 
-def _result(document: Any, file: str) -> Document:  # noqa: ANN401 (any JSON)
-    """Check what was read."""
+def checked(document: Any, file: str) -> Document:  # noqa: ANN401 (any JSON)
+    """Return a result that was read from a file, or is called that, or raise what keeps it from being one."""
     if not isinstance(document, dict) or "photostrip_result" not in document:
         refuse(file, "result-kind", "has no key `photostrip_result`", expected="a result.json of photostrip")
     if document["photostrip_result"] != SCHEMA:

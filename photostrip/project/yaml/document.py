@@ -13,7 +13,9 @@ from photostrip.errors import Fault
 from photostrip.formats.text.numbers import shown
 from photostrip.notes import Note
 
-COMMAND_LINE = "--set"  # the place of values that stand in no file
+COMMAND_LINE = "--set"  # the place of values that the command line sets
+OVERRIDE = "override"  # the place of those that a script sets
+NO_FILES = frozenset({COMMAND_LINE, OVERRIDE})
 _STEP = re.compile(r'(?:^|\.)(?:"([^"]*)"|([^."\[\]]+))|\[([0-9]{1,6})\]')
 _PLAIN_NAME = re.compile(r"[\w-]+")
 
@@ -46,6 +48,17 @@ class Place:
     def note(self, code: str, message: str, severity: str = "note", *, key: str = "") -> Note:
         """Make a note that stands here."""
         return Note(code, message, severity, file=self.file, line=self.line, column=self.column, key=key)
+
+
+class Override(str):
+    """An assignment ``path=value`` of a script; others are of the command line."""
+
+    __slots__ = ()
+
+
+def place_of(assignment: str) -> Place:
+    """Return the place of what an assignment sets."""
+    return Place(OVERRIDE if isinstance(assignment, Override) else COMMAND_LINE)
 
 
 @dataclass(slots=True, eq=False)

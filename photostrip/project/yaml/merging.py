@@ -1,4 +1,4 @@
-"""One project from several sources: what ``extends`` brings, what the file says, what ``--set`` overrides."""
+"""One project from several sources: what ``extends`` brings, what the file says, what overrides set."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
-from photostrip.errors import Fault
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import shown
-from photostrip.project.yaml.document import COMMAND_LINE, Node, Path, Place, at_key, fault_at, steps
+from photostrip.project.yaml.document import NO_FILES, OVERRIDE, Node, Path, Place, at_key, fault_at, place_of, steps
 from photostrip.project.yaml.parsing import parse, read_document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from photostrip.errors import Fault
 
 LONGEST_CHAIN = 8
 
@@ -22,9 +23,9 @@ LONGEST_CHAIN = 8
 def path_of(node: Node, project: str) -> str:
     """Return the path of the file that a value names, as the user could type it.
 
-    Values from the command line are relative to the project file.
+    Values that stand in no file are relative to the project file.
     """
-    owner = project if node.place.file == COMMAND_LINE else node.place.file
+    owner = project if node.place.file in NO_FILES else node.place.file
     return str(FilePath(owner).parent / node.text)  # `..` stays: behind a link it does not cancel the folder before it
 
 
@@ -93,24 +94,24 @@ def override(root: Node, assignments: Sequence[str], findings: Findings) -> Node
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         path = steps(name.strip())
-        place = Place(COMMAND_LINE)
+        place = place_of(assignment)
         if not equals or not path:
-            message = f"`{shown(assignment)}` sets nothing"
-            fault = Fault(message, "set", COMMAND_LINE, expected="key.path=value, as in observations.sigma=0.004")
-            findings.add(fault)
+            typed, expected = assignment, "key.path=value, as in observations.sigma=0.004"
+            if place.file == OVERRIDE:
+                typed, expected = name, "a path of keys, as in strips[0].camera"
+            findings.add(place.fault(f"`{shown(typed)}` sets nothing", "set", expected=expected))
             continue
         if path == ("extends",):
-            message = "`extends` cannot be set on the command line"
-            findings.add(Fault(message, "set", COMMAND_LINE, fix="set the keys themselves"))
+            findings.add(place.fault("`extends` cannot be set", "set", fix="set the keys themselves"))
             continue
-        value = parse(text, COMMAND_LINE, findings)
+        value = parse(text, place.file, findings)
         if value is not None:
             root = _assigned(root, path, _moved(value, place), name, findings)
     return root
 
 
 def _moved(node: Node, place: Place) -> Node:
-    """Return a tree from the command line one place, without a line."""
+    """Return a tree that stands in no file one place, without a line."""
     if isinstance(node.value, list):
         return Node([_moved(each, place) for each in node.value], place)
     if isinstance(node.value, dict):
@@ -131,10 +132,12 @@ def _assigned(root: Node, path: Path, value: Node, name: str, findings: Findings
             elements[number] = _assigned(elements[number], rest, value, name, findings)
             return Node(elements, root.place)
         message = f"there is no element {step} in a list of {len(root.value)}"
-        findings.add(Fault(message, "set", COMMAND_LINE, key=name, expected="a number, the first element being 0"))
+        expected = "a number, the first element being 0"
+        findings.add(value.place.fault(message, "set", key=name, expected=expected))
         return root
     if isinstance(root.value, str) and root.value:
-        findings.add(Fault(f"there is nothing below the value `{shown(root.value)}`", "set", COMMAND_LINE, key=name))
+        message = f"there is nothing below the value `{shown(root.value)}`"
+        findings.add(value.place.fault(message, "set", key=name))
         return root
     key = str(step)
     inner = root.entries.get(key, Node({} if rest else "", value.place))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.frozen import dataclass
-from photostrip.project.yaml.document import COMMAND_LINE, Node, Path, fault_at
+from photostrip.project.yaml.document import NO_FILES, Node, Path, fault_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -188,7 +188,7 @@ def _units_of_sigma(root: Node) -> Iterator[Fault]:
     """Refuse a standard deviation that would take its unit from another file, as when a preset changes below it."""
     for section in ("observations", "fiducial_measurements"):
         sigma, unit = root.find(section, "sigma"), root.find(section, "unit")
-        if sigma is None or unit is None or sigma.place.file in {unit.place.file, COMMAND_LINE}:
+        if sigma is None or unit is None or sigma.place.file in NO_FILES | {unit.place.file}:
             continue
         message = f"sigma stands in {sigma.place.file}, its unit in {unit.place.file}"
         yield fault_at(root, (section, "sigma"), message, "unit-elsewhere", fix="write both in one file")
