@@ -295,6 +295,11 @@ def distance_without_format(case: Case) -> Planted | None:
     return without_format(with_camera(case, 0.1)), NOBODY
 
 
+def ten_distances_without_format(case: Case) -> Planted | None:
+    """Give ten times the principal distance, without a format; seen in pairs and in the heights of the control."""
+    return (without_format(with_camera(case, 10.0)), NOBODY) if seen_in_heights(case, 0.9) else None
+
+
 def unit_of_one(case: Case) -> Planted | None:
     """Give one photo in micrometres."""
     photo = str(case.rng.choice(case.photos))
@@ -900,6 +905,7 @@ MISTAKES = (
     Mistake("image coordinates in another unit", unit, ("P101",)),
     Mistake("ten times too large, no format", unit_without_format, ("P101",)),
     Mistake("a tenth of the principal distance, no format", distance_without_format, ("P101",)),
+    Mistake("ten principal distances, no format", ten_distances_without_format, ("P101", "P105")),
     Mistake("one photo in another unit", unit_of_one, ("P102",)),
     Mistake("y down read as y up", y_down, ("P103", "P401")),
     Mistake("negatives read as positives", negatives, ("P103", "P401")),
@@ -925,6 +931,7 @@ MISTAKES = (
     Mistake("camera positions that drift", positions_drifting, ("P208",), sound, "bundle"),
     Mistake("one id for two points", same_id, ("P301",)),
     Mistake("one id for two points of two strips", same_id_in_two_strips, ("P301",), block),
+    Mistake("one id for two points of two strips, bundle", same_id_in_two_strips, ("P301",), block, "bundle"),
     Mistake("two ids for one point", two_ids, ("P302",)),
     Mistake("axes of the control exchanged", axes_exchanged, ("P401", "P103")),
     Mistake("an axis of a local system backwards", left_handed, ("P401",)),

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
+from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Set as AbstractSet
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
@@ -67,13 +70,39 @@ class MeanPoints(NamedTuple):
     xyz: Floats  # (n, 3): mean over the strips that hold them, Cartesian frame, metres
 
 
-def mean_points(strips: Sequence[StripResult]) -> MeanPoints:
-    """Mean of every point over the strips that hold it."""
-    point = np.concatenate([strip.formed.point for strip in strips])
-    cartesian = np.concatenate([strip.cartesian for strip in strips])
+def mean_points(strips: Sequence[StripResult], strangers: Mapping[str, AbstractSet[int]] | None = None) -> MeanPoints:
+    """Mean of every point over the strips that hold it.
+
+    strangers: points by strip that do not count there.
+    """
+    none: AbstractSet[int] = frozenset()
+    held = [~np.isin(each.formed.point, list((strangers or {}).get(each.strip.id, none))) for each in strips]
+    point = np.concatenate([strip.formed.point[rows] for strip, rows in zip(strips, held, strict=True)])
+    cartesian = np.concatenate([strip.cartesian[rows] for strip, rows in zip(strips, held, strict=True)])
     number, inverse = np.unique(point, return_inverse=True)
     sums = np.column_stack([np.bincount(inverse, column) for column in cartesian.T])
     return MeanPoints(number, np.asarray(sums / np.bincount(inverse)[:, None], float))
+
+
+def compared_strips(strips: Sequence[StripResult], point_ids: Sequence[str]) -> Iterator[TiesOfStrips]:
+    """Compare strips two and two at their common points, before anything joins them."""
+    for one, other in combinations(strips, 2):
+        number, at_one, at_other = np.intersect1d(one.formed.point, other.formed.point, return_indices=True)
+        frame = one.intermediate
+        first, second = (
+            frame.intermediate_from_cartesian(strip.cartesian[rows])
+            for strip, rows in ((one, at_one), (other, at_other))
+        )
+        yield TiesOfStrips(
+            points=number,
+            names=tuple(point_ids[each] for each in number.tolist()),
+            plan=first[:, :2],
+            difference=(second - first)[:, :2],
+            rays=np.minimum(one.rays[at_one], other.rays[at_other]),
+            sigma=float(np.hypot(one.precision[0], other.precision[0])),
+            depth=min(one.depth, other.depth),
+            strips=(one.strip.id, other.strip.id),
+        )
 
 
 def _joined(strips: Sequence[StripResult], point_ids: Sequence[str], output: GroundFrame) -> Adjusted:

@@ -10,7 +10,8 @@ import numpy as np
 from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+    from collections.abc import Set as AbstractSet
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
@@ -224,6 +225,7 @@ class BlockStart:
     centers: Floats
     rotations: Floats
     points: Floats  # (q, 3): all points of the observations; NaN where one has no coordinates
+    strangers: Mapping[str, AbstractSet[int]]  # points by strip whose ids stand for other points in a strip before
     rough: Flags  # (m,): photos that stand as they were given, with too few known points to orient them
     free: bool  # whether nothing ties the block to the ground: its frame and scale are those of the first strip
 

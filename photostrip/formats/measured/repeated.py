@@ -20,6 +20,7 @@ MOST_SHARE = 0.5  # disagree for one reason
 REACH_SHARE = 0.98  # of the coordinates
 AGREEING_SHARE = 3e-4  # of what coordinates reach to: 30 micrometres of 100 mm
 FARTHEST = 10.0  # standard deviations from the mean; beyond, two measurements are not of one point
+DECIMALS = 9  # of the unit of a table: what is left beyond is rounding
 
 
 def refuse(read: Measurements, target: str, findings: Findings) -> None:
@@ -139,6 +140,7 @@ def _spread(read: Measurements, target: str, off: Floats, count: Numbers) -> Not
     """Tell how well repeated measurements agree."""
     several = count > 1
     freedom = int((count[several] - 1).sum())
+    off = np.round(off, DECIMALS)
     scatter = np.sqrt((off**2).sum(axis=0) / freedom)
     worst = int(np.abs(off).max(axis=1).argmax())
     name, photo = read.target_ids[read.target[worst]], read.photo_ids[read.photo[worst]]

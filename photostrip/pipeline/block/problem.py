@@ -292,6 +292,10 @@ def _begin(
     loose = np.isin(images.point, images.point[start.rough[images.photo]]) & np.isfinite(miss)
     if loose.any():  # what an orientation that is only given approximately misses says nothing of the rays
         far[loose] = np.maximum(far[loose], FAR * np.median(miss[loose]))
+    for strip in start.strips:
+        if strangers := start.strangers.get(strip.strip.id):
+            of_strip = np.isin(images.photo, start.rows_of(strip.strip.photos))
+            inside &= ~(of_strip & np.isin(images.point, list(strangers)))
     whole = Selection.everything(problem)
     given = whole.control.copy()
     wrong = {strip.control.ids[each.row]: list(each.axes) for strip in start.strips for each in strip.wrong_control}

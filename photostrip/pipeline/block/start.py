@@ -23,18 +23,20 @@ from photostrip.pipeline.block.datum import (
     datum,
     join_waiting,
 )
-from photostrip.pipeline.common_points import mean_points
+from photostrip.pipeline.common_points import compared_strips, mean_points
 from photostrip.pipeline.given_points import cartesian_of
 from photostrip.pipeline.results import BlockStart, StripResult
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.triangulation.plausibility.photos.tied_strips import odd_ties
 from photostrip.triangulation.resection.closed_form import approximate
 from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.resection.ray_intersection import intersect_points
 from photostrip.triangulation.resection.resection import resect
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+    from collections.abc import Set as AbstractSet
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.inputs import Inputs, Settings
@@ -153,7 +155,8 @@ def _together(
     inputs: Inputs, strips: tuple[StripResult, ...], observations: PhotoPoints, known: Known, *, free: bool
 ) -> BlockStart:
     """Orientations of all photos, single ones included, and all points."""
-    points = _mean_points(strips, len(observations.point_ids))
+    strangers = _strangers(strips, observations.point_ids)
+    points = _mean_points(strips, len(observations.point_ids), strangers)
     oriented: dict[str, tuple[Floats, Floats]] = {}
     for strip in strips:
         centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
@@ -181,16 +184,27 @@ def _together(
         centers=centers,
         rotations=rotations,
         points=points,
+        strangers=strangers,
         rough=np.array([name in rough for name in names], bool),
         free=free,
     )
 
 
-def _mean_points(strips: Sequence[StripResult], count: int) -> Floats:
+def _strangers(strips: Sequence[StripResult], point_ids: Sequence[str]) -> dict[str, set[int]]:
+    """Points by strip whose ids stand for other points in a strip before: at a place between them no ray goes."""
+    found: dict[str, set[int]] = {}
+    for ties in compared_strips(strips, point_ids):
+        odd, (one, other) = odd_ties(ties), ties.strips
+        points = [] if odd is None else ties.points[odd.rows].tolist()
+        found.setdefault(other, set()).update(set(points) - found.get(one, set()))
+    return found
+
+
+def _mean_points(strips: Sequence[StripResult], count: int, strangers: Mapping[str, AbstractSet[int]]) -> Floats:
     """Mean of the points over the strips; NaN for points of none."""
     found = np.full((count, 3), np.nan)
     if strips:
-        number, xyz = mean_points(strips)
+        number, xyz = mean_points(strips, strangers)
         found[number] = xyz
     return found
 

@@ -43,9 +43,9 @@ MOST_PHOTOS = 40  # photos: a longer strip would take too long
 MOST_POINTS = (
     20_000  # image points of all strips formed for trials: of 20 photos with 200 points two starts are followed
 )
-FACTOR_RANGE = (0.2, 5.0)  # of the principal distance given
+FACTOR_RANGE = (0.05, 5.0)  # of the principal distance given
 FIX = "take it from the certificate"
-FIRST_FACTORS = (1.4, 0.7, 2.0, 0.5)  # tried when the pairs cannot be oriented at all
+FIRST_FACTORS = (1.4, 0.7, 2.0, 0.5, 0.1)  # tried when the pairs cannot be oriented at all
 
 
 class DistanceTrial(NamedTuple):

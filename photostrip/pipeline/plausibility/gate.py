@@ -7,13 +7,13 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
+from photostrip.pipeline.common_points import compared_strips
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.plausibility import (
     control_layout,
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
-    from photostrip.pipeline.results import Result, StripResult
+    from photostrip.pipeline.results import Result
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.independent_models.formation import FormedModels
 
@@ -86,7 +86,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each in formed:
         findings += _of_formed(each, points)
-    findings += _of_ties(stages, points)
+    for ties in compared_strips(stages, points.point_ids):
+        findings += tied_strips.find_shared_ids_of_strips(ties)
     findings += given_cameras.centers(inputs, points, images.strips, directory)
     findings += _of_rotations(result, formed, directory)
     if result.bundle is not None:
@@ -231,29 +232,6 @@ def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     findings += identity.find_shared_ids(each.orientation, whole, names, strip.photos, sigma, strip.id)
     focal = strip.camera.principal_distance
     findings += identity.find_double_ids(observations, formed, focal, strip.photos, strip.id, sigma)
-    return findings
-
-
-def _of_ties(strips: Sequence[StripResult], observations: PhotoPoints) -> list[Finding]:
-    """Compare strips with each other at their common points, before anything joins them."""
-    findings: list[Finding] = []
-    for one, other in combinations(strips, 2):
-        number, at_one, at_other = np.intersect1d(one.formed.point, other.formed.point, return_indices=True)
-        frame = one.intermediate
-        first, second = (
-            frame.intermediate_from_cartesian(strip.cartesian[rows])
-            for strip, rows in ((one, at_one), (other, at_other))
-        )
-        ties = tied_strips.TiesOfStrips(
-            names=tuple(observations.point_ids[each] for each in number.tolist()),
-            plan=first[:, :2],
-            difference=(second - first)[:, :2],
-            rays=np.minimum(one.rays[at_one], other.rays[at_other]),
-            sigma=float(np.hypot(one.precision[0], other.precision[0])),
-            depth=min(one.depth, other.depth),
-            strips=(one.strip.id, other.strip.id),
-        )
-        findings += tied_strips.find_shared_ids_of_strips(ties)
     return findings
 
 

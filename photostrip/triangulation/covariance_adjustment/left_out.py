@@ -43,9 +43,11 @@ def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[LeftOut]:
 
 
 def _predicted(cofactors: Floats, correlates: Floats) -> LeftOut:
-    size = np.sqrt(np.maximum(np.diag(cofactors), np.finfo(float).tiny))
-    scaled = cofactors / size / size[:, None]
-    if np.linalg.eigvalsh(scaled)[0] < UNCHECKED:
-        return LeftOut(np.full(len(correlates), np.inf), np.inf)
-    errors = np.linalg.solve(scaled, correlates / size) / size
-    return LeftOut(np.asarray(errors, float), float(errors @ correlates))
+    square = np.diag(cofactors)
+    if (square > 0.0).all():
+        size = np.sqrt(square)
+        scaled = cofactors / size / size[:, None]
+        if np.linalg.eigvalsh(scaled)[0] >= UNCHECKED:
+            errors = np.linalg.solve(scaled, correlates / size) / size
+            return LeftOut(np.asarray(errors, float), float(errors @ correlates))
+    return LeftOut(np.full(len(correlates), np.inf), np.inf)

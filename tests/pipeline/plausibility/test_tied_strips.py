@@ -12,6 +12,7 @@ from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
 from photostrip.simulation import Control, Flight, GrossError, Points, Spec
 from photostrip.simulation.simulation import simulate
+from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips, find_shared_ids_of_strips
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -53,16 +54,31 @@ def with_shared_ids(simulation: Simulation, inputs: Inputs, count: int, distance
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["polynomial", "bundle"])
-def test_ids_that_two_strips_share_by_mistake_are_named(method: str) -> None:
-    """Three ids for points 50 m apart: the run was called good, and ties lay 50 m from each other."""
+@pytest.mark.parametrize(("method", "apart"), [("polynomial", 50.0), ("bundle", 50.0), ("bundle", 800.0)])
+def test_ids_that_two_strips_share_by_mistake_are_named(method: str, apart: float) -> None:
+    """Three ids for points 50 m apart: the run was called good; 800 m apart, a bundle did not converge."""
     simulation = simulate(SPEC)
-    inputs, names = with_shared_ids(simulation, inputs_of(simulation), 3, 50.0)
+    inputs, names = with_shared_ids(simulation, inputs_of(simulation), 3, apart)
     result = triangulate(inputs, replace(settings_of(simulation), adjustment=method))
     found = [each for each in result.findings if each.code == "P301"]
     assert {name for each in found for name in each.points} == names
     assert {each.strips for each in found} == {("A", "B")}
-    assert all(40.0 < float(each.evidence["distance_m"]) < 60.0 for each in nonempty(found))
+    assert all(0.8 < float(each.evidence["distance_m"]) / apart < 1.2 for each in nonempty(found))
+
+
+@pytest.mark.parametrize(("off", "named"), [(10.0, 0), (500.0, 1)])
+def test_a_single_common_point_is_judged_by_the_flying_height(off: float, named: int) -> None:
+    ties = TiesOfStrips(
+        points=np.array([7]),
+        names=("P7",),
+        plan=np.zeros((1, 2)),
+        difference=np.array([[0.0, off]]),
+        rays=np.array([2]),
+        sigma=0.1,
+        depth=1000.0,
+        strips=("A", "C"),
+    )
+    assert [each.points for each in find_shared_ids_of_strips(ties)] == [("P7",)] * named
 
 
 @pytest.mark.parametrize("size", [0.0, 150.0, 400.0])

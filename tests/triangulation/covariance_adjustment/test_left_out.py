@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from photostrip.triangulation.covariance_adjustment import conditions, prediction, system
-from photostrip.triangulation.covariance_adjustment.left_out import left_out_errors
+from photostrip.triangulation.covariance_adjustment.left_out import _predicted, left_out_errors
 from tests.derivatives import errors_of
 from tests.loops import nonempty
 from tests.triangulation.covariance_adjustment.test_covariance_adjustment import noisy
@@ -43,4 +43,10 @@ def test_control_that_alone_holds_the_strip_cannot_be_predicted() -> None:
     given = strip.absolute.misclosures[some.point, some.axis]
     wanted = conditions.conditions(found.errors, strip.of_photos.orientation, strip.of_photos.formed, some, given)
     (left_out,) = left_out_errors(system.system(found.errors, wanted, 1.0), [np.arange(6)])
+    assert not np.isfinite(left_out.errors).any()
+
+
+def test_a_coordinate_of_no_information_cannot_be_predicted() -> None:
+    """Image coordinates in another unit left such a one, and a warning of numpy in the user's face."""
+    left_out = _predicted(np.array([[0.0, 1e-9], [1e-9, 1.0]]), np.ones(2))
     assert not np.isfinite(left_out.errors).any()

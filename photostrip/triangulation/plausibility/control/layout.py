@@ -76,7 +76,7 @@ def find_line(
     if breadth > LEAST_BREADTH:
         return
     message = (
-        f"{what}: its control lies on one line, {100 * breadth:.2g} % of half the breadth of "
+        f"{what}: its control lies on one line, {100 * breadth:.1f} % of half the breadth of "
         f"{'a' if len(strips) > 1 else 'the'} strip to either side: an error of a height turns the "
         f"{'block' if len(strips) > 1 else 'strip'} about it"
     )

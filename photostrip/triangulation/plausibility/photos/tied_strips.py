@@ -6,7 +6,7 @@ function of the place. What lies far off it is no error of a strip.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 LEAST_TIES = 1 + LEAST_REDUNDANCY  # a shift fits one tie
 TWO_RAYS = 2
 MANY_RAYS_SHARE = 0.002  # of the flying height: of thousands of ties some are worse than the others
+FEW_TIES_SHARE = 0.05  # of the flying height: so far apart no two strips on the ground put a point
 ONE_RAY_SHARE = 0.01  # of the flying height: an image coordinate along the base that is off by a millimetre moves less
 
 
@@ -30,6 +31,7 @@ ONE_RAY_SHARE = 0.01  # of the flying height: an image coordinate along the base
 class TiesOfStrips:
     """Points that two strips have in common, in a level plane."""
 
+    points: Numbers  # (t,): as numbered in the observations
     names: tuple[str, ...]
     plan: Floats  # (t, 2): their places, metres
     difference: Floats  # (t, 2): where the second strip puts them minus where the first does, metres
@@ -39,32 +41,55 @@ class TiesOfStrips:
     strips: tuple[str, str]
 
 
-def find_shared_ids_of_strips(ties: TiesOfStrips) -> Iterator[Finding]:
-    """Find ids of two points by the ties of two strips in plan.
+class OddTies(NamedTuple):
+    """Ties that do not go with the others."""
+
+    rows: Numbers  # those
+    far: Floats  # (t,): how far each tie is off, metres
+    limit: Floats  # (t,): how far chance may bring it, metres
+
+
+def odd_ties(ties: TiesOfStrips) -> OddTies | None:
+    """Find the ties of two points by their places in plan; None where nothing is odd at first sight.
 
     A wrong image coordinate along the base moves a point of two rays, and nothing in its strip shows it.
     """
     if len(ties.names) < LEAST_TIES:
-        return
+        return _of_few(ties)
     place, off = ties.plan[:, 0] + 1j * ties.plan[:, 1], ties.difference[:, 0] + 1j * ties.difference[:, 1]
     least = np.where(ties.rays > TWO_RAYS, MANY_RAYS_SHARE, ONE_RAY_SHARE) * ties.depth
     middle = complex(np.median(off.real), np.median(off.imag))
     if (np.abs(off - middle) <= least).all():
-        return  # none is far from the others even if the strips share no bend
+        return None  # none is far from the others even if the strips share no bend
     local = (place - place.mean()) / max(float(np.abs(place - place.mean()).max()), 1e-9)
     columns = [np.ones_like(local), local, np.conj(local), local**2, np.abs(local) ** 2, np.conj(local) ** 2]
     _, fit = fit_simplest(columns, 1, off, np.ones(len(off), bool), ties.sigma)
     far = np.abs(fit.residual)
+    return OddTies(np.flatnonzero(fit.odd & (far > least)), far, fit.limit)
+
+
+def _of_few(ties: TiesOfStrips) -> OddTies:
+    far = np.hypot(*ties.difference.T)
+    limit = np.full(len(far), FEW_TIES_SHARE * ties.depth)
+    return OddTies(np.flatnonzero(far > limit), far, limit)
+
+
+def find_shared_ids_of_strips(ties: TiesOfStrips) -> Iterator[Finding]:
+    """Find ids of two points by the ties of two strips."""
+    odd = odd_ties(ties)
+    if odd is None:
+        return
     one, other = ties.strips
-    for row in np.flatnonzero(fit.odd & (far > least)).tolist():
+    for row in odd.rows.tolist():
+        far = float(odd.far[row])
         message = (
-            f"point {ties.names[row]} stands for two points: strip {other} puts it {far[row]:.4g} m away from where "
-            f"strip {one} puts it; half of the other common points agree within {_others(far, row):.2g} m"
+            f"point {ties.names[row]} stands for two points: strip {other} puts it {far:.4g} m away from where "
+            f"strip {one} puts it{_others(np.delete(odd.far, row))}"
         )
-        evidence = {"distance_m": float(far[row]), "limit_m": float(fit.limit[row])}
+        evidence = {"distance_m": far, "limit_m": float(odd.limit[row])}
         fix = f"give it another id on the photos of strip {other}"
         yield found("P301", message, fix, evidence, points=(ties.names[row],), strips=ties.strips)
 
 
-def _others(far: Floats, row: int) -> float:
-    return float(np.median(np.delete(far, row)))
+def _others(far: Floats) -> str:
+    return f"; half of the other common points agree within {np.median(far):.2g} m" if len(far) else ""
