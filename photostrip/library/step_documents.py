@@ -19,9 +19,11 @@ if TYPE_CHECKING:
     Document = dict[str, Any]
 
 MICROMETRES = 1000.0  # in a millimetre
+MILLION = 1e6
 DIGITS = 10  # of values: more than any measurement has
 SYSTEM = "omega-phi-kappa"
 XYZ = "xyz"
+OF = {"interior": "mark", "chain": "photo"}  # what a row stands for; else a point
 
 
 def interior_document(ids: Sequence[str], found: Interior) -> Document:
@@ -69,6 +71,30 @@ def absolute_document(ids: Sequence[str], found: Absolute, unit: str) -> Documen
     values += _angles(similarity.rotation)
     columns = [(f"v{axis}", unit, 4, found.residuals[:, k]) for k, axis in enumerate(XYZ)]
     return _document("absolute", [*values, *_fit(found.sigma0, unit, found.redundancy)], ids, columns)
+
+
+def chain_document(ids: Sequence[str], rotations: Floats) -> Document:
+    """Return the angles of the photos in the strip."""
+    turned = np.degrees(np.array([angles(each, SYSTEM) for each in rotations]))
+    columns = [(name, "deg", 6, turned[:, k]) for k, name in enumerate(SYSTEM.split("-"))]
+    return _document("chain", [], ids, columns)
+
+
+def scale_document(ids: Sequence[str], factor: float, departures: Floats) -> Document:
+    """Return the factor of the second model, and what each point departs from it, in parts of a million."""
+    rms = float(np.sqrt((departures**2).mean()))
+    values = [_value("k", factor), _value("rms departure", rms * MILLION, "ppm")]
+    return _document("scale", values, ids, [("departure", "ppm", 1, departures * MILLION)])
+
+
+def polynomial_document(
+    ids: Sequence[str], terms: Sequence[str], coefficients: Floats, residuals: Floats, unit: str
+) -> Document:
+    """Return the coefficients of a polynomial, and what it leaves."""
+    values = [_value(term, coefficient) for term, coefficient in zip(terms, coefficients, strict=True)]
+    redundancy = len(ids) - len(values)
+    sigma0 = float(np.sqrt((residuals**2).sum() / redundancy)) if redundancy > 0 else float("nan")
+    return _document("polynomial", [*values, *_fit(sigma0, unit, redundancy)], ids, [("v", unit, 4, residuals)])
 
 
 def resection_document(ids: Sequence[str], found: OrientedPhoto, unit: str) -> Document:
@@ -120,6 +146,7 @@ def _document(
         "photostrip_step": 1,
         "step": step,
         "values": values,
+        "of": OF.get(step, "point"),
         "columns": [{"name": name, "unit": unit, "decimals": decimals} for name, unit, decimals, _ in listed],
         "points": [list(row) for row in zip(ids, *numbers, strict=True)],
     }

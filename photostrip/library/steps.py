@@ -3,7 +3,7 @@
 Image coordinates are millimetres, x to the right and y up, reduced to the principal point but in ``interior`` and
 ``refine``; the principal distance is in millimetres, angles in radians. Models have the unit of the base that is given;
 ground coordinates are Cartesian, metres: tangent plane, geocentric, or a map where its curvature does not matter.
-Rotations take image axes, or those of a model, to the axes named beside them. ``photostrip.run`` is the bundle.
+Rotations take image axes, or those of a model, to the axes named beside them.
 """
 
 from __future__ import annotations
@@ -17,9 +17,18 @@ from photostrip.frozen import dataclass
 from photostrip.geometry import plane
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.triangulation.bundle.observations.problem import (
+    BundleCameras,
+    BundleProblem,
+    ControlObservations,
+    ImageObservations,
+    StartValues,
+)
+from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
+from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
 from photostrip.triangulation.image_coordinates.refraction import refraction_constant
-from photostrip.triangulation.polynomial.terms import columns
+from photostrip.triangulation.polynomial.terms import POWERS, columns
 from photostrip.triangulation.relative_orientation.orientation import orient_pairs
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.triangulation.resection.closed_form import OrientedPhoto, space_resection
@@ -103,22 +112,11 @@ def relative(
     """
     one, other = _rows(left, 2), _rows(right, 2)
     _same(one, other)
-    weight = np.ones(len(one)) if weights is None else np.asarray(weights, float)
-    if np.count_nonzero(weight) < MINIMUM_POINTS:
-        message = f"{np.count_nonzero(weight)} common points cannot orient a pair; five are needed"
+    pair = one_pair(one, other, principal_distance, None if weights is None else np.asarray(weights, float))
+    if np.count_nonzero(pair.weight) < MINIMUM_POINTS:
+        message = f"{np.count_nonzero(pair.weight)} common points cannot orient a pair; five are needed"
         raise GeometryError(message, code="too-few-common-points")
-    number = np.arange(len(one))
-    pairs = Pairs(
-        starts=np.zeros(1, np.intp),
-        pair=np.zeros(len(one), np.intp),
-        left=one,
-        right=other,
-        weight=weight,
-        focal=principal_distance,
-        point=number,
-        rows=np.column_stack([number, number]),
-    )
-    found = orient_pairs(pairs, ("left", "right"))
+    found = orient_pairs(pair, ("left", "right"))
     alpha1, kappa1, alpha2, omega2, kappa2 = found.elements[0]
     rotations = (from_alpha_omega_kappa(alpha1, 0.0, kappa1), from_alpha_omega_kappa(alpha2, omega2, kappa2))
     directions, turned = found.relative
@@ -131,6 +129,21 @@ def relative(
         rotation=turned[0],
         model=intersection(one, other, principal_distance, base=(base, 0.0, 0.0), rotations=rotations).xyz,
         iterations=int(found.iterations[0]),
+    )
+
+
+def one_pair(left: Floats, right: Floats, principal_distance: float, weights: Floats | None = None) -> Pairs:
+    """Return the common points (n, 2) of two photos as the pair that relative orientation takes."""
+    number = np.arange(len(left))
+    return Pairs(
+        starts=np.zeros(1, np.intp),
+        pair=np.zeros(len(left), np.intp),
+        left=left,
+        right=right,
+        weight=np.ones(len(left)) if weights is None else weights,
+        focal=principal_distance,
+        point=number,
+        rows=np.column_stack([number, number]),
     )
 
 
@@ -228,9 +241,12 @@ def polynomial(xyz: ArrayLike, misclosures: ArrayLike, terms: Sequence[str]) -> 
 
     Source: [001] eq. 151.
     """
+    if unknown := [each for each in terms if each not in POWERS] or ([] if terms else [""]):
+        raise InputError(f"there is no term {unknown[0]!r}: {', '.join(POWERS)}")
     design = columns(_rows(xyz, 3), list(terms))
     size = np.linalg.norm(design, axis=0)
-    values = np.asarray(misclosures, float)
+    values = _rows(np.reshape(misclosures, (-1, 1)), 1)[:, 0]
+    _same(design, values)
     if len(design) < design.shape[1] or np.linalg.matrix_rank(design / np.where(size > 0, size, 1)) < design.shape[1]:
         raise GeometryError(f"{len(design)} points do not determine {len(terms)} terms", code="control-deficient")
     found = np.linalg.lstsq(design / size, values, rcond=None)[0] / size
@@ -247,6 +263,78 @@ def resection(xy: ArrayLike, ground: ArrayLike, principal_distance: float, *, si
     image, points = _rows(xy, 2), _rows(ground, 3)
     _same(image, points)
     return space_resection(image, np.full(image.shape, sigma), points, principal_distance)
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """Photos and points adjusted together."""
+
+    centers: Floats  # (p, 3): perspective centres
+    rotations: Floats  # (p, 3, 3): photos to the frame of the points
+    points: Floats  # (q, 3)
+    residuals: Floats  # (n, 2): measured minus computed image coordinates, mm
+    sigmas: Floats  # (q, 3): standard deviations of the points, for the stated ones of the measurements
+    sigma0: float  # standard deviation of unit weight; NaN without redundancy
+    redundancy: int
+    iterations: int
+
+
+def bundle(
+    rays: tuple[ArrayLike, ArrayLike, ArrayLike],
+    principal_distance: float,
+    start: tuple[ArrayLike, ArrayLike, ArrayLike],
+    *,
+    ground: ArrayLike | None = None,
+    sigma: float = 0.005,
+    ground_sigma: float = 0.05,
+) -> Bundle:
+    """Adjust all photos and points at once, from approximate values and without any search for errors.
+
+    rays: photo (n,) and point (n,) as numbers from 0, and image coordinates (n, 2).
+    start: centres (p, 3), rotations (p, 3, 3) and points (q, 3), near the truth: from ``resection``, ``intersection``.
+    ground: (q, 3), given coordinates; NaN where none is given. Without any the network is free: it stays as near to the
+        points of the start as its shape lets it.
+    sigma, ground_sigma: standard deviations of an image coordinate, mm, and of a given one.
+    Raises GeometryError where the rays and given coordinates do not determine the photos and points.
+    """
+    photo, point = (np.asarray(each, np.intp) for each in rays[:2])
+    xy, points, centers = _rows(rays[2], 2), _rows(start[2], 3), _rows(start[0], 3)
+    _same(xy, photo)
+    _same(xy, point)
+    if not (np.isin(photo, np.arange(len(centers))).all() and np.isin(point, np.arange(len(points))).all()):
+        raise InputError("a ray has a photo or a point that the start does not have")
+    given = np.full(points.shape, np.nan) if ground is None else np.asarray(ground, float)
+    known = np.isfinite(given)
+    _same(points, given)
+    rows = np.flatnonzero(known.any(axis=1))
+    origin = points.mean(axis=0)
+    problem = BundleProblem(
+        images=ImageObservations(photo=photo, point=point, xy=xy, sigma=np.full(xy.shape, sigma)),
+        cameras=BundleCameras(of_photo=np.zeros(len(centers), np.intp), focal=np.array([principal_distance])),
+        start=StartValues(
+            centers=centers - origin,
+            rotations=np.asarray(start[1], float).reshape(-1, 3, 3),
+            points=points - origin,
+        ),
+        control=ControlObservations(
+            point=rows,
+            xyz=np.where(known, given, points)[rows] - origin,
+            axes=np.broadcast_to(np.eye(3), (len(rows), 3, 3)),
+            sigma=np.where(known, ground_sigma, np.inf)[rows],
+        ),
+    )
+    found = solve(problem)
+    variances = cofactors_of(found).points.diagonal(axis1=1, axis2=2)
+    return Bundle(
+        centers=found.centers + origin,
+        rotations=found.rotations,
+        points=found.points + origin,
+        residuals=found.image_residuals,
+        sigmas=np.sqrt(variances),
+        sigma0=found.sigma0,
+        redundancy=found.redundancy,
+        iterations=len(found.steps),
+    )
 
 
 def _rows(values: ArrayLike, width: int) -> Floats:

@@ -34,7 +34,8 @@ MEMBERS = {
     "Table": ["columns", "meanings", "name", "to_arrow", "to_pandas", "units", "where"],
 }  # fmt: skip
 STEPS = [
-    "absolute", "chain", "interior", "intersection", "polynomial", "refine", "relative", "resection", "scale_transfer",
+    "absolute", "bundle", "chain", "interior", "intersection", "polynomial", "refine", "relative", "resection",
+    "scale_transfer",
 ]  # fmt: skip
 ERRORS = ["GeometryError", "InputError", "PhotostripError"]
 

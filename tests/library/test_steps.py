@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
@@ -14,6 +15,7 @@ from photostrip import steps
 from photostrip.camera import Camera, Distortion
 from photostrip.cli.main import main
 from photostrip.geometry.rotation import from_angles
+from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -120,6 +122,32 @@ def test_a_photo_is_found_on_known_points(truth: Truth) -> None:
     np.testing.assert_allclose(half.covariance, found.covariance / 4)
 
 
+def test_all_photos_are_adjusted_at_once(truth: Truth) -> None:
+    seen = [(photo, name) for photo in range(3) for name in truth.common(photo)]
+    ids = sorted({name for _, name in seen if sum(name == other for _, other in seen) > 1})
+    seen = [(photo, name) for photo, name in seen if name in ids]
+    photo, point = np.array([each for each, _ in seen]), np.array([ids.index(name) for _, name in seen])
+    xy = np.array([truth.image(each, [name])[0] for each, name in seen])
+    rng = np.random.default_rng(5)
+    ground = np.where(np.arange(len(ids))[:, None] % 4 == 0, truth.xyz(ids), np.nan)
+    ground[4, :2] = np.nan  # known in height only
+    rotations = [from_angles(rng.normal(0, 0.01, 3), "omega-phi-kappa") @ each for each in truth.rotations]
+    start = truth.centers + rng.normal(0, 5, (3, 3)), rotations, truth.xyz(ids) + rng.normal(0, 5, (len(ids), 3))
+    found = steps.bundle((photo, point, xy), F, start, ground=ground)
+    np.testing.assert_allclose(found.points, truth.xyz(ids), atol=1e-5)
+    np.testing.assert_allclose(found.centers, truth.centers, atol=1e-5)
+    np.testing.assert_allclose(found.rotations, truth.rotations, atol=1e-8)
+    assert found.redundancy == 2 * len(xy) + np.isfinite(ground).sum() - 3 * len(ids) - 18
+    assert found.sigma0 < 1e-4
+    half = steps.bundle((photo, point, xy), F, start, ground=ground, sigma=0.0025, ground_sigma=0.025)
+    np.testing.assert_allclose(half.sigmas, found.sigmas / 2)
+    free = steps.bundle((photo, point, xy), F, start)
+    assert free.redundancy == 2 * len(xy) - 3 * len(ids) - 18 + 7
+    assert np.abs(free.residuals).max() < 1e-6
+    with pytest.raises(photostrip.InputError, match="a photo or a point that the start does not have"):
+        steps.bundle((photo + 1, point, xy), F, start)
+
+
 @pytest.mark.parametrize(("kind", "redundancy"), [("affine", 2), ("conformal", 4)])
 def test_marks_give_photo_coordinates(kind: Literal["affine", "conformal"], redundancy: int) -> None:
     measured = np.array([[10.0, 10.0], [210.0, 12.0], [208.0, 212.0], [8.0, 210.0]])
@@ -155,6 +183,11 @@ def test_a_deformation_is_fitted() -> None:
     assert np.abs(residuals).max() < 1e-12
     with pytest.raises(photostrip.GeometryError, match="3 points do not determine 4 terms"):
         steps.polynomial(xyz[:3], bend[:3], ["1", "X", "X^2", "XY"])
+    for terms, message in ((["1", "x"], "there is no term 'x': 1, X, Y, XY"), ([], "there is no term ''")):
+        with pytest.raises(photostrip.InputError, match=message):
+            steps.polynomial(xyz, bend, terms)
+    with pytest.raises(photostrip.InputError, match="12 and 3 rows"):
+        steps.polynomial(xyz, bend[:3], ["1"])
 
 
 @pytest.mark.parametrize(
@@ -232,6 +265,26 @@ def test_the_commands_are_the_functions(truth: Truth, tmp_path: Path, capsys: py
     rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
     assert [float(row["dx"]) for row in rows] == [-500.0] * len(ids)
 
+    strip = table(
+        tmp_path / "strip.csv", "photo omega phi kappa", ["1", "2"], np.array([[1.0, 2.0, 30.0], [3.0, 2.0, 1.0]])
+    )
+    assert main(["step", "chain", strip, "--format", "json"]) == 0
+    handed = np.radians([row[1:] for row in json.loads(capsys.readouterr().out)["points"]])
+    turns = [from_angles(np.radians(each), "omega-phi-kappa") for each in ([1.0, 2.0, 30.0], [3.0, 2.0, 1.0])]
+    np.testing.assert_allclose(from_angles(handed[1], "omega-phi-kappa"), turns[0] @ turns[1], atol=2e-8)
+
+    junction = table(
+        tmp_path / "junction.csv", "point x y z x_next y_next z_next", ids, expected.model, expected.model / 1.25
+    )
+    assert main(["step", "scale", junction, "--format", "json"]) == 0
+    assert values(capsys.readouterr().out) == {"k": pytest.approx(1.25), "rms departure": pytest.approx(0, abs=1e-6)}
+
+    bend = (2 + 3e-3 * expected.model[:, 0])[:, None]
+    control = table(tmp_path / "bend.csv", "point x y z misclosure", ids, expected.model, bend)
+    assert main(["step", "polynomial", control, "--terms", "1,X", "--format", "json"]) == 0
+    fitted = values(capsys.readouterr().out)
+    assert (fitted["1"], fitted["X"]) == (pytest.approx(2), pytest.approx(3e-3))
+
     base = ",".join(str(each) for each in truth.rotations[0].T @ (truth.centers[1] - truth.centers[0]))
     angles = ",".join(str(found[name]) for name in ("omega", "phi", "kappa"))
     assert (
@@ -240,6 +293,98 @@ def test_the_commands_are_the_functions(truth: Truth, tmp_path: Path, capsys: py
     )
     places = np.array([row[1:4] for row in json.loads(capsys.readouterr().out)["points"]])
     np.testing.assert_allclose(places @ truth.rotations[0].T + truth.centers[0], truth.xyz(ids), atol=2e-4)
+
+
+def traced(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """Give the tables of the trace of a step: columns by name."""
+    assert main(["step", *arguments, "--trace", "--format", "json"]) == 0
+    tables = json.loads(capsys.readouterr().out)["trace"]
+    assert all(each["equations"] for each in nonempty(tables) if each["title"] == "Points")
+    return {
+        each["title"]: {
+            column["name"]: np.array([row[k] for row in each["rows"]], float)
+            for k, column in enumerate(each["columns"], 1)
+        }
+        for each in tables
+    }
+
+
+def test_a_trace_leads_to_what_the_step_found(truth: Truth, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ids = truth.common(0, 1)
+    rng = np.random.default_rng(2)
+    images = [truth.image(photo, ids) + rng.normal(0, 0.005, (len(ids), 2)) for photo in (0, 1)]
+    pair = table(tmp_path / "pair.csv", "point x_left y_left x_right y_right", ids, *images)
+    found = steps.relative(*images, F, base=920.0)
+    tables = traced(capsys, "relative", pair, "-f", "153", "--base", "920")
+    before, added = tables["Elements before each step"], tables["What the step adds"]
+    for k, name in enumerate(("alpha1", "kappa1", "alpha2", "omega2", "kappa2")):
+        assert before[name][-1] + added[name][-1] == pytest.approx(np.degrees(found.elements[k]), abs=1e-9)
+        np.testing.assert_allclose(before[name][:-1] + added[name][:-1], before[name][1:], atol=1e-9)
+    assert before["[qq]"][-1] == pytest.approx((found.parallax**2).sum())
+    (points,) = [each for title, each in tables.items() if title.startswith("Points")]
+    np.testing.assert_allclose(points["y1h"] - points["y2h"], found.parallax, atol=1e-9)
+    np.testing.assert_allclose(points["N"] * points["x1h"], found.model[:, 0])
+    np.testing.assert_allclose((points["Y1"] + points["Y2"]) / 2, found.model[:, 1])
+
+    tables = traced(capsys, "intersection", pair, "-f", "153", "--base=900,10,-20", "--right=0.2,-0.1,1.4")
+    turned = from_angles(np.radians([0.2, -0.1, 1.4]), "omega-phi-kappa")
+    met = steps.intersection(*images, F, base=[900, 10, -20], rotations=(np.eye(3), turned))
+    np.testing.assert_allclose(tables["Points"]["Y1"] - tables["Points"]["Y2"], met.gap, atol=1e-9)
+
+    photo = table(tmp_path / "photo.csv", "point x y x_ground y_ground z_ground", ids, images[0], truth.xyz(ids))
+    tables = traced(capsys, "resection", photo, "-f", "153")
+    oriented = steps.resection(images[0], truth.xyz(ids), F)
+    before, added = tables["Centre before each step"], tables["What the step adds"]
+    assert before["X0"][-1] + added["dX0"][-1] == pytest.approx(oriented.center[0], abs=1e-7)
+    assert before["[vv]"][-1] == pytest.approx((oriented.residuals**2).sum())
+    np.testing.assert_allclose(tables["Points"]["x"] - tables["Points"]["x'"], oriented.residuals[:, 0], atol=1e-9)
+
+    control = table(
+        tmp_path / "control.csv", "point x y z x_ground y_ground z_ground", ids, found.model, truth.xyz(ids)
+    )
+    rows = traced(capsys, "absolute", control)["Points"]
+    fitted = steps.absolute(found.model, truth.xyz(ids))
+    np.testing.assert_allclose(rows["X'"] - rows["X-Xm"], fitted.residuals[:, 0], atol=1e-9)
+
+
+def test_traces_of_the_other_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    marks = table(
+        tmp_path / "marks.csv",
+        "mark x y x_photo y_photo",
+        ["1", "2", "3", "4"],
+        np.array([[0.0, 0.0], [10.0, 0.1], [10.0, 10.0], [0.0, 10.0]]),
+        np.array([[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]]),
+    )
+    assert main(["step", "interior", marks, "--trace"]) == 0
+    out = capsys.readouterr().out
+    (line,) = re.findall(r"x' = (.*)\n", out)
+    x = eval(line.replace(" x", " * 10").replace(" y", " * 0.1"))  # noqa: S307 (an equation with its numbers)
+    rows = traced(capsys, "interior", marks)["Marks"]
+    assert x == pytest.approx(rows["x'"][1], abs=1e-8)
+    assert main(["step", "interior", marks, "--trace", "--transform", "projective"]) == 0
+    assert re.search(r"x' = \(.*\) / \(", capsys.readouterr().out)
+
+    points = table(tmp_path / "points.csv", "point x y", ["1", "2"], np.array([[80.0, 60.0], [-100.0, 20.0]]))
+    lens = ["-f", "153", "--principal-point", "0.2,-0.1", "--k", "2e-8,0,0", "--flying-height", "3000"]
+    rows = traced(capsys, "refine", points, *lens)["Corrections, one after the other"]
+    np.testing.assert_allclose(rows["lens_x"], 2e-8 * rows["r"] ** 2 * rows["x-x0"] * 1000, atol=1e-9)
+    np.testing.assert_allclose(rows["x-x0"] + (rows["lens_x"] + rows["refr_x"]) / 1000, rows["x'"])
+    assert (rows["refr_x"] * rows["x-x0"] < 0).all()
+
+    strip = table(tmp_path / "strip.csv", "photo omega phi kappa", ["1", "2"], np.array([[1.0, 2, 30], [3, 2, 1]]))
+    tables = traced(capsys, "chain", strip)
+    given, handed = (np.column_stack([each["1"], each["2"], each["3"]]).reshape(-1, 3, 3) for each in tables.values())
+    np.testing.assert_allclose(handed[1], given[0] @ given[1])
+
+    junction = table(
+        tmp_path / "junction.csv", "point x y z x_next y_next z_next", ["1", "2"], np.eye(3)[:2] * 3, np.eye(3)[:2] * 2
+    )
+    assert traced(capsys, "scale", junction)["Points"]["k_t"].tolist() == [1.5, 1.5]
+    line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    control = table(tmp_path / "c.csv", "point x y z misclosure", ["1", "2", "3"], line, np.array([[1.0], [3], [6]]))
+    rows = traced(capsys, "polynomial", control, "--terms", "1,X")["Points"]
+    np.testing.assert_allclose(rows["polynomial"] + rows["v"], [1, 3, 6])
+    np.testing.assert_allclose(rows["X"], [0, 1, 2])
 
 
 @pytest.mark.parametrize(

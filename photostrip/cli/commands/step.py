@@ -36,15 +36,20 @@ class Delivery:
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write .json, .csv, .md or .txt.")
     ] = None
+    trace: Annotated[
+        bool, typer.Option("--trace", help="The equations with their numbers, too: every iteration, every point.")
+    ] = False
     quiet: Silent = False
 
-    def deliver(self, document: Document) -> None:
+    def deliver(self, document: Document, trace: Callable[[], list[Document]]) -> None:
         """Print a step; write it when a file is named."""
+        if self.trace:
+            document["trace"] = trace()
         from photostrip.formats.output.csv_text import to_csv
         from photostrip.report.commands.steps import step_report
 
         def table(document: Document) -> str:
-            return to_csv(["point", *(each["name"] for each in document["columns"])], document["points"])
+            return to_csv([document["of"], *(each["name"] for each in document["columns"])], document["points"])
 
         rendering = Rendering(step_report, table)
         if self.output is not None:
@@ -81,9 +86,11 @@ def interior(
     with failures_as(delivery.form):
         from photostrip.library import steps
         from photostrip.library.step_documents import interior_document
+        from photostrip.library.step_traces import interior_trace
 
         ids, (measured, calibrated) = _read(file, "interior", delivery)
-        delivery.deliver(interior_document(ids, steps.interior(measured, calibrated, transform)))
+        found = steps.interior(measured, calibrated, transform)
+        delivery.deliver(interior_document(ids, found), lambda: interior_trace(ids, measured, calibrated, found))
 
 
 @_command("refine", "point, x, y", "points.csv -f 152.12 --principal-point 0.012,-0.004 --k 2.5e-8,0,0")
@@ -110,6 +117,7 @@ def refine(
         from photostrip.camera import Camera, Distortion
         from photostrip.library import steps
         from photostrip.library.step_documents import refine_document
+        from photostrip.library.step_traces import refine_trace
 
         ids, (xy,) = _read(file, "refine", delivery)
         k1, k2, k3 = _numbers(k, 3, "--k")
@@ -117,7 +125,7 @@ def refine(
         lens = Distortion(model="brown", direction="image_to_ideal", k=(k1, k2, k3)) if any((k1, k2, k3)) else None
         camera = Camera(name="camera", principal_distance=focal, principal_point=(x0, y0), distortion=lens)
         refined = steps.refine(xy, camera, flying_height=flying_height, ground_height=ground_height)
-        delivery.deliver(refine_document(ids, xy, refined))
+        delivery.deliver(refine_document(ids, xy, refined), lambda: refine_trace(ids, xy, refined, camera))
 
 
 @_command("relative", "point, x_left, y_left, x_right, y_right", "pair.csv -f 153 --base 920 --unit m")
@@ -136,9 +144,12 @@ def relative(
     with failures_as(delivery.form):
         from photostrip.library import steps
         from photostrip.library.step_documents import relative_document
+        from photostrip.library.step_traces import relative_trace
 
         ids, (left, right) = _read(file, "relative", delivery)
-        delivery.deliver(relative_document(ids, steps.relative(left, right, focal, base=base), base, unit))
+        found = steps.relative(left, right, focal, base=base)
+        document = relative_document(ids, found, base, unit)
+        delivery.deliver(document, lambda: relative_trace(ids, left, right, focal, found, base))
 
 
 @_command(
@@ -165,14 +176,51 @@ def intersection(
 ) -> None:
     """Intersect the rays of two photos of known orientation; points stand relative to the left perspective centre."""
     with failures_as(delivery.form):
+        import numpy as np
+
         from photostrip.library import steps
         from photostrip.library.step_documents import intersection_document
+        from photostrip.library.step_traces import intersection_trace
 
         ids, (one, other) = _read(file, "intersection", delivery)
-        turned = tuple(_rotation(text, name) for text, name in ((left, "--left"), (right, "--right")))
-        b = _numbers(base, 3, "--base")
-        found = steps.intersection(one, other, focal, base=b, rotations=(turned[0], turned[1]), left_ray=left_ray)
-        delivery.deliver(intersection_document(ids, found, unit))
+        turned = _rotation(_numbers(left, 3, "--left")), _rotation(_numbers(right, 3, "--right"))
+        b = np.array(_numbers(base, 3, "--base"))
+        found = steps.intersection(one, other, focal, base=b, rotations=turned, left_ray=left_ray)
+        document = intersection_document(ids, found, unit)
+        delivery.deliver(document, lambda: intersection_trace(ids, (one, other), focal, b, turned))
+
+
+@_command("chain", "photo, omega, phi, kappa (degrees)", "strip.csv")
+def chain(*, file: Table, delivery: Delivery) -> None:
+    """Hand the orientation on along a strip: each photo is given in the system of the photo before it.
+
+    The first photo is given in the system of the strip: 0, 0, 0, or its angles there.
+    """
+    with failures_as(delivery.form):
+        import numpy as np
+
+        from photostrip.library import steps
+        from photostrip.library.step_documents import chain_document
+        from photostrip.library.step_traces import chain_trace
+
+        ids, (given,) = _read(file, "chain", delivery)
+        rotations = np.array([_rotation(each) for each in given.tolist()])
+        handed = steps.chain(rotations[1:], rotations[0])
+        delivery.deliver(chain_document(ids, handed), lambda: chain_trace(ids, rotations, handed))
+
+
+@_command("scale", "point, x, y, z, x_next, y_next, z_next", "junction.csv")
+def scale(*, file: Table, delivery: Delivery) -> None:
+    """Bring a model to the scale of the one before it by common points, each from the perspective centre of both."""
+    with failures_as(delivery.form):
+        from photostrip.library import steps
+        from photostrip.library.step_documents import scale_document
+        from photostrip.library.step_traces import scale_trace
+
+        ids, (first, second) = _read(file, "scale", delivery)
+        factor, departures = steps.scale_transfer(first, second)
+        document = scale_document(ids, factor, departures)
+        delivery.deliver(document, lambda: scale_trace(ids, first, second, factor))
 
 
 @_command("absolute", "point, x, y, z, x_ground, y_ground, z_ground", "control.csv")
@@ -181,9 +229,32 @@ def absolute(*, file: Table, unit: Unit = "m", delivery: Delivery) -> None:
     with failures_as(delivery.form):
         from photostrip.library import steps
         from photostrip.library.step_documents import absolute_document
+        from photostrip.library.step_traces import absolute_trace
 
         ids, (model, ground) = _read(file, "absolute", delivery)
-        delivery.deliver(absolute_document(ids, steps.absolute(model, ground), unit))
+        found = steps.absolute(model, ground)
+        delivery.deliver(absolute_document(ids, found, unit), lambda: absolute_trace(ids, model, ground, found, unit))
+
+
+@_command("polynomial", "point, x, y, z, misclosure", "control.csv --terms 1,X,Y,X^2")
+def polynomial(
+    *,
+    file: Table,
+    terms: Annotated[str, typer.Option("--terms", metavar="A,B,...", help="Of 1, X, Y, XY, X^2 and X^3.")] = "1,X,Y",
+    unit: Unit = "m",
+    delivery: Delivery,
+) -> None:
+    """Fit the deformation of a strip along one axis: misclosures, strip minus given, at control points."""
+    with failures_as(delivery.form):
+        from photostrip.library import steps
+        from photostrip.library.step_documents import polynomial_document
+        from photostrip.library.step_traces import polynomial_trace
+
+        ids, (xyz, misclosures) = _read(file, "polynomial", delivery)
+        wanted, values = [each.strip() for each in terms.split(",")], misclosures[:, 0]
+        found = steps.polynomial(xyz, values, wanted)
+        document = polynomial_document(ids, wanted, *found, unit)
+        delivery.deliver(document, lambda: polynomial_trace(ids, xyz, values, wanted, found))
 
 
 @_command("resection", "point, x, y, x_ground, y_ground, z_ground", "photo.csv -f 152.12 --sigma-um 8")
@@ -192,9 +263,12 @@ def resection(*, file: Table, focal: Focal, sigma_um: Sigma = 5.0, unit: Unit = 
     with failures_as(delivery.form):
         from photostrip.library import steps
         from photostrip.library.step_documents import resection_document
+        from photostrip.library.step_traces import resection_trace
 
         ids, (xy, ground) = _read(file, "resection", delivery)
-        delivery.deliver(resection_document(ids, steps.resection(xy, ground, focal, sigma=sigma_um / 1000.0), unit))
+        found = steps.resection(xy, ground, focal, sigma=sigma_um / 1000.0)
+        document = resection_document(ids, found, unit)
+        delivery.deliver(document, lambda: resection_trace(ids, xy, ground, focal, found, unit))
 
 
 def _read(file: Path, name: str, delivery: Delivery) -> tuple[list[str], Any]:
@@ -216,9 +290,9 @@ def _numbers(text: str, count: int, option: str) -> list[float]:
     return found
 
 
-def _rotation(text: str, option: str) -> Any:  # noqa: ANN401 (an array)
+def _rotation(degrees: list[float]) -> Any:  # noqa: ANN401 (an array)
     from math import radians
 
     from photostrip.geometry.rotation import from_angles
 
-    return from_angles([radians(each) for each in _numbers(text, 3, option)], "omega-phi-kappa")
+    return from_angles([radians(each) for each in degrees], "omega-phi-kappa")

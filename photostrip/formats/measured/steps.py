@@ -13,17 +13,20 @@ from photostrip.formats.text.tables import Column
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
 
-IMAGE, GROUND = ("x", "y"), ("x_ground", "y_ground", "z_ground")
+IMAGE, XYZ, GROUND = ("x", "y"), ("x", "y", "z"), ("x_ground", "y_ground", "z_ground")
 PHOTOS = (("x_left", "y_left"), ("x_right", "y_right"))
 COLUMNS: dict[str, tuple[tuple[str, ...], ...]] = {
     "interior": (IMAGE, ("x_photo", "y_photo")),
     "refine": (IMAGE,),
     "relative": PHOTOS,
     "intersection": PHOTOS,
-    "absolute": (("x", "y", "z"), GROUND),
+    "chain": (("omega", "phi", "kappa"),),
+    "scale": (XYZ, ("x_next", "y_next", "z_next")),
+    "absolute": (XYZ, GROUND),
+    "polynomial": (XYZ, ("misclosure",)),
     "resection": (IMAGE, GROUND),
 }
-MARK = Column("point", aliases=("mark", *POINT.aliases))
+MARK = Column("point", aliases=("mark", "photo", *POINT.aliases))
 
 
 def read_step(file: str, step: str) -> tuple[list[str], list[Floats]]:

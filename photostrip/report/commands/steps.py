@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from photostrip.report.page.numbers import fixed
-from photostrip.report.page.parts import DASH, Document, Facts, Part, Section
+from photostrip.report.page.numbers import fixed, power
+from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 TITLES = {
@@ -13,7 +13,10 @@ TITLES = {
     "refine": "Refined image coordinates",
     "relative": "Relative orientation",
     "intersection": "Space intersection",
+    "chain": "Orientation handed on along a strip",
+    "scale": "Scale transfer",
     "absolute": "Absolute orientation",
+    "polynomial": "Polynomial",
     "resection": "Space resection",
 }
 
@@ -23,12 +26,25 @@ def step_report(document: Document) -> tuple[str, tuple[Section, ...]]:
     parts: list[Part] = []
     if document["values"]:
         parts.append(Facts(tuple((each["name"], _written(each)) for each in document["values"])))
-    columns = [words("point", lambda row: row[0])]
+    columns = [words(document["of"], lambda row: row[0])]
     columns += [
         number(each["name"], partial(_cell, place), each["decimals"], each["unit"])
         for place, each in enumerate(document["columns"], 1)
     ]
-    return TITLES[document["step"]], (Section("", (*parts, tabulated(document["points"], columns))),)
+    sections = [Section("", (*parts, tabulated(document["points"], columns)))]
+    sections += [_traced(each) for each in document.get("trace", ())]
+    return TITLES[document["step"]], tuple(sections)
+
+
+def _traced(table: Document) -> Section:
+    """Show a table of the trace: what is exact to decimals or, where these are negative, to digits."""
+    columns = [words("", lambda row: row[0])]
+    for place, each in enumerate(table["columns"], 1):
+        decimals = each["decimals"]
+        form = decimals if decimals >= 0 else partial(power, digits=-1 - decimals)
+        columns.append(number(each["name"], partial(_cell, place), form, each["unit"]))
+    equations = [Words(each) for each in table["equations"]]
+    return Section(table["title"], (*equations, tabulated(table["rows"], columns)))
 
 
 def _cell(place: int, row: list[float]) -> float:

@@ -52,8 +52,7 @@ def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
     """Repeat the relative orientation of every pair: with all its points, then without those that were rejected."""
     final = strip.of_photos.orientation
     given = _with_all_points(result, strip)
-    start = _starts(given, final.elements)
-    rounds = [[first] for first in _round(start, given)]
+    rounds = [[first] for first in first_rounds(given, final.elements)]
     changed = np.unique(given.pair[given.weight != final.pairs.weight])
     ends = np.array([each[-1].end for each in rounds])
     for number, second in zip(changed.tolist(), _round(ends[changed], final.pairs.take(changed)), strict=True):
@@ -69,14 +68,17 @@ def _with_all_points(result: Result, strip: StripResult) -> Pairs:
     return pairs.without(np.array([tuple(row) not in kept for row in pairs.rows.tolist()], bool))
 
 
-def _starts(pairs: Pairs, wanted: Floats) -> Floats:
-    """Start values; rounded elements for a pair that a run had to start from other azimuths."""
+def first_rounds(pairs: Pairs, wanted: Floats) -> list[PairRound]:
+    """Repeat the iteration of pairs from their start values, which are to lead to the wanted elements (p, 5).
+
+    A pair that had to start from other azimuths starts from rounded elements.
+    """
     start = start_values(pairs)
     solved = solve_elements(pairs).elements
     reached = iterate_elements(start, pairs).elements
     turned = np.abs(np.sin((reached - solved) / 2)).max(axis=1) > SAME_ELEMENTS
     start[turned] = np.round(np.where(np.isfinite(solved), solved, wanted)[turned], START_DIGITS)
-    return start
+    return _round(start, pairs)
 
 
 def _round(start: Floats, pairs: Pairs) -> list[PairRound]:

@@ -13,6 +13,8 @@ from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation.resection.collinearity import KnownPhotos, partials, project
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from photostrip.arrays import Flags, Floats, Numbers
 
 ITERATIONS = 20
@@ -54,13 +56,21 @@ def with_residuals(xy: Floats, points: Floats, photo: Numbers, photos: KnownPhot
     return Resection(centers=centers, rotations=rotations, residuals=residuals, rms=rms, solved=np.ones(count, bool))
 
 
-def resect(xy: Floats, points: Floats, photo: Numbers, start: KnownPhotos) -> Resection:
+def resect(
+    xy: Floats,
+    points: Floats,
+    photo: Numbers,
+    start: KnownPhotos,
+    watch: Callable[[KnownPhotos, Floats], None] | None = None,
+) -> Resection:
     """Orient every photo on its points by least squares on the image coordinates.
 
     xy: (m, 2), image coordinates in mm, reduced to the principal point; rows ordered by photo.
     points: (m, 3), known points of the rows.
     start: orientations to start from. They stay for a photo with fewer than four points, or whose iteration does not
         converge.
+    watch: called at every step with the orientations before it, and what is added to them (n, 6): shifts in the frame
+        of the points, and small rotations about its axes.
     """
     centers, rotations, focal = start
     counts = np.bincount(photo, minlength=len(centers))
@@ -73,6 +83,8 @@ def resect(xy: Floats, points: Floats, photo: Numbers, start: KnownPhotos) -> Re
     for _ in range(ITERATIONS):
         step = _steps(xy, points, photo, KnownPhotos(centers, rotations, focal), distance, (present, starts))
         step[~enough] = 0.0
+        if watch is not None:
+            watch(KnownPhotos(centers, rotations, focal), step * np.repeat([distance, distance**0], 3, axis=0).T)
         centers = centers + step[:, :3] * distance[:, None]
         rotations = from_vector(step[:, 3:]) @ rotations
         converged = np.isfinite(step).all(axis=1) & (np.abs(step).max(axis=1) < CONVERGED)

@@ -1,0 +1,215 @@
+"""How the numbers of a single step come about: its equations, its iterations, each point on its way through them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.library.steps import one_pair
+from photostrip.result.trace.replay import first_rounds
+from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
+from photostrip.triangulation.polynomial.terms import columns as design_columns
+from photostrip.triangulation.relative_orientation.solution import ELEMENTS
+from photostrip.triangulation.resection.closed_form import approximate
+from photostrip.triangulation.resection.collinearity import KnownPhotos, project
+from photostrip.triangulation.resection.resection import resect
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from photostrip.arrays import Floats
+    from photostrip.camera import Camera
+    from photostrip.library.steps import Absolute, Interior, Relative
+    from photostrip.triangulation.resection.closed_form import OrientedPhoto
+
+    Document = dict[str, Any]
+    Column = tuple[str, str, int, ArrayLike]  # name, unit, decimals; negative: digits of numbers of any size
+    Trace = list[Document]
+
+MICROMETRES = 1000.0  # in a millimetre
+_TURNED = "(u, v, w) = R (x, y, -f); xh = -f u/w, yh = -f v/w; eq. 137"
+
+
+def interior_trace(ids: Sequence[str], measured: Floats, calibrated: Floats, found: Interior) -> Trace:
+    """Show the coordinates of the marks on their way from the comparator to the photo."""
+    (x, y, below), photo = found.transform.coefficients.tolist(), found.transform(measured)
+    equations = [f"x' = {_linear(x)}", f"y' = {_linear(y)}"]
+    if below != [0.0, 0.0, 0.0, 1.0]:
+        equations = [f"{each.replace('= ', '= (')}) / ({_linear(below)})" for each in equations]
+    rows = [*_plane("x y", "", 4, measured), *_plane("x' y'", "mm", 4, photo)]
+    return [
+        _table("Marks", ids, [*rows, *_plane("given_x given_y", "mm", 4, calibrated)], "v = x' - given", *equations)
+    ]
+
+
+def refine_trace(ids: Sequence[str], measured: Floats, refined: Floats, camera: Camera) -> Trace:
+    """Show what the principal point, the lens and refraction each do."""
+    central = measured - np.asarray(camera.principal_point)
+    lens = undistort(measured, camera, Bending()) - central
+    bent = refined - central - lens
+    rows = _plane("x-x0 y-y0", "mm", 4, central)
+    rows += [("r", "mm", 3, np.hypot(*central.T)), *_plane("lens_x lens_y", "um", 2, lens * MICROMETRES)]
+    rows += [*_plane("refr_x refr_y", "um", 2, bent * MICROMETRES), *_plane("x' y'", "mm", 4, refined)]
+    return [_table("Corrections, one after the other", ids, rows, "x' = x - x0 + lens + refraction")]
+
+
+def relative_trace(
+    ids: Sequence[str], left: Floats, right: Floats, focal: float, found: Relative, base: float
+) -> Trace:
+    """Show the iteration of the elements, and each point from the image to the model."""
+    (rounds,) = first_rounds(one_pair(left, right, focal), found.elements[None])
+    elements, added = (np.degrees([getattr(each, name) for each in rounds.steps]) for name in ("elements", "step"))
+    squares: list[Column] = [("[qq]", "mm^2", -5, [each.squares for each in rounds.steps])]
+    before, changes = _plane(" ".join(ELEMENTS), "deg", 6, elements), _plane(" ".join(ELEMENTS), "deg", -3, added)
+    alpha1, kappa1, alpha2, omega2, kappa2 = found.elements
+    rotations = from_alpha_omega_kappa(alpha1, 0.0, kappa1), from_alpha_omega_kappa(alpha2, omega2, kappa2)
+    points = _table(
+        "Points: photos turned into the base frame, and the model",
+        ids,
+        _rays(left, right, focal, np.array([base, 0.0, 0.0]), rotations),
+        _TURNED,
+        f"q = y1h - y2h; N = B / (x1h - x2h) with B = {base:g}; X = N x1h, Y = N (y1h + y2h)/2, Z = -N f",
+    )
+    return [
+        _table("Elements before each step", _numbers(squares), [*squares, *before], "eq. 131-137"),
+        _table("What the step adds", _numbers(squares), changes, "-(J'J)^-1 J'q, J the derivatives of q"),
+        _matrices("Rotations to the base frame, by rows", ("left", "right"), np.stack(rotations)),
+        points,
+    ]
+
+
+def intersection_trace(
+    ids: Sequence[str], images: tuple[Floats, Floats], focal: float, base: Floats, rotations: tuple[Floats, Floats]
+) -> Trace:
+    """Show each point from the image to the model."""
+    words = (
+        _TURNED,
+        f"N = (BX + x2h BZ/f) / (x1h - x2h), N2 = N + BZ/f, B = {', '.join(f'{each:g}' for each in base)}; eq. 138",
+        "X = N x1h, Y1 = N y1h, Y2 = BY + N2 y2h, Z = -N f",
+    )
+    found = _table("Points", ids, _rays(*images, focal, base, rotations), *words)
+    return [_matrices("Rotations, by rows", ("left", "right"), np.stack(rotations)), found]
+
+
+def absolute_trace(ids: Sequence[str], model: Floats, ground: Floats, found: Absolute, unit: str) -> Trace:
+    """Show the points reduced to their centroids, and turned."""
+    similarity, centre, place = found.similarity, model.mean(axis=0), ground.mean(axis=0)
+    reduced, wanted = model - centre, ground - place
+    turned = similarity.scale * reduced @ similarity.rotation.T
+    rows = [*_plane("x-xm y-ym z-zm", "", 4, reduced), *_plane("X-Xm Y-Ym Z-Zm", unit, 4, wanted)]
+    rows += _plane("X' Y' Z'", unit, 4, turned)
+    words = f"X' = s R (x - xm) with s = {similarity.scale:.9g}; v = X' - (X - Xm); the shift is Xm - s R xm"
+    means = np.stack([centre, place])
+    return [
+        _table("Centroids", ["model xm", "ground Xm"], _plane("x y z", "", 4, means)),
+        _matrices("Rotation R, by rows", ("R",), similarity.rotation),
+        _table("Points", ids, rows, words),
+    ]
+
+
+def resection_trace(
+    ids: Sequence[str], xy: Floats, ground: Floats, focal: float, found: OrientedPhoto, unit: str
+) -> Trace:
+    """Show the start in closed form, the iteration, and each ray."""
+    photo, seen, added, squares = np.zeros(len(xy), np.intp), [], [], []
+
+    def watch(before: KnownPhotos, step: Floats) -> None:
+        squares.append(float(((xy - project(ground, before, photo)) ** 2).sum()))
+        seen.append(before.centers[0])
+        added.append(step[0])
+
+    center, rotation = approximate(xy, ground, focal)
+    resect(xy, ground, photo, KnownPhotos(center[None], rotation[None], np.array([focal])), watch)
+    steps: list[Column] = [("[vv]", "mm^2", -5, squares), *_plane("X0 Y0 Z0", unit, 4, np.array(seen))]
+    changes = _plane("dX0 dY0 dZ0", unit, -3, np.array(added)[:, :3])
+    changes += _plane("turn_X turn_Y turn_Z", "deg", -3, np.degrees(added)[:, 3:])
+    u, v, w = ((ground - found.center) @ found.rotation).T
+    rays = [("u", unit, 4, u), ("v", unit, 4, v), ("w", unit, 4, w)]
+    rays += [("x'", "mm", 4, -focal * u / w), ("y'", "mm", 4, -focal * v / w), *_plane("x y", "mm", 4, xy)]
+    collinear = "(u, v, w) = R' (X - X0); x' = -f u/w, y' = -f v/w; v = x - x'"
+    return [
+        _table("Centre before each step", _numbers(steps), steps, "Step 1 starts from three points in closed form."),
+        _table("What the step adds", _numbers(steps), changes, "(J'J)^-1 J'v, J the derivatives of x' and y'"),
+        _matrices("Rotation R, photo to ground, by rows", ("R",), found.rotation),
+        _table("Points", ids, rays, collinear),
+    ]
+
+
+def chain_trace(ids: Sequence[str], given: Floats, handed: Floats) -> Trace:
+    """Show the matrices that are multiplied."""
+    return [
+        _matrices("Given: each photo in the photo before it, by rows", ids, given),
+        _matrices("In the strip, by rows", ids, handed, "A(i+1) = A(i) A(i, i+1); eq. 131-134"),
+    ]
+
+
+def scale_trace(ids: Sequence[str], first: Floats, second: Floats, factor: float) -> Trace:
+    """Show the distances and the ratio of each point."""
+    before, after = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
+    rows: list[Column] = [("D", "", 6, before), ("D'", "", 6, after), ("k_t", "", 7, before / after)]
+    words = f"k_t = D / D' from the common perspective centre; k = {factor:.9g}, their mean; eq. 139-141"
+    return [_table("Points", ids, rows, words)]
+
+
+def polynomial_trace(
+    ids: Sequence[str], xyz: Floats, misclosures: Floats, terms: Sequence[str], found: tuple[Floats, Floats]
+) -> Trace:
+    """Show the design, what the polynomial is at each point, and what is left."""
+    design, (coefficients, left) = design_columns(xyz, terms), found
+    rows: list[Column] = [(term, "", -6, design[:, k]) for k, term in enumerate(terms)]
+    rows += [("misclosure", "", 4, misclosures), ("polynomial", "", 4, misclosures - left), ("v", "", 4, left)]
+    equation = " + ".join(f"{value:.8g} {term}" for value, term in zip(coefficients, terms, strict=True))
+    return [_table("Points", ids, rows, f"polynomial = {equation}", "v = misclosure - polynomial; eq. 151")]
+
+
+def _rays(left: Floats, right: Floats, focal: float, base: Floats, rotations: tuple[Floats, Floats]) -> list[Column]:
+    """Return images turned into the frame of the base, ray factors and heights of both rays."""
+    turned = []
+    for xy, rotation in zip((left, right), rotations, strict=True):
+        u, v, w = rotation @ np.vstack([xy.T, np.full(len(xy), -focal)])
+        turned += [-focal * u / w, -focal * v / w]
+    x1, y1, x2, y2 = turned
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = (base[0] + x2 * base[2] / focal) / (x1 - x2)
+    other = factor + base[2] / focal  # the same where the base is level
+    rows: list[Column] = [
+        (name, "mm", 4, each) for name, each in zip(("x1h", "y1h", "x2h", "y2h"), turned, strict=True)
+    ]
+    rows += [("N", "", 6, factor), *([("N2", "", 6, other)] if base[2] else [])]
+    return [*rows, ("Y1", "", 4, factor * y1), ("Y2", "", 4, base[1] + other * y2)]
+
+
+def _linear(coefficients: Iterable[float]) -> str:
+    """Write a linear form of x, y, x y and 1."""
+    terms = zip(coefficients, (" x", " y", " x y", ""), strict=True)
+    return " + ".join(f"{value:.10g}{name}" for value, name in terms if value).replace("+ -", "- ") or "0"
+
+
+def _plane(names: str, unit: str, decimals: int, values: Floats) -> list[Column]:
+    return [(name, unit, decimals, values[:, k]) for k, name in enumerate(names.split())]
+
+
+def _matrices(title: str, ids: Sequence[str], rotations: Floats, *words: str) -> Document:
+    """Return rotation matrices, each as three rows."""
+    names = [f"{name} {row}" for name in ids for row in "abc"]
+    return _table(title, names, _plane("1 2 3", "", 8, rotations.reshape(-1, 3)), *words)
+
+
+def _numbers(steps: Sequence[Column]) -> list[str]:
+    return [str(number) for number in range(1, len(np.asarray(steps[0][3])) + 1)]
+
+
+def _table(title: str, ids: Sequence[str], columns: Iterable[Column], *words: str) -> Document:
+    """Put columns together under a title, equations below it; the rows are lists, the id first."""
+    listed = list(columns)
+    numbers = [[each if np.isfinite(each) else None for each in np.asarray(one, float).tolist()] for *_, one in listed]
+    return {
+        "title": title,
+        "equations": list(words),
+        "columns": [{"name": name, "unit": unit, "decimals": decimals} for name, unit, decimals, _ in listed],
+        "rows": [list(row) for row in zip(ids, *numbers, strict=True)],
+    }
