@@ -10,6 +10,8 @@ WORKERS ?= 2
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 unexport PYTHONDONTWRITEBYTECODE # or each of the hundreds of processes that the tests start compiles the program anew
 
+KATEX := .venv-site/node_modules/katex/dist
+
 .PHONY: demo test check lint types lowest bench mutations docs site golden regress man clean
 .DELETE_ON_ERROR:
 
@@ -55,8 +57,15 @@ mutations: $(VENV)/dev.installed ## change the program in 120 places, one at a t
 docs: $(VENV)/dev.installed ## rewrite the printed output in README.md and docs/ by running the commands there
 	$(BIN)/python -m tests.renew_docs
 
-site: ## the documentation as a site with search, in build/site
-	test -d .venv-site || { $(PYTHON) -m venv .venv-site && .venv-site/bin/python -m pip install --quiet zensical==0.1.2; }
+site: $(VENV)/photostrip.installed ## the documentation as a site with search, in build/site (formulas need npm)
+	test -d .venv-site || { $(PYTHON) -m venv .venv-site && .venv-site/bin/python -m pip install --quiet zensical==0.0.73; }
+	test -d $(KATEX) || npm install --prefix .venv-site --no-save --no-audit --no-fund --ignore-scripts --silent katex@0.19.1
+	rm -rf build/docs
+	mkdir -p build
+	cp -r docs build/docs
+	$(BIN)/python -m tests.reference build/docs/reference
+	mkdir build/docs/katex
+	cp -r $(KATEX)/katex.min.css $(KATEX)/katex.min.js $(KATEX)/fonts build/docs/katex
 	.venv-site/bin/zensical build --clean --strict
 
 regress: $(VENV)/photostrip.installed ## adjust the sample projects that changed and compare them with their baselines

@@ -76,6 +76,7 @@ class InputError(PhotostripError):
         if isinstance(faults, str):
             faults = Fault(faults)
         self.faults: tuple[Fault, ...] = (faults,) if isinstance(faults, Fault) else tuple(faults)
+        """All of them: message, code, file, line, column, key, expected, fix, points."""
         super().__init__("\n".join(map(str, self.faults)))
 
 
@@ -94,8 +95,11 @@ class GeometryError(PhotostripError):
     ) -> None:
         super().__init__(message)
         self.photos = tuple(photos)
+        """Photos concerned."""
         self.points = tuple(points)
+        """Points concerned."""
         self.code = code
+        """Stable short name of the kind."""
 
 
 @contextmanager

@@ -82,7 +82,12 @@ class Check:
 
     def __init__(self, checked: Checked) -> None:
         self._checked = checked
-        self.faults, self.findings, self.notes = checked.faults, checked.findings, checked.notes
+        self.faults = checked.faults
+        """What must be put right before the project is run."""
+        self.findings = checked.findings
+        """What the data say against themselves."""
+        self.notes = checked.notes
+        """What is worth knowing beside."""
         self.ok = not checked.wrong
         """Whether nothing must be put right before the project is run."""
         self.document = checked.document

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from photostrip.camera import Camera, Distortion
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass
 from photostrip.geometry import plane
@@ -41,8 +42,28 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from photostrip.arrays import Floats
-    from photostrip.camera import Camera
 
+
+__all__ = [
+    "Absolute",
+    "Bundle",
+    "Camera",
+    "Distortion",
+    "Interior",
+    "Intersection",
+    "OrientedPhoto",
+    "Relative",
+    "absolute",
+    "bundle",
+    "chain",
+    "interior",
+    "intersection",
+    "polynomial",
+    "refine",
+    "relative",
+    "resection",
+    "scale_transfer",
+]
 ON_A_LINE = 1e-6  # ratio of the spreads of points that lie on one line
 
 
@@ -78,6 +99,8 @@ def interior(
 def refine(xy: ArrayLike, camera: Camera, *, flying_height: float | None = None, ground_height: float = 0.0) -> Floats:
     """Refine photo coordinates (n, 2): principal point, lens distortion, with heights in metres refraction, too.
 
+    camera: ``steps.Camera(name="film", principal_distance=153.0, principal_point=(0.01, 0.02))``, its ``distortion`` a
+        ``steps.Distortion``.
     Returns ideal image coordinates, reduced to the principal point, shape (n, 2).
     """
     refraction = 0.0 if flying_height is None else refraction_constant(flying_height, ground_height)
@@ -234,7 +257,8 @@ def absolute(model: ArrayLike, ground: ArrayLike, weights: ArrayLike | None = No
 def polynomial(xyz: ArrayLike, misclosures: ArrayLike, terms: Sequence[str]) -> tuple[Floats, Floats]:
     """Fit the deformation of a strip along one axis by a polynomial.
 
-    xyz: (n, 3), control points in the intermediate frame; misclosures: (n,), strip minus given along the axis.
+    xyz: (n, 3), control points in the intermediate frame.
+    misclosures: (n,), strip minus given along the axis.
     terms: as the report names them: ``"1"``, ``"X"``, ``"Y"``, ``"XY"``, ``"X^2"``.
     Returns coefficients, one for each term, and residuals (n,). Subtract the polynomial from the strip.
     Raises GeometryError where there are fewer points than terms, or they do not determine them.
@@ -256,7 +280,8 @@ def polynomial(xyz: ArrayLike, misclosures: ArrayLike, terms: Sequence[str]) -> 
 def resection(xy: ArrayLike, ground: ArrayLike, principal_distance: float, *, sigma: float = 0.005) -> OrientedPhoto:
     """Orient one photo on known points, at any attitude and without approximate values.
 
-    xy: (n, 2), image coordinates; ground: (n, 3), their points; sigma: standard deviation of an image coordinate, mm.
+    xy, ground: (n, 2) image coordinates and (n, 3) their points.
+    sigma: standard deviation of an image coordinate, mm.
     Returns centre, rotation (photo to ground), their covariance, and residuals (n, 2).
     Raises GeometryError with fewer than four points, with points on one line, or where no orientation fits.
     """

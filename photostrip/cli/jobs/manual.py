@@ -31,19 +31,21 @@ VARIABLES = (
 
 def manual_pages() -> dict[str, str]:
     """Return the manual pages by file name: ``photostrip.1``, and one for every command and those below it."""
+    pages = {
+        f"photostrip-{name.replace(' ', '-')}.1": _command_page(name, command) for name, command in every_command()
+    }
+    return {"photostrip.1": _main_page(typer.main.get_command(whole_program())), **pages}
+
+
+def every_command() -> Iterator[tuple[str, Any]]:
+    """Return every command with its name, each followed by those below it."""
     root: Any = typer.main.get_command(whole_program())
-    pages = {"photostrip.1": _main_page(root)}
-    for name, command in root.commands.items():
-        pages |= _pages_of(name, command)
-    return pages
-
-
-def _pages_of(name: str, command: Any) -> dict[str, str]:  # noqa: ANN401 (typer does not export its classes)
-    below: dict[str, Any] = getattr(command, "commands", {})
-    pages = {f"photostrip-{name.replace(' ', '-')}.1": _command_page(name, command)}
-    for inner, each in below.items():
-        pages |= _pages_of(f"{name} {inner}", each)
-    return pages
+    waiting = [(name, root.commands[name]) for name in COMMANDS]
+    while waiting:
+        name, command = waiting.pop(0)
+        yield name, command
+        below = getattr(command, "commands", {})
+        waiting = [*((f"{name} {inner}", each) for inner, each in below.items()), *waiting]
 
 
 def _main_page(root: Any) -> str:  # noqa: ANN401
@@ -51,7 +53,7 @@ def _main_page(root: Any) -> str:  # noqa: ANN401
     lines += [".SH SYNOPSIS", r".B photostrip", r"[\-\-debug] \fICOMMAND\fR [\fIARGUMENTS\fR]..."]
     lines += [".SH DESCRIPTION", *_prose(usage().split("\n\n")[1])]
     lines += [".SH COMMANDS", *_entries((f"photostrip-{name}(1)", entry.help) for name, entry in COMMANDS.items())]
-    lines += [".SH OPTIONS", *_entries(_records(root, "option"))]
+    lines += [".SH OPTIONS", *_entries(records(root, "option"))]
     return _ended([*lines, *_tail(f"photostrip-{name}" for name in COMMANDS)])
 
 
@@ -72,10 +74,10 @@ def _command_page(name: str, command: Any) -> str:  # noqa: ANN401
             for inner, each in below.items()
         )
         lines += [".SH COMMANDS", *_entries(pages)]
-    arguments = list(_records(command, "argument"))
+    arguments = list(records(command, "argument"))
     if arguments:
         lines += [".SH ARGUMENTS", *_entries(arguments)]
-    lines += [".SH OPTIONS", *_entries(_records(command, "option"))]
+    lines += [".SH OPTIONS", *_entries(records(command, "option"))]
     if name in COMMANDS:
         lines += [".SH EXAMPLE", ".nf", _safe(COMMANDS[name].example), ".fi"]
     return _ended([*lines, *_tail(["photostrip", *([f"photostrip-{top}"] if top != name else [])])])
@@ -105,7 +107,7 @@ def _synopsis(command: Any) -> str:  # noqa: ANN401
     return " ".join([*words, *([r"\fICOMMAND\fR"] if getattr(command, "commands", {}) else [])])
 
 
-def _records(command: Any, kind: str) -> Iterator[tuple[str, str]]:  # noqa: ANN401
+def records(command: Any, kind: str) -> Iterator[tuple[str, str]]:  # noqa: ANN401
     """Return what ``--help`` says of the arguments, or of the options."""
     with command.make_context(command.name, [], resilient_parsing=True) as context:
         for each in command.get_params(context):

@@ -31,6 +31,8 @@ SINGULAR = 1e-9  # smallest over largest singular value: points that do not dete
 
 @dataclass(frozen=True, eq=False)
 class OrientedPhoto:
+    """One photo oriented on known points, and how well they fit."""
+
     center: Floats  # (3,): perspective centre, metres, in the frame of the points
     rotation: Floats  # (3, 3): photo to that frame
     # (6, 6): of the centre (metres) and of the small rotation about the axes of the frame (radians) that turns the

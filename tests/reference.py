@@ -1,0 +1,188 @@
+"""Write the reference: names from docstrings, commands from their help (``python -m tests.reference FOLDER``)."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import inspect
+import re
+import textwrap
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import photostrip
+from photostrip.cli.command_table import COMMANDS
+from photostrip.cli.jobs.manual import EXIT_CODES, VARIABLES, every_command, records
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+ARGUMENT = re.compile(r"(?:[a-z_]\w*(?:, (?=[a-z_]))?)+: ")  # ``left, right: ...`` in a docstring
+PARAGRAPH = re.compile(r"(Returns|Raises|Source:?) ?")
+WIDTH = 100  # of a signature on one line
+STEPS = ("interior", "refine", "relative", "chain", "intersection", "scale_transfer", "absolute", "polynomial",
+         "resection", "bundle")  # fmt: skip
+
+
+def python_page() -> str:
+    """Write every public name with its signature and what its docstring says."""
+    found = [getattr(photostrip, name) for name in photostrip.__all__ if name != "steps"]
+    functions = [each for each in found if inspect.isfunction(each)]
+    errors = [each for each in found if inspect.isclass(each) and issubclass(each, Exception)]
+    classes = [each for each in found if inspect.isclass(each) and each not in errors]
+    steps = [getattr(photostrip.steps, name) for name in STEPS]
+    lines = [
+        "# Reference: Python",
+        "",
+        "What stays from version to version: see [In Python](../library.md#what-stays).",
+        "",
+    ]
+    for title, listed in (("Functions", functions), ("Objects", classes), ("Errors", errors)):
+        lines += [f"## {title}", ""]
+        for each in listed:
+            lines += _function(each, "photostrip.") if inspect.isfunction(each) else _class(each)
+    lines += ["## Steps: `photostrip.steps`", "", *_prose(inspect.getdoc(photostrip.steps) or "")]
+    for each in steps:
+        lines += _function(each, "steps.")
+    for name in photostrip.steps.__all__:
+        lines += _class(getattr(photostrip.steps, name)) if name[0].isupper() else []
+    return "\n".join(lines)
+
+
+def _function(function: Callable[..., Any], above: str) -> list[str]:
+    lines = [f"### `{above}{function.__name__}`", "", "```python", _signature(function), "```", ""]
+    return [*lines, *_prose(inspect.getdoc(function) or "")]
+
+
+def _class(kind: type) -> list[str]:
+    """Write a class with its attributes, properties and methods."""
+    lines = [f"### `{kind.__name__}`", "", *_prose(inspect.getdoc(kind) or "")]
+    rows = [*_attributes(kind), *_properties(kind)]
+    if rows:
+        lines += ["| attribute | |", "|---|---|", *(f"| `{name}` | {_escaped(text)} |" for name, text in rows), ""]
+    for name, member in vars(kind).items():
+        if inspect.isfunction(member) and (not name.startswith("_") or name == "__getitem__"):
+            title = f"`{kind.__name__}[key]`" if name == "__getitem__" else f"`{kind.__name__}.{name}`"
+            lines += [f"#### {title}", "", "```python", _signature(member), "```", ""]
+            lines += _prose(inspect.getdoc(member) or "")
+    return lines
+
+
+def _properties(kind: type) -> Iterator[tuple[str, str]]:
+    for name, member in vars(kind).items():
+        if not name.startswith("_") and (isinstance(member, property) or hasattr(member, "attrname")):
+            yield name, " ".join((inspect.getdoc(member) or "").split())
+
+
+def _attributes(kind: type) -> Iterator[tuple[str, str]]:
+    """Return what a class sets in its ``__init__`` and describes below, and fields with the comment beside them."""
+    source = textwrap.dedent(inspect.getsource(kind))
+    lines, (tree,) = source.splitlines(), ast.parse(source).body
+    assert isinstance(tree, ast.ClassDef)
+    for node in tree.body:
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            beside = lines[node.lineno - 1].partition("  # ")[2]
+            above: list[str] = []
+            for line in reversed(lines[: node.lineno - 1]):
+                if not line.strip().startswith("# ") or beside:
+                    break
+                above.insert(0, line.strip().removeprefix("# "))
+            yield node.target.id, beside or " ".join(above) or _below(tree.body, node)
+        if isinstance(node, ast.FunctionDef) and node.name == "__init__":
+            for one in node.body:
+                for target in ast.walk(one) if _below(node.body, one) else ():
+                    if isinstance(target, ast.Attribute) and isinstance(target.ctx, ast.Store):
+                        yield target.attr, _below(node.body, one)
+
+
+def _below(body: list[ast.stmt], one: ast.stmt) -> str:
+    """Return the text that stands below a statement."""
+    after = dict(pairwise(body)).get(one)
+    return (
+        " ".join(str(after.value.value).split())
+        if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        else ""
+    )
+
+
+def _signature(function: Callable[..., Any]) -> str:
+    signature, parts = inspect.signature(function), []
+    for name, each in signature.parameters.items():
+        if each.kind is each.KEYWORD_ONLY and "*" not in parts:
+            parts.append("*")
+        stars = "**" if each.kind is each.VAR_KEYWORD else ""
+        default = "" if each.default is each.empty else f" = {each.default!r}"
+        parts += [f"{stars}{name}: {each.annotation}{default}"] if name != "self" else []
+    head, back = f"{function.__name__}(", f") -> {signature.return_annotation}"
+    one = head + ", ".join(parts) + back
+    return one if len(one) <= WIDTH else "\n".join([head, *(f"    {each}," for each in parts), back])
+
+
+def _prose(text: str) -> list[str]:
+    """Write a docstring: paragraphs, arguments as a list, and what is returned and raised on lines of their own."""
+    lines: list[str] = []
+    for paragraph in text.split("\n\n"):
+        items: list[str] = []
+        for line in paragraph.splitlines():
+            argument = ARGUMENT.match(line)
+            if argument:
+                names = ", ".join(f"`{name}`" for name in argument[0].removesuffix(": ").split(", "))
+                items.append(f"- {names}: {_escaped(line[argument.end() :])}")
+            elif PARAGRAPH.match(line) or not items:
+                items.append(_escaped(line))
+            else:
+                items[-1] += f" {_escaped(line.strip())}"
+        for before, item in zip(["", *items], items, strict=False):
+            lines += [""] if not (before.startswith("- ") and item.startswith("- ")) else []
+            lines.append(item)
+        lines.append("")
+    return [line for before, line in zip(["", *lines], lines, strict=False) if line or before]
+
+
+def _escaped(text: str) -> str:
+    """Keep signs of Markdown outside of code, and write code as Markdown does."""
+    parts = re.split(r"(``.*?``|`[^`]*`)", text)
+    return "".join(
+        f"`{part.strip('`')}`" if part.startswith("`") else re.sub(r"([*^~<$|])", r"\\\1", part) for part in parts
+    )
+
+
+def command_page() -> str:
+    """Write every command with its arguments and options, as ``--help`` and the manual pages have them."""
+    lines = ["# Reference: commands", "", "The same as `photostrip COMMAND --help` and `photostrip man COMMAND`.", ""]
+    for name, command in every_command():
+        lines += [f"## `photostrip {name}`", ""]
+        for paragraph in (command.help or "").partition("\f")[0].replace("\b", "").strip().split("\n\n"):
+            lines += [_escaped(" ".join(paragraph.split())), ""]
+        below = getattr(command, "commands", {})
+        if below:
+            links = ", ".join(f"[{each}](#{_anchor(f'photostrip {name} {each}')})" for each in below)
+            lines += [f"Commands: {links}.", ""]
+        rows = [*records(command, "argument"), *records(command, "option")]
+        lines += ["| argument, option | |", "|---|---|"]
+        lines += [f"| {_escaped(f'`{term}`')} | {_escaped(text)} |" for term, text in rows]
+        if name in COMMANDS:
+            lines += ["", "```text", *textwrap.dedent(COMMANDS[name].example).splitlines(), "```"]
+        lines.append("")
+    for title, entries in (("Exit codes", EXIT_CODES), ("Environment", VARIABLES)):
+        lines += [f"## {title}", "", "| | |", "|---|---|"]
+        lines += [*(f"| `{term}` | {_escaped(text)} |" for term, text in entries), ""]
+    return "\n".join(lines)
+
+
+def _anchor(title: str) -> str:
+    return title.replace(" ", "-")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m tests.reference", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    folder = parser.parse_args().folder
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "python.md").write_text(python_page(), encoding="utf-8")
+    (folder / "commands.md").write_text(command_page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
