@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
 
 
 __all__ = [
@@ -370,7 +370,7 @@ def _rows(values: ArrayLike, width: int) -> Floats:
     return found
 
 
-def _same(one: Floats, other: Floats) -> None:
+def _same(one: Floats, other: Floats | Numbers) -> None:
     if len(one) != len(other):
         raise InputError(f"{len(one)} and {len(other)} rows: each point needs a row in both")
 

@@ -283,7 +283,7 @@ def test_the_commands_are_the_functions(truth: Truth, tmp_path: Path, capsys: py
     control = table(tmp_path / "bend.csv", "point x y z misclosure", ids, expected.model, bend)
     assert main(["step", "polynomial", control, "--terms", "1,X", "--format", "json"]) == 0
     fitted = values(capsys.readouterr().out)
-    assert (fitted["1"], fitted["X"]) == (pytest.approx(2), pytest.approx(3e-3))
+    assert [fitted["1"], fitted["X"]] == pytest.approx([2, 3e-3])
 
     base = ",".join(str(each) for each in truth.rotations[0].T @ (truth.centers[1] - truth.centers[0]))
     angles = ",".join(str(found[name]) for name in ("omega", "phi", "kappa"))
@@ -312,9 +312,9 @@ def traced(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, dic
 def test_a_trace_leads_to_what_the_step_found(truth: Truth, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ids = truth.common(0, 1)
     rng = np.random.default_rng(2)
-    images = [truth.image(photo, ids) + rng.normal(0, 0.005, (len(ids), 2)) for photo in (0, 1)]
-    pair = table(tmp_path / "pair.csv", "point x_left y_left x_right y_right", ids, *images)
-    found = steps.relative(*images, F, base=920.0)
+    left, right = (truth.image(photo, ids) + rng.normal(0, 0.005, (len(ids), 2)) for photo in (0, 1))
+    pair = table(tmp_path / "pair.csv", "point x_left y_left x_right y_right", ids, left, right)
+    found = steps.relative(left, right, F, base=920.0)
     tables = traced(capsys, "relative", pair, "-f", "153", "--base", "920")
     before, added = tables["Elements before each step"], tables["What the step adds"]
     for k, name in enumerate(("alpha1", "kappa1", "alpha2", "omega2", "kappa2")):
@@ -328,12 +328,12 @@ def test_a_trace_leads_to_what_the_step_found(truth: Truth, tmp_path: Path, caps
 
     tables = traced(capsys, "intersection", pair, "-f", "153", "--base=900,10,-20", "--right=0.2,-0.1,1.4")
     turned = from_angles(np.radians([0.2, -0.1, 1.4]), "omega-phi-kappa")
-    met = steps.intersection(*images, F, base=[900, 10, -20], rotations=(np.eye(3), turned))
+    met = steps.intersection(left, right, F, base=[900, 10, -20], rotations=(np.eye(3), turned))
     np.testing.assert_allclose(tables["Points"]["Y1"] - tables["Points"]["Y2"], met.gap, atol=1e-9)
 
-    photo = table(tmp_path / "photo.csv", "point x y x_ground y_ground z_ground", ids, images[0], truth.xyz(ids))
+    photo = table(tmp_path / "photo.csv", "point x y x_ground y_ground z_ground", ids, left, truth.xyz(ids))
     tables = traced(capsys, "resection", photo, "-f", "153")
-    oriented = steps.resection(images[0], truth.xyz(ids), F)
+    oriented = steps.resection(left, truth.xyz(ids), F)
     before, added = tables["Centre before each step"], tables["What the step adds"]
     assert before["X0"][-1] + added["dX0"][-1] == pytest.approx(oriented.center[0], abs=1e-7)
     assert before["[vv]"][-1] == pytest.approx((oriented.residuals**2).sum())
