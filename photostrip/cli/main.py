@@ -109,7 +109,6 @@ def _call(name: str, arguments: list[str]) -> int:
     """
     import typer
 
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # to look for them it reads every installed package, 8 ms
     command = _parser(name, getattr(import_module(COMMANDS[name].module), name))
     # the class of every usage error; typer does not export it, but derives BadParameter from it
     usage_error = cast("type[Exception]", typer.BadParameter.__base__)
@@ -132,11 +131,14 @@ def _parser(name: str, target: Callable[..., object]) -> Command:
     """Let typer make what reads the arguments of a command."""
     import typer
 
+    from photostrip.cli.typed_values import read_plainly
+
     app = target
     if not isinstance(app, typer.Typer):
         app = typer.Typer(add_completion=False, rich_markup_mode=None)
         app.command(name, context_settings=HELP_NAMES)(target)
     command = typer.main.get_command(app)
+    read_plainly(command)
     command.epilog = f"\b\nExample:\n  {COMMANDS[name].example}"  # \b: typer keeps the line breaks
     return command
 

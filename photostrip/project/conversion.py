@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
     from photostrip.project.schema.processing import Processing
     from photostrip.project.schema.project_file import ProjectFile
-    from photostrip.project.schema.values import Section
+    from photostrip.project.schema.sections import Section
     from photostrip.triangulation.image_coordinates.certificate import Certificate
 
 T = TypeVar("T", bound="DataclassInstance")
@@ -362,14 +362,14 @@ def settings(project: ProjectFile) -> Settings:
         ),
         angle_system=project.output.angles.system,
         angle_unit=project.output.angles.unit,
-        tolerances={name: limit for name, limit in project.tolerances if limit is not None},
+        tolerances={name: limit for name, limit in project.tolerances.values().items() if limit is not None},
         accept=tuple(map(str, project.accept)),
     )
 
 
 def _laid_over(usual: T, given: Section) -> T:
     """Replace the fields of settings by the keys of a section that has the same names."""
-    changed: dict[str, Any] = dict(given)
+    changed = given.values()
     for name, value in changed.items():
         if isinstance(value, list):
             changed[name] = type(getattr(usual, name))(map(str, value))

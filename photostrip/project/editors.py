@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
+from copy import deepcopy
 from importlib import import_module
-from typing import Any
+from inspect import getdoc
+from types import EllipsisType
+from typing import Annotated, Any, get_args, get_origin
 
-from photostrip.project.schema.values import AUTO, Section
+from photostrip.project.schema.sections import Key, Length, Read, Section, bare, types
+from photostrip.project.schema.values import AUTO
 
 KINDS = {  # where the keys of each kind of file stand, and its title
     "project": ("schema.project_file", "ProjectFile", "photostrip project"),
@@ -25,42 +28,62 @@ def schema_of(kind: str) -> dict[str, Any]:
     """Return the JSON Schema of a kind of file; the same on every call."""
     module, name, title = KINDS[kind]
     file: type[Section] = getattr(import_module(f"photostrip.project.{module}"), name)
-    _build(file)
-    with warnings.catch_warnings():
-        # defaults of nested sections are encoded twice, and the second time a tuple of words is a list
-        warnings.filterwarnings("ignore", message="Pydantic serializer warnings", category=UserWarning)
-        schema = _for_editors(file.model_json_schema())
+    blocks: dict[str, Any] = {}
+    whole = _section(file, blocks)
     needed = MEASURED if kind == "project" else {}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **schema, **needed}
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
+    return {**head, **({"$defs": dict(sorted(blocks.items()))} if blocks else {}), **whole, **needed}
 
 
-def _build(kind: type[Section]) -> None:
-    """Build all sections: early versions of pydantic cannot describe a default of one that is not built yet."""
-    for field in kind.model_fields.values():
-        if isinstance(field.annotation, type) and issubclass(field.annotation, Section):
-            _build(field.annotation)
-    kind.model_rebuild()
+def _section(kind: type[Section], blocks: dict[str, Any]) -> dict[str, Any]:
+    """Describe a section; those below it become `blocks`."""
+    keys = {name: _key(entry, types(kind)[name], blocks) for name, entry in kind.keys.items()}
+    required = [name for name, entry in kind.keys.items() if isinstance(entry.default, EllipsisType)]
+    return {
+        "additionalProperties": False,
+        "description": getdoc(kind),
+        "properties": keys,
+        **({"required": required} if required else {}),
+        "type": "object",
+    }
 
 
-def _for_editors(schema: Any) -> Any:  # noqa: ANN401 (JSON)
-    """Take out what pydantic adds: titles made of names, and null, which no key accepts."""
-    if isinstance(schema, list):
-        return [_for_editors(each) for each in schema]
-    if not isinstance(schema, dict):
-        return schema
-    result = {name: _for_editors(each) for name, each in schema.items() if name != "title" or isinstance(each, dict)}
-    if "allOf" in result:  # early versions of pydantic wrap a reference that has a description
-        result |= result.pop("allOf")[0]
-    if result.get("type") == "object" and "minLength" in result:
-        result["minProperties"] = result.pop("minLength")
-    kinds = [each for each in result.get("anyOf", []) if each != {"type": "null"}]
-    if "anyOf" in result:
-        del result["anyOf"]
-        result |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
-    if isinstance(result.get("default"), dict):
-        result["default"] = {}  # the keys of the section carry their own
-    if "default" in result and result["default"] is None:
-        del result["default"]
-        if AUTO in kinds:
-            result["default"] = "auto"
-    return result
+def _key(entry: Key, annotation: Any, blocks: dict[str, Any]) -> dict[str, Any]:  # noqa: ANN401 (a type)
+    """Describe a key."""
+    found: dict[str, Any] = {"description": entry.description}
+    value = _value(annotation, blocks)
+    default = entry.default
+    if isinstance(default, Section):  # the keys of the section carry their own
+        found["default"] = {}
+    elif default is None and AUTO in value.get("anyOf", []):
+        found["default"] = "auto"
+    elif default is not None and default is not ...:
+        found["default"] = list(default) if isinstance(default, tuple) else default
+    if entry.unit:
+        found["unit"] = entry.unit
+    return dict(sorted({**found, **value}.items()))
+
+
+def _value(annotation: Any, blocks: dict[str, Any]) -> dict[str, Any]:  # noqa: ANN401 (a type)
+    """Describe values of a type."""
+    inner = bare(annotation)
+    if get_origin(inner) is Annotated:
+        own = [each.schema for each in inner.__metadata__ if isinstance(each, Read)]
+        found = deepcopy(own[0]) if own else _value(inner.__origin__, blocks)
+        for each in inner.__metadata__:
+            if isinstance(each, Length):
+                kind = "Items" if found["type"] == "array" else "Properties"
+                found |= {f"min{kind}": each.least, **({f"max{kind}": each.most} if each.most else {})}
+        return found
+    if isinstance(inner, type) and issubclass(inner, Section):
+        if inner.__name__ not in blocks:
+            blocks[inner.__name__] = {}
+            blocks[inner.__name__] = _section(inner, blocks)
+        return {"$ref": f"#/$defs/{inner.__name__}"}
+    parts = get_args(inner)
+    if get_origin(inner) is tuple:
+        entries = [_value(each, blocks) for each in parts]
+        return {"type": "array", "prefixItems": entries, "minItems": len(parts), "maxItems": len(parts)}
+    if get_origin(inner) is list:
+        return {"type": "array", "items": _value(parts[0], blocks)}
+    return {"type": "object", "additionalProperties": _value(parts[1], blocks)}

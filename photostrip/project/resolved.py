@@ -7,13 +7,12 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel
-
 from photostrip.formats.text.source import seen_from
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.project.conversion import first_frame, output_spec
 from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.ground import Ellipsoid
+from photostrip.project.schema.sections import Section
 from photostrip.project.schema.values import Text
 from photostrip.project.yaml.merging import path_of
 
@@ -55,59 +54,55 @@ def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
     observations, models = project.observations, project.models
     if observations is not None:
         usual = None if project.fiducial_measurements else "top-left" if observations.unit == "px" else "center"
-        observations = observations.model_copy(
-            update={
-                "file": _relative(root, path, "observations"),
-                "y_axis": observations.y_axis or "up",
-                "origin": observations.origin or usual,
-            }
+        observations = observations.changed(
+            file=_relative(root, path, "observations"),
+            y_axis=observations.y_axis or "up",
+            origin=observations.origin or usual,
         )
     if models is not None:
         centers = models.centers
         if centers is not None:
-            centers = centers.model_copy(update={"file": _relative(root, path, "models", "centers")})
-        filled_in = {"center_sigma": models.center_sigma or models.sigma, "centers": centers}
-        models = models.model_copy(update={"file": _relative(root, path, "models"), **filled_in})
+            centers = centers.changed(file=_relative(root, path, "models", "centers"))
+        sigma = models.center_sigma or models.sigma
+        models = models.changed(file=_relative(root, path, "models"), center_sigma=sigma, centers=centers)
     marks = project.fiducial_measurements
     if marks is not None and observations is not None:
         same = marks.unit in {None, observations.unit}
-        update = {
-            "file": _relative(root, path, "fiducial_measurements"),
-            "unit": marks.unit or observations.unit,
-            "y_axis": marks.y_axis or observations.y_axis,
-            "sigma": marks.sigma or (observations.sigma if same else None),
-        }
-        marks = marks.model_copy(update=update)
+        marks = marks.changed(
+            file=_relative(root, path, "fiducial_measurements"),
+            unit=marks.unit or observations.unit,
+            y_axis=marks.y_axis or observations.y_axis,
+            sigma=marks.sigma or (observations.sigma if same else None),
+        )
     control = [
-        each.model_copy(update={"file": _relative(root, path, "control", i), "axes": each.axes or CARTESIAN_AXES})
+        each.changed(file=_relative(root, path, "control", i), axes=each.axes or CARTESIAN_AXES)
         for i, each in enumerate(project.control)
     ]
     cameras: dict[str, Any] = {
-        name: each.model_copy(update={"file": _relative(root, path, name), "axes": each.axes or CARTESIAN_AXES})
+        name: each.changed(file=_relative(root, path, name), axes=each.axes or CARTESIAN_AXES)
         for name in ("camera_positions", "orientations")
         if (each := getattr(project, name)) is not None
     }
     spec = output_spec(project.output, first_frame(project)) or first_frame(project)
-    ellipsoid = None if spec.ellipsoid is None else Ellipsoid.model_construct(a=spec.ellipsoid[0], b=spec.ellipsoid[1])
-    frame: dict[str, Any] = {
-        "crs": Text(spec.crs),
-        "axes": spec.axes,
-        "height": spec.height,
-        "geoid_undulation": spec.geoid_undulation,
-        "epoch": spec.epoch,
-        "ellipsoid": ellipsoid,
-    }
-    filled: dict[str, Any] = {
-        "name": project.name or Text(Path(path).stem),
-        "extends": None,
-        "observations": observations,
-        "models": models,
-        "fiducial_measurements": marks,
-        "control": control,
+    ellipsoid = None if spec.ellipsoid is None else Ellipsoid(a=spec.ellipsoid[0], b=spec.ellipsoid[1])
+    output = project.output.changed(
+        crs=Text(spec.crs),
+        axes=spec.axes,
+        height=spec.height,
+        geoid_undulation=spec.geoid_undulation,
+        epoch=spec.epoch,
+        ellipsoid=ellipsoid,
+    )
+    return project.changed(
+        name=project.name or Text(Path(path).stem),
+        extends=None,
+        observations=observations,
+        models=models,
+        fiducial_measurements=marks,
+        control=control,
+        output=output,
         **cameras,
-        "output": project.output.model_copy(update=frame),
-    }
-    return project.model_copy(update=filled)
+    )
 
 
 def _relative(root: Node, project: str, *owner: str | int) -> Text:
@@ -133,9 +128,9 @@ def text_of(project: ProjectFile) -> str:
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
     """Turn sections into mappings, without keys that say nothing."""
-    if isinstance(value, BaseModel):
+    if isinstance(value, Section):
         skipped = ("k", "p", "b") if isinstance(value, Distortion) and value.model == "radial-table" else ()
-        fields = ((name, getattr(value, name)) for name in type(value).model_fields if name not in skipped)
+        fields = ((name, getattr(value, name)) for name in type(value).keys if name not in skipped)
         return {
             name: "auto" if each is None else _plain(each)
             for name, each in fields

@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator
-
 from photostrip import camera, simulation
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
@@ -19,6 +17,7 @@ from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.ground import CRS, UNDULATION, Ellipsoid
 from photostrip.project.schema.measurements import Unit
+from photostrip.project.schema.sections import After, Before, Section, key, wrong
 from photostrip.project.schema.values import (
     Axes,
     Flag,
@@ -26,14 +25,11 @@ from photostrip.project.schema.values import (
     Number,
     Pair,
     Positive,
-    Section,
     Triple,
     Whole,
     Words,
     YAxis,
-    key,
     schema_number,
-    wrong,
 )
 from photostrip.project.yaml.reading import Reading, read_file
 
@@ -60,15 +56,13 @@ def _shares(value: object) -> object:
     return {value: "1"} if isinstance(value, str) and value else value
 
 
-Shares = Annotated[dict[str, Number], BeforeValidator(_shares)]
+Shares = Annotated[dict[str, Number], Before(_shares)]
 
 
 class SimulatedCamera(Section):
     """The camera: a preset, and what is different from it."""
 
-    preset: Annotated[Words, AfterValidator(_preset)] = key(
-        "`film` (153 mm, 230 mm) or `digital` (100.5 mm, 6 um)", "film"
-    )
+    preset: Annotated[Words, After(_preset)] = key("`film` (153 mm, 230 mm) or `digital` (100.5 mm, 6 um)", "film")
     name: Words | None = key("Name of the camera; default: that of the preset", None)
     principal_distance: Positive | None = key("Principal distance", None, unit="mm")
     principal_point: Pair | None = key("Principal point in the system of the image coordinates", None, unit="mm")
@@ -203,18 +197,18 @@ class SimulationFile(Section):
     """A specification: strips of photos to be simulated. Every key has a default."""
 
     photostrip_simulation: Annotated[
-        Whole, AfterValidator(schema_number("photostrip_simulation", SCHEMA_NUMBER, " of simulations"))
+        Whole, After(schema_number("photostrip_simulation", SCHEMA_NUMBER, " of simulations"))
     ] = key("Number of this schema")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the project", USUAL.name)
     seed: Whole = key("Number that all random numbers come from", USUAL.seed)
-    camera: SimulatedCamera = key("Camera", SimulatedCamera.model_construct())
-    ground: Ground = key("Frame and place", Ground.model_construct())
-    flight: Flight = key("Photos and strips", Flight.model_construct())
-    terrain: Terrain = key("The ground", Terrain.model_construct())
-    points: Points = key("Pass points", Points.model_construct())
-    control: Control = key("Control and check points", Control.model_construct())
-    image: Image = key("Measurement of image coordinates", Image.model_construct())
+    camera: SimulatedCamera = key("Camera", SimulatedCamera())
+    ground: Ground = key("Frame and place", Ground())
+    flight: Flight = key("Photos and strips", Flight())
+    terrain: Terrain = key("The ground", Terrain())
+    points: Points = key("Pass points", Points())
+    control: Control = key("Control and check points", Control())
+    image: Image = key("Measurement of image coordinates", Image())
     film: Film | None = key("Deformed film with measured fiducial marks; default: none", None)
     refraction: Flag = key("Bend the rays in the standard atmosphere", USUAL.refraction)
     gross_errors: list[GrossError] = key("Gross errors", [])
@@ -263,7 +257,7 @@ def _spec(given: SimulationFile) -> simulation.Spec:
 
 def _fields(section: Section) -> dict[str, Any]:
     """Values of a section by key, texts as plain texts."""
-    values = {name: getattr(section, name) for name in type(section).model_fields}
+    values = {name: getattr(section, name) for name in type(section).keys}
     return {name: str(value) if isinstance(value, str) else value for name, value in values.items()}
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from pydantic import PlainValidator, WithJsonSchema
-
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.text.numbers import NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
-from photostrip.project.schema.values import Flag, Section, Words, key, schema_number, wrong
+from photostrip.project.schema.sections import Read, Section, key, wrong
+from photostrip.project.schema.values import Flag, Words, schema_number
 from photostrip.project.yaml.reading import read_file
 
 if TYPE_CHECKING:
@@ -41,14 +40,10 @@ def _whole(value: object) -> int:
     return int(found)
 
 
-Size = Annotated[float, PlainValidator(_size), WithJsonSchema({"type": "number", "minimum": 0})]
-Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"type": "integer", "minimum": 0})]
+Size = Annotated[float, Read(_size, {"type": "number", "minimum": 0})]
+Whole = Annotated[int, Read(_whole, {"type": "integer", "minimum": 0})]
 _read_schema_number = schema_number("photostrip_tolerances", SCHEMA_NUMBER, " of tolerances")
-SchemaNumber = Annotated[
-    int,
-    PlainValidator(_read_schema_number),
-    WithJsonSchema({"const": SCHEMA_NUMBER}),
-]
+SchemaNumber = Annotated[int, Read(_read_schema_number, {"const": SCHEMA_NUMBER})]
 
 
 class Absolute(Section):
@@ -80,7 +75,7 @@ class Members(Section):
 
 def _usual(kind: type[T], usual: Tolerance | SetTolerance) -> T:
     """Return a section that holds the defaults."""
-    return kind.model_construct(**{name: getattr(usual, name) for name in kind.model_fields})
+    return kind(**{name: getattr(usual, name) for name in kind.keys})
 
 
 class ToleranceFile(Section):
@@ -111,5 +106,5 @@ def load_tolerances(path: Path) -> tuple[Tolerances, Sequence[str]]:
 
 def _completed(usual: Tolerance | SetTolerance, given: Section) -> Any:  # noqa: ANN401 (the type of `usual`)
     """Lay what is given over the default."""
-    named = {name: getattr(given, name) for name in type(given).model_fields}
+    named = {name: getattr(given, name) for name in type(given).keys}
     return replace(usual, **{name: value for name, value in named.items() if value is not None})

@@ -19,11 +19,7 @@ if TYPE_CHECKING:
 
 RATIO = 4.0  # to loading the libraries, which takes 0.25 to 0.35 s of the processor
 MEMORY_MB = 200
-LIBRARIES = """
-import numpy, pydantic, pyproj, typer, yaml
-class Model(pydantic.BaseModel):
-    number: int
-"""
+LIBRARIES = "import numpy, pyproj, typer, yaml"
 # A small process starts the command: the system counts the memory of the process that starts one as its own at first.
 MEASURED = """
 import json, os, subprocess, sys

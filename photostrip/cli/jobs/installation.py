@@ -57,7 +57,7 @@ def _requirements() -> tuple[list[str], dict[str, list[str]]]:
     try:
         lines = metadata.requires("photostrip") or []
     except metadata.PackageNotFoundError:  # run from a folder, not installed
-        lines = ["numpy", "pydantic", "pyproj", "pyyaml", "rich", "scipy", "typer"]
+        lines = ["numpy", "pyproj", "pyyaml", "rich", "scipy", "typer"]
     required: list[str] = []
     extras: dict[str, list[str]] = {}
     for line in lines:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
 
 from photostrip.errors import InputError
 from photostrip.planning import camera_efficiency
 from photostrip.project.conversion import distortion_of
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Percent, SigmaUm, read_plan
 from photostrip.project.schema.cameras import Distortion
-from photostrip.project.schema.values import Id, Number, Positive, Range, Section, Words, bounded, key, one_of, wrong
+from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
+from photostrip.project.schema.values import Id, Number, Positive, Range, Words, bounded, one_of
 from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-Lap = Annotated[Number, AfterValidator(bounded(Range(0.0, 90.0, "%")))]
-Relief = Annotated[Number, AfterValidator(bounded(Range(0.0, 9000.0, "m")))]
-Slope = Annotated[Number, AfterValidator(bounded(Range(0.0, 89.0, "deg")))]
+Lap = Annotated[Number, After(bounded(Range(0.0, 90.0, "%")))]
+Relief = Annotated[Number, After(bounded(Range(0.0, 9000.0, "m")))]
+Slope = Annotated[Number, After(bounded(Range(0.0, 89.0, "deg")))]
 FLOWN = ("scale", "flying_height", "height_sigma")
 
 
@@ -40,14 +40,13 @@ class PlanCamera(Section):
     base: Positive | None = key("Photo base; default: from `format` and the overlap", None, unit="mm")
     format: tuple[Positive, Positive] | None = key("Length along and width across the flight", None, unit="mm")
 
-    @model_validator(mode="after")
-    def _has_a_base(self) -> Self:
+    @Rule
+    def _has_a_base(self) -> None:
         if self.base is None and self.format is None:
             raise wrong("nothing says how long the photo base is", code="missing-key", expected="`base` or `format`")
-        return self
 
-    @model_validator(mode="after")
-    def _has_one_precision(self) -> Self:
+    @Rule
+    def _has_one_precision(self) -> None:
         if (self.sigma_um is None) == (self.image_sigma_um is None):
             what = "nothing says" if self.sigma_um is None else "two keys say"
             message = f"{what} how well an x parallax is known"
@@ -62,13 +61,12 @@ class PlanCamera(Section):
         if self.distortion is not None and self.format is None:
             message = "where the distortion lies in a model follows from the format, which is not given"
             raise wrong(message, code="missing-key", at="distortion", expected="`format`")
-        return self
 
 
 class CameraPlanFile(Section):
     """Cameras to compare."""
 
-    photostrip_plan_cameras: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_cameras: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the comparison", "cameras")
     end_lap_percent: Percent = key("Overlap, for cameras without `base`", 60.0, unit="%")
@@ -79,10 +77,10 @@ class CameraPlanFile(Section):
     relief: Relief = key("Difference between the highest and the lowest ground", 0.0, unit="m")
     slope_deg: Slope = key("Steepest slope that is to be seen", 0.0, unit="deg")
     reference: Id | None = key("Camera that the others stand beside; default: the last", None)
-    cameras: Annotated[dict[Id, PlanCamera], Field(min_length=1)] = key("Cameras by name")
+    cameras: Annotated[dict[Id, PlanCamera], Length(1)] = key("Cameras by name")
 
-    @model_validator(mode="after")
-    def _reference_is_there(self) -> Self:
+    @Rule
+    def _reference_is_there(self) -> None:
         if self.reference is not None and self.reference not in self.cameras:
             expected = f"one of {', '.join(self.cameras)}"
             raise wrong(
@@ -93,10 +91,9 @@ class CameraPlanFile(Section):
             lacking = next(name for name in self.cameras if name not in wide)
             message = f"camera `{lacking}` has no format, and others have: areas cannot be compared"
             raise wrong(message, code="missing-key", at="cameras", fix="give `format` for all cameras, or for none")
-        return self
 
-    @model_validator(mode="after")
-    def _flown_one_way(self) -> Self:
+    @Rule
+    def _flown_one_way(self) -> None:
         given = [name for name in FLOWN if getattr(self, name) is not None]
         if len(given) > 1:
             raise wrong(f"`{given[0]}` and `{given[1]}` are both given", code="two-keys", at=given[1], fix="remove one")
@@ -109,7 +106,6 @@ class CameraPlanFile(Section):
         if self.relief and any(camera.format is None for camera in self.cameras.values()):
             message = "how far photos overlap on high ground follows from their format, which is not given"
             raise wrong(message, code="missing-key", at="relief", fix="give `format` for all cameras")
-        return self
 
 
 class CameraPlan(NamedTuple):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
 
 from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
-from photostrip.project.schema.values import Fraction, Number, Range, Section, Words, bounded, key, one_of, wrong
+from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
+from photostrip.project.schema.values import Fraction, Number, Range, Words, bounded, one_of
 from photostrip.project.terrestrial.cameras import Distance, Size
 from photostrip.project.terrestrial.options import chosen_camera, required_format
 from photostrip.project.terrestrial.ranges import BASE, DISTANCE, SIGNIFICANCE
@@ -23,48 +23,45 @@ if TYPE_CHECKING:
 PRESET = "UMK 10/1318"
 CONVERGENCE = Range(-45.0, 45.0, "deg")
 POWER = Range(0.5, 0.9999, "")
-Metres = Annotated[Number, AfterValidator(bounded(DISTANCE))]
+Metres = Annotated[Number, After(bounded(DISTANCE))]
 
 
 class DisplacementPlanFile(Section):
     """Expected accuracy of displacements. Every key but the first has a default."""
 
-    photostrip_plan_displacement: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key(
-        "Number of this schema: 1"
-    )
+    photostrip_plan_displacement: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the plan", "displacements")
     camera: Words = key("Name of a camera of the list", PRESET)
     presets: Words | None = key("A list of cameras of your own", None)
     principal_distance: Distance | None = key("Principal distance, instead of that of the list", None, unit="mm")
     format: Size | None = key("Width and height of the photo, likewise", None, unit="mm")
-    stations: Annotated[Words, AfterValidator(one_of("2", "1"))] = key(
+    stations: Annotated[Words, After(one_of("2", "1"))] = key(
         "2, at the ends of a base, or 1, with known distances", "2"
     )
-    base: Annotated[Number, AfterValidator(bounded(BASE))] = key("Length of the base", 20.0, unit="m")
-    convergence_deg: Annotated[Number, AfterValidator(bounded(CONVERGENCE))] = key(
+    base: Annotated[Number, After(bounded(BASE))] = key("Length of the base", 20.0, unit="m")
+    convergence_deg: Annotated[Number, After(bounded(CONVERGENCE))] = key(
         "Turn of each camera towards the other", 0.0, unit="deg"
     )
-    distances: Annotated[list[Metres], Field(min_length=1, max_length=50)] = key(
+    distances: Annotated[list[Metres], Length(1, 50)] = key(
         "Distances of the object from the base", [50.0, 100.0, 200.0], unit="m"
     )
     sigma_um: SigmaUm | None = key("Standard deviation of an image coordinate of each epoch", None, unit="um")
     sigma_d_um: SigmaUm | None = key("That of a pseudo-parallax, instead; default: 5", None, unit="um")
-    significance: Annotated[Fraction, AfterValidator(bounded(SIGNIFICANCE))] = key(
+    significance: Annotated[Fraction, After(bounded(SIGNIFICANCE))] = key(
         "Probability of calling a point moved that did not move", DisplacementSpec.significance
     )
-    power: Annotated[Fraction, AfterValidator(bounded(POWER))] = key(
+    power: Annotated[Fraction, After(bounded(POWER))] = key(
         "Probability with which the displacements stated are found", DisplacementSpec.power
     )
 
-    @model_validator(mode="after")
-    def _one_precision(self) -> Self:
+    @Rule
+    def _one_precision(self) -> None:
         if self.sigma_um is not None and self.sigma_d_um is not None:
             message = "the standard deviation of a coordinate and that of a pseudo-parallax are both given"
             raise wrong(message, code="two-keys", at="sigma_d_um", fix="remove one")
         if self.stations == "1" and self.convergence_deg:
             raise wrong("one camera has no other to be turned towards", at="convergence_deg", fix="remove it")
-        return self
 
 
 class DisplacementPlan(NamedTuple):

@@ -6,13 +6,12 @@ these keys.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Self, TypeVar
-
-from pydantic import AfterValidator, model_validator
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from photostrip.formats.text.findings import Findings
 from photostrip.planning.strip.ideal_strip import StripGeometry
-from photostrip.project.schema.values import Positive, Range, Section, Triple, Words, bounded, key, wrong
+from photostrip.project.schema.sections import After, Rule, Section, key, wrong
+from photostrip.project.schema.values import Positive, Range, Triple, Words, bounded
 from photostrip.project.simulation import SimulatedCamera
 from photostrip.project.terrestrial.ranges import IMAGE_SIGMA_UM
 from photostrip.project.yaml.document import COMMAND_LINE, Node, Place
@@ -36,8 +35,8 @@ NUMBER_KEYS = {
 }
 OVERLAP = Range(1.0, 99.0, "%")
 
-Percent = Annotated[Positive, AfterValidator(bounded(OVERLAP))]
-SigmaUm = Annotated[Positive, AfterValidator(bounded(IMAGE_SIGMA_UM))]
+Percent = Annotated[Positive, After(bounded(OVERLAP))]
+SigmaUm = Annotated[Positive, After(bounded(IMAGE_SIGMA_UM))]
 
 
 def all_positive(value: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -47,24 +46,23 @@ def all_positive(value: tuple[float, float, float]) -> tuple[float, float, float
     return value
 
 
-Sigmas = Annotated[Triple, AfterValidator(all_positive)]
+Sigmas = Annotated[Triple, After(all_positive)]
 
 
 class Flown(Section):
     """A plan of something that is flown: camera, overlap, scale, measuring."""
 
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
-    camera: SimulatedCamera = key("Camera; its lens counts as ideal", SimulatedCamera.model_construct())
+    camera: SimulatedCamera = key("Camera; its lens counts as ideal", SimulatedCamera())
     end_lap_percent: Percent = key("Overlap of neighbouring photos", StripGeometry.end_lap_percent, unit="%")
     scale: Positive | None = key("Denominator of the photo scale; default: 10000", None)
     flying_height: Positive | None = key("Height above the ground, instead of `scale`", None, unit="m")
     image_sigma_um: SigmaUm = key("Standard deviation of an image coordinate", 5.0, unit="um")
 
-    @model_validator(mode="after")
-    def _one_scale(self) -> Self:
+    @Rule
+    def _one_scale(self) -> None:
         if self.scale is not None and self.flying_height is not None:
             raise wrong("photo scale and flying height are both given", at="flying_height", fix="remove one")
-        return self
 
     def scale_of(self, camera: Camera) -> float:
         """Denominator of the photo scale, given itself or by the flying height."""
@@ -75,7 +73,7 @@ class Flown(Section):
 def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> tuple[T, Reading]:
     """Read a plan file, or make one of assignments alone, or raise every fault."""
     if path is None:
-        place, number = Place(COMMAND_LINE), next(name for name in kind.model_fields if name in NUMBER_KEYS)
+        place, number = Place(COMMAND_LINE), next(name for name in kind.keys if name in NUMBER_KEYS)
         root = Node({number: Node(SCHEMA_NUMBER, place)}, place, {number: place})
         reading = Reading(file=COMMAND_LINE, root=root, findings=Findings(), files=[])
     else:

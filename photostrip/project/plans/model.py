@@ -2,28 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
-
-from pydantic import AfterValidator, BeforeValidator, model_validator
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from photostrip.errors import Fault, InputError
 from photostrip.planning.model.plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.schema.values import (
-    Id,
-    Number,
-    Pair,
-    Positive,
-    Range,
-    Section,
-    Triple,
-    Whole,
-    Words,
-    bounded,
-    key,
-    one_of,
-    wrong,
-)
+from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong
+from photostrip.project.schema.values import Id, Number, Pair, Positive, Range, Triple, Whole, Words, bounded, one_of
 from photostrip.project.simulation import camera_of
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
 
@@ -52,7 +37,7 @@ class ModelControlPoint(ModelPoint):
     """One control point."""
 
     name: Id = key("Name; default: C and its number", "")
-    use: Annotated[Words, AfterValidator(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
     misclosure: Triple | None = key("Model minus given, where it has been measured", None, unit="m")
     given_error: Triple = key("Error of the given coordinates", NO_ERROR, unit="m")
 
@@ -75,10 +60,10 @@ def _control_point(value: object) -> object:
 class ModelControl(Section):
     """The control of the model."""
 
-    layout: Annotated[Words, AfterValidator(one_of(*LAYOUTS))] = key(
+    layout: Annotated[Words, After(one_of(*LAYOUTS))] = key(
         "`corners`, `corners+centre`, or `six` standard points", "corners"
     )
-    points: list[Annotated[ModelControlPoint, BeforeValidator(_control_point)]] = key(
+    points: list[Annotated[ModelControlPoint, Before(_control_point)]] = key(
         "Points instead of a layout: [x, y], or {at: [x, y], use: z}", []
     )
     sigma: Sigmas = key("Standard deviations along, across and in height", ModelSpec.control_sigma, unit="m")
@@ -87,49 +72,48 @@ class ModelControl(Section):
 class ModelOrientation(Section):
     """The points that orient the pair."""
 
-    zone_points: Annotated[Whole, AfterValidator(bounded(ZONE_POINTS))] = key("Points in each of six zones", 1)
+    zone_points: Annotated[Whole, After(bounded(ZONE_POINTS))] = key("Points in each of six zones", 1)
     points: list[Pair] = key("Points instead of zones: [x, y], from the left nadir", [], unit="mm")
 
 
 class Grid(Section):
     """Where errors are computed."""
 
-    columns: Annotated[Whole, AfterValidator(bounded(GRID))] = key("Points along the base", ModelSpec.grid[0])
-    rows: Annotated[Whole, AfterValidator(bounded(GRID))] = key("Points across the flight", ModelSpec.grid[1])
+    columns: Annotated[Whole, After(bounded(GRID))] = key("Points along the base", ModelSpec.grid[0])
+    rows: Annotated[Whole, After(bounded(GRID))] = key("Points across the flight", ModelSpec.grid[1])
 
 
 class ModelPlanFile(Flown):
     """Expected errors over one model. Every key but the first has a default."""
 
-    photostrip_plan_model: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_model: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "model")
     base: Positive | None = key("Photo base, instead of the overlap", None, unit="mm")
-    reach_percent: Annotated[Positive, AfterValidator(bounded(REACH))] = key(
+    reach_percent: Annotated[Positive, After(bounded(REACH))] = key(
         "Outermost points, of half the width of the photo", 80.0, unit="%"
     )
-    orientation: ModelOrientation = key("Points that orient the pair", ModelOrientation.model_construct())
-    control: ModelControl = key("Control", ModelControl.model_construct())
-    grid: Grid = key("Where errors are computed", Grid.model_construct())
+    orientation: ModelOrientation = key("Points that orient the pair", ModelOrientation())
+    control: ModelControl = key("Control", ModelControl())
+    grid: Grid = key("Where errors are computed", Grid())
     points: list[ModelPoint] = key("Further points, with names and heights", [])
-    element_errors: ElementErrors = key("Given errors of the elements", ElementErrors.model_construct())
+    element_errors: ElementErrors = key("Given errors of the elements", ElementErrors())
 
-    @model_validator(mode="after")
-    def _errors_or_misclosures(self) -> Self:
+    @Rule
+    def _errors_or_misclosures(self) -> None:
         measured = [point for point in self.control.points if point.misclosure is not None]
         if not measured:
-            return self
+            return
         if len(measured) < len(self.control.points):
             message = "some control points have a misclosure, and others have none"
             raise wrong(message, code="missing-key", at="control", fix="give it for all control points, or for none")
         every: list[ModelPoint] = [*self.control.points, *self.points]
         made = [point for point in every if any(point.measured_error)]
-        if made or any(any(point.given_error) for point in measured) or any(vars(self.element_errors).values()):
+        if made or any(any(point.given_error) for point in measured) or any(self.element_errors.values().values()):
             message = "misclosures that were found, and errors that would make some, are both given"
             raise wrong(message, code="two-keys", at="control", fix="remove the one or the other")
-        return self
 
-    @model_validator(mode="after")
-    def _points_are_seen(self) -> Self:
+    @Rule
+    def _points_are_seen(self) -> None:
         camera = camera_of(self.camera)
         flying_height = self.scale_of(camera) * camera.principal_distance / MILLIMETRES
         for name, points in (("control", self.control.points), ("points", self.points)):
@@ -137,10 +121,9 @@ class ModelPlanFile(Flown):
             if highest > RELIEF * flying_height:
                 message = f"a point {highest:g} m high is not seen from {flying_height:g} m"
                 raise wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
-        return self
 
 
-ELEMENT_KEYS = tuple(f"element_errors.{name}" for name in ElementErrors.model_fields)
+ELEMENT_KEYS = tuple(f"element_errors.{name}" for name in ElementErrors.keys)
 
 
 def elements_option(text: str | None) -> dict[str, str]:

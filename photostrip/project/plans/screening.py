@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
-
-from pydantic import AfterValidator, Field, model_validator
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
 from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
+from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
 from photostrip.project.schema.values import (
     Fraction,
     NotNegative,
     Number,
     Positive,
     Range,
-    Section,
     Whole,
     Words,
     bounded,
     choice,
-    key,
     one_of,
-    wrong,
 )
 from photostrip.triangulation.gross_errors.pairs.screening import METHODS
 
@@ -36,57 +32,56 @@ TILT, RELIEF = Range(0.0, 10.0, "deg"), Range(0.0, 50.0, "%")
 POINTS, MODELS = Range(0, 100, ""), Range(1, 1000, "")
 REPETITIONS = Range(1, 1000, "")
 
-Length = Annotated[Number, AfterValidator(bounded(LENGTH))]
-Count = Annotated[Whole, AfterValidator(bounded(POINTS))]
+Size = Annotated[Number, After(bounded(LENGTH))]
+Count = Annotated[Whole, After(bounded(POINTS))]
 
 
 class ScreeningPlanFile(Section):
     """An experiment with gross errors in pairs; the defaults are the published one."""
 
-    photostrip_plan_screening: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_screening: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the plan", "screening")
-    principal_distance: Annotated[Number, AfterValidator(bounded(FOCAL))] = key(
+    principal_distance: Annotated[Number, After(bounded(FOCAL))] = key(
         "Principal distance", USUAL.layout.focal, unit="mm"
     )
-    base: Length = key("Photo base", USUAL.layout.base, unit="mm")
-    width: Length = key("Distance of the side zones from the base", USUAL.layout.width, unit="mm")
-    zone_points: Annotated[list[Count], Field(min_length=ZONES, max_length=ZONES)] = key(
+    base: Size = key("Photo base", USUAL.layout.base, unit="mm")
+    width: Size = key("Distance of the side zones from the base", USUAL.layout.width, unit="mm")
+    zone_points: Annotated[list[Count], Length(ZONES, ZONES)] = key(
         "Points in each of the standard zones 1 to 6", list(USUAL.layout.counts)
     )
     zone_reach: NotNegative = key(
         "How far points lie from the middle of their zone, in x and y, at most", USUAL.layout.scatter, unit="mm"
     )
-    tilt: Annotated[Number, AfterValidator(bounded(TILT))] = key("Largest tilt", USUAL.layout.tilt, unit="deg")
-    relief_percent: Annotated[Number, AfterValidator(bounded(RELIEF))] = key(
+    tilt: Annotated[Number, After(bounded(TILT))] = key("Largest tilt", USUAL.layout.tilt, unit="deg")
+    relief_percent: Annotated[Number, After(bounded(RELIEF))] = key(
         "Largest relief, up and down, of the flying height", 100 * USUAL.layout.relief, unit="%"
     )
     parallax_sigma_um: SigmaUm = key(
         "Standard deviation of a y parallax", MICROMETRES * USUAL.layout.parallax_sigma, unit="um"
     )
-    models: Annotated[Whole, AfterValidator(bounded(MODELS))] = key("Pairs, each with an error", USUAL.models)
-    second_errors: Annotated[Whole, AfterValidator(bounded(Range(0, 1000, "")))] = key(
+    models: Annotated[Whole, After(bounded(MODELS))] = key("Pairs, each with an error", USUAL.models)
+    second_errors: Annotated[Whole, After(bounded(Range(0, 1000, "")))] = key(
         "Pairs of them that have a second one", USUAL.second
     )
-    error_sizes_um: Annotated[list[Positive], Field(min_length=1, max_length=20)] = key(
+    error_sizes_um: Annotated[list[Positive], Length(1, 20)] = key(
         "Sizes of the errors, each as often as any other", [MICROMETRES * size for size in USUAL.sizes], unit="um"
     )
-    methods: Annotated[list[Annotated[str, *choice(METHODS)]], Field(min_length=1)] = key(
+    methods: Annotated[list[Annotated[str, choice(METHODS)]], Length(1)] = key(
         "Methods, of `processing.relative.screening`", list(USUAL.methods)
     )
     grubbs_alpha: Fraction = key("Probability of rejecting a good point of a pair", USUAL.grubbs_alpha)
     parallax_limit: Positive = key("Limit of `parallax+grubbs`", USUAL.parallax_limit, unit="mm")
-    repetitions: Annotated[Whole, AfterValidator(bounded(REPETITIONS))] = key(
+    repetitions: Annotated[Whole, After(bounded(REPETITIONS))] = key(
         "How often the experiment is made", USUAL.repetitions
     )
     seed: Whole = key("Number that makes the drawn pairs and errors the same again", USUAL.seed)
 
-    @model_validator(mode="after")
-    def _errors_have_pairs(self) -> Self:
+    @Rule
+    def _errors_have_pairs(self) -> None:
         if self.second_errors > self.models:
             message = f"{self.second_errors} second errors do not go into {self.models} pairs"
             raise wrong(message, code="range", at="second_errors", expected=f"0 to {self.models}")
-        return self
 
 
 class ScreeningPlan(NamedTuple):

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Self
-
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from typing import TYPE_CHECKING, Annotated
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.frozen import dataclass
@@ -15,19 +13,8 @@ from photostrip.planning.strip.ideal_strip import LEAST_PHOTOS, StripGeometry
 from photostrip.planning.strip.methods import BUNDLE, METHODS
 from photostrip.planning.strip.placement import Placement, Required
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.schema.values import (
-    Flag,
-    Id,
-    Positive,
-    Range,
-    Section,
-    Whole,
-    Words,
-    bounded,
-    key,
-    one_of,
-    wrong,
-)
+from photostrip.project.schema.sections import After, Before, Length, Rule, Section, key, read_section, wrong
+from photostrip.project.schema.values import Flag, Id, Positive, Range, Whole, Words, bounded, one_of
 from photostrip.project.simulation import camera_of
 from photostrip.simulation import Points
 
@@ -51,11 +38,11 @@ DEFAULT_LAYOUTS = {"3 bands": "bands=3", "4 bands": "bands=4", "corners": "corne
 class StripPoints(Section):
     """Pass points."""
 
-    rows: Annotated[Whole, AfterValidator(bounded(ROWS))] = key("Points across the flight at each nadir", USUAL.rows)
-    reach_percent: Annotated[Positive, AfterValidator(bounded(REACH))] = key(
+    rows: Annotated[Whole, After(bounded(ROWS))] = key("Points across the flight at each nadir", USUAL.rows)
+    reach_percent: Annotated[Positive, After(bounded(REACH))] = key(
         "Outermost rows, of half the width of the photo", USUAL.reach_percent, unit="%"
     )
-    extra_per_model: Annotated[Whole, AfterValidator(bounded(EXTRA))] = key(
+    extra_per_model: Annotated[Whole, After(bounded(EXTRA))] = key(
         "Further points in each model", USUAL.extra_per_model
     )
 
@@ -64,7 +51,7 @@ class StripSpot(Section):
     """One control point."""
 
     at: tuple[Whole, Whole] = key("Photo at whose nadir it lies, and row from left to right, both counted from 1")
-    use: Annotated[Words, AfterValidator(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
 
 
 def _spot(value: object) -> object:
@@ -90,16 +77,16 @@ def layout_option(word: str) -> tuple[str, str]:
 class StripLayout(Section):
     """One layout of control."""
 
-    layout: Annotated[Words, AfterValidator(one_of(*LAYOUTS))] = key(
+    layout: Annotated[Words, After(one_of(*LAYOUTS))] = key(
         "`bands`, `corners`, `corners+centre`, or `points` alone", USUAL_LAYOUT.kind
     )
     bands: Whole = key("Bands across the strip, from the first to the last photo", USUAL_LAYOUT.bands)
-    every: Annotated[Whole, AfterValidator(bounded(Range(1, 400, "models")))] | None = key(
+    every: Annotated[Whole, After(bounded(Range(1, 400, "models")))] | None = key(
         "Models from band to band, instead of `bands`", None
     )
     per_band: Whole = key("Points of a band", USUAL_LAYOUT.per_band)
-    use: Annotated[Words, AfterValidator(one_of(*USES))] = key("`xyz`, `xy` or `z`", USUAL_LAYOUT.use)
-    points: list[Annotated[StripSpot, BeforeValidator(_spot)]] = key(
+    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", USUAL_LAYOUT.use)
+    points: list[Annotated[StripSpot, Before(_spot)]] = key(
         "Single points, further ones or instead of a band's: [photo, row], or {at: [photo, row], use: z}", []
     )
     sigma: Sigmas | None = key("Standard deviations along, across, in height; default: `control_sigma`", None, unit="m")
@@ -108,11 +95,10 @@ class StripLayout(Section):
     )
     gnss_offset: Flag = key("Whether these have a constant offset to be determined", USUAL_LAYOUT.gnss_offset)
 
-    @model_validator(mode="after")
-    def _one_way_to_space_bands(self) -> Self:
-        if self.every is not None and "bands" in self.model_fields_set:
+    @Rule
+    def _one_way_to_space_bands(self) -> None:
+        if self.every is not None and "bands" in self.given:
             raise wrong("the number of bands and their distance are both given", at="every", fix="remove one")
-        return self
 
 
 class StripRequired(Section):
@@ -125,36 +111,36 @@ class StripRequired(Section):
 class StripPlacement(Section):
     """Further control points to be placed as well as possible."""
 
-    points: Annotated[Whole, AfterValidator(bounded(PLACED))] = key("How many")
+    points: Annotated[Whole, After(bounded(PLACED))] = key("How many")
     into: Id | None = key("Layout that they are added to; default: the first", None)
-    method: Annotated[Words, AfterValidator(one_of(*METHODS))] = key("Method of adjustment", METHODS[-1])
-    use: Annotated[Words, AfterValidator(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+    method: Annotated[Words, After(one_of(*METHODS))] = key("Method of adjustment", METHODS[-1])
+    use: Annotated[Words, After(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
 
 
 class StripPlanFile(Flown):
     """A strip and layouts of its control. Every key but the first has a default."""
 
-    photostrip_plan_strip: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_plan_strip: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
     name: Words = key("Name of the plan", "strip")
-    models: Annotated[Whole, AfterValidator(bounded(MODELS))] = key("Models of the strip, one less than photos", 10)
-    points: StripPoints = key("Pass points", StripPoints.model_construct())
+    models: Annotated[Whole, After(bounded(MODELS))] = key("Models of the strip, one less than photos", 10)
+    points: StripPoints = key("Pass points", StripPoints())
     control_sigma: Sigmas = key("Standard deviations along, across and in height", USUAL_LAYOUT.sigma, unit="m")
     gnss: Sigmas | None = key(
         "Standard deviations of measured perspective centres: each layout is compared with and without them",
         None,
         unit="m",
     )
-    layouts: Annotated[dict[Id, Annotated[StripLayout, BeforeValidator(_layout)]], Field(min_length=1)] | None = key(
+    layouts: Annotated[dict[Id, Annotated[StripLayout, Before(_layout)]], Length(1)] | None = key(
         f"Layouts by name; a word may stand for one. Default: {', '.join(DEFAULT_LAYOUTS)}", None
     )
-    methods: Annotated[list[Annotated[Words, AfterValidator(one_of(*METHODS))]], Field(min_length=1)] = key(
+    methods: Annotated[list[Annotated[Words, After(one_of(*METHODS))]], Length(1)] = key(
         f"Methods of adjustment: {', '.join(METHODS)}", list(METHODS)
     )
-    required: StripRequired = key("Accuracy that every point must reach", StripRequired.model_construct())
+    required: StripRequired = key("Accuracy that every point must reach", StripRequired())
     place: StripPlacement | None = key("Further points to be placed as well as possible", None)
 
-    @model_validator(mode="after")
-    def _names_and_methods_fit(self) -> Self:
+    @Rule
+    def _names_and_methods_fit(self) -> None:
         into = self.place.into if self.place is not None else None
         names = list(self.layouts or DEFAULT_LAYOUTS)
         if into is not None and into not in names:
@@ -165,7 +151,6 @@ class StripPlanFile(Flown):
         if measured and BUNDLE not in self.methods:
             message = "measured perspective centres are of use to the bundle alone, which is not among the methods"
             raise wrong(message, at="methods", fix="add `bundle`, or leave `gnss` out")
-        return self
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,8 +182,8 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
         ),
         image_sigma=given.image_sigma_um / 1000.0,
     )
-    usual = {name: StripLayout.model_validate(_layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
-    chosen = (given.layouts or usual).items()
+    usual = {name: read_section(StripLayout, _layout(word), []) for name, word in DEFAULT_LAYOUTS.items()}
+    chosen = [(name, each) for name, each in (given.layouts or usual).items() if each is not None]
     layouts = tuple(_of_layout(str(name), each, given.control_sigma) for name, each in chosen)
     if given.gnss is not None:
         plain = [layout for layout in layouts if layout.gnss is None]

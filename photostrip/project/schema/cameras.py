@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
-
-from pydantic import BeforeValidator, Field, model_validator
+from typing import Annotated
 
 from photostrip.project.schema.ground import Angles
-from photostrip.project.schema.values import (
-    Id,
-    Number,
-    Pair,
-    Positive,
-    Section,
-    Triple,
-    choice,
-    if_empty,
-    key,
-    quoted,
-    wrong,
-)
+from photostrip.project.schema.sections import Before, Length, Rule, Section, key, wrong
+from photostrip.project.schema.values import Id, Number, Pair, Positive, Triple, choice, if_empty, quoted
 from photostrip.triangulation.bundle.settings import CALIBRATION
 from photostrip.triangulation.image_coordinates.certificate import PLACES
 
-Place = Annotated[str, *choice(tuple(PLACES))]
-Parameter = Annotated[str, *choice(CALIBRATION)]
+Place = Annotated[str, choice(tuple(PLACES))]
+Parameter = Annotated[str, choice(CALIBRATION)]
 
 
 class Distortion(Section):
     """Lens distortion of a camera."""
 
-    model: Annotated[str, *choice(("brown", "radial-table"))] = key("`brown` or `radial-table`")
-    direction: Annotated[str, *choice(("image_to_ideal", "ideal_to_image"))] = key(
+    model: Annotated[str, choice(("brown", "radial-table"))] = key("`brown` or `radial-table`")
+    direction: Annotated[str, choice(("image_to_ideal", "ideal_to_image"))] = key(
         "`image_to_ideal`: ideal = image + D(image); `ideal_to_image`: image = ideal + D(ideal)"
     )
     k: tuple[Number, Number, Number] = key(
@@ -42,21 +29,20 @@ class Distortion(Section):
     radius: list[Number] = key("Radial table: ascending distances from the principal point", [], unit="mm")
     distortion: list[Number] = key("Radial table: distortion at these distances, outwards positive", [], unit="mm")
 
-    @model_validator(mode="after")
-    def _one_model(self) -> Self:
+    @Rule
+    def _one_model(self) -> None:
         table = self.model == "radial-table"
         for name in ("k", "p", "b") if table else ("radius", "distortion"):
-            if name in self.model_fields_set:
+            if name in self.given:
                 raise wrong(f"`{name}` does not belong to model {self.model}", at=name, fix="remove it or change model")
         if not table:
-            return self
+            return
         if len(self.radius) < 2 or len(self.radius) != len(self.distortion):
             message = f"{len(self.radius)} radii and {len(self.distortion)} values of distortion are given"
             raise wrong(message, at="distortion", expected="as many values as radii, at least two")
         steps = zip(self.radius, self.radius[1:], strict=False)
         if self.radius[0] < 0 or any(after <= before for before, after in steps):
             raise wrong("the radii do not ascend", at="radius", expected="distances from 0 upwards")
-        return self
 
 
 class Camera(Section):
@@ -66,10 +52,10 @@ class Camera(Section):
     principal_point: Pair = key("Principal point in the system of the image coordinates", (0.0, 0.0), unit="mm")
     format: tuple[Positive, Positive] | None = key("Width and height of the photo; needed for pixels", None, unit="mm")
     pixel_size: Positive | None = key("Size of a pixel; needed for pixels without fiducial marks", None, unit="mm")
-    fiducials: Annotated[dict[str, Pair], BeforeValidator(if_empty)] = key(
+    fiducials: Annotated[dict[str, Pair], Before(if_empty)] = key(
         "Coordinates of the fiducial marks, by mark: calibrated, or nominal beside `fiducial_distances`", {}, unit="mm"
     )
-    fiducial_places: Annotated[dict[str, Place], BeforeValidator(if_empty)] = key(
+    fiducial_places: Annotated[dict[str, Place], Before(if_empty)] = key(
         f"Where on the photo each mark is, for `fiducial_distances` without coordinates: {quoted(tuple(PLACES))}", {}
     )
     fiducial_distances: list[tuple[Id, Id, Positive]] = key(
@@ -81,8 +67,8 @@ class Camera(Section):
         None,
     )
 
-    @model_validator(mode="after")
-    def _marks_have_a_place(self) -> Self:
+    @Rule
+    def _marks_have_a_place(self) -> None:
         if self.fiducial_places and (self.fiducials or not self.fiducial_distances):
             message = "places of fiducial marks are for distances between them without coordinates"
             raise wrong(message, at="fiducial_places", fix="remove them, or give fiducial_distances and no fiducials")
@@ -90,7 +76,6 @@ class Camera(Section):
             message = "distances alone do not say which mark is where"
             fix = "give fiducial_places: {F1: bottom-right, ...}, or nominal coordinates in fiducials"
             raise wrong(message, at="fiducial_distances", fix=fix)
-        return self
 
 
 class FirstPhoto(Angles):
@@ -105,10 +90,8 @@ class Strip(Section):
 
     id: Id = key("Id of the strip")
     camera: Id | None = key("Camera of all its photos, a key of `cameras`; not with model coordinates", None)
-    photos: Annotated[list[Id], Field(min_length=1)] = key(
-        "Photos in flight order: two at least, or one in a bundle adjustment"
-    )
-    models: Annotated[list[Id], Field(min_length=1)] | None = key(
+    photos: Annotated[list[Id], Length(1)] = key("Photos in flight order: two at least, or one in a bundle adjustment")
+    models: Annotated[list[Id], Length(1)] | None = key(
         "Independent models in flight order, one for every two neighbouring photos. Default: by their perspective"
         " centres",
         None,

@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
-
-from pydantic import model_validator
+from typing import Annotated, Any
 
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.pipeline import Settings
 from photostrip.project.schema.measurements import COLUMNS, ControlColumns
-from photostrip.project.schema.values import (
-    Axes,
-    Flag,
-    Height,
-    Number,
-    Positive,
-    Section,
-    Sigma3,
-    Triple,
-    Words,
-    choice,
-    key,
-    wrong,
-)
+from photostrip.project.schema.sections import Rule, Section, key, wrong
+from photostrip.project.schema.values import Axes, Flag, Height, Number, Positive, Sigma3, Triple, Words, choice
 
 USUAL = Settings()
 CRS = "An authority code (`EPSG:32633`), a PROJ string, WKT, `geocentric`, or `local` (right-handed, metres)"
@@ -52,13 +38,12 @@ class GivenList(Section):
     epoch: Positive | None = EPOCH
     ellipsoid: Ellipsoid | None = ELLIPSOID
 
-    @model_validator(mode="after")
-    def _axes_are_given(self) -> Self:
+    @Rule
+    def _axes_are_given(self) -> None:
         if self.axes is None and self.crs != "geocentric":
             expected = "axes: [east, north, up], or [north, east, up] where x points north"
             message = "nothing says which of the columns x, y, z is east"
             raise wrong(message, code="missing-key", at="axes", expected=expected)
-        return self
 
 
 class Control(GivenList):
@@ -72,12 +57,11 @@ class Control(GivenList):
         None,
     )
 
-    @model_validator(mode="after")
-    def _zones_are_local(self) -> Self:
+    @Rule
+    def _zones_are_local(self) -> None:
         if self.other_zone and self.crs != "local":
             message = "zones of a known projection are tied by their formulas"
             raise wrong(message, at="other_zone", fix="remove it")
-        return self
 
 
 class CameraPositions(GivenList):
@@ -90,12 +74,12 @@ class CameraPositions(GivenList):
         (0.0, 0.0, 0.0),
         unit="m",
     )
-    correction: Annotated[str, *choice(("none", "offset", "drift"))] = key(
+    correction: Annotated[str, choice(("none", "offset", "drift"))] = key(
         "Unknown error that the positions of one strip share: `none`, `offset` (constant) or `drift` (constant and"
         " linear in `time`; without times in the number of the photo)",
         "none",
     )
-    group: Annotated[str, *choice(("strip", "block"))] = key(
+    group: Annotated[str, choice(("strip", "block"))] = key(
         "What has one `correction` in common: each `strip`, or the whole `block`", "strip"
     )
 
@@ -103,10 +87,10 @@ class CameraPositions(GivenList):
 class Angles(Section):
     """Angles of the exterior orientations."""
 
-    system: Annotated[str, *choice(SYSTEMS)] = key(
+    system: Annotated[str, choice(SYSTEMS)] = key(
         "`alpha-omega-kappa`, `omega-phi-kappa` or `phi-omega-kappa`", USUAL.angle_system
     )
-    unit: Annotated[str, *choice(("deg", "gon", "rad"))] = key("`deg`, `gon` or `rad`", USUAL.angle_unit)
+    unit: Annotated[str, choice(("deg", "gon", "rad"))] = key("`deg`, `gon` or `rad`", USUAL.angle_unit)
 
 
 class Orientations(GivenList):
@@ -115,8 +99,8 @@ class Orientations(GivenList):
     file: Words = key(
         "Table `photo,x,y,z` and the angles by name, as `alpha,omega,kappa`, [,sx,sy,sz][,s_alpha,s_omega,s_kappa]"
     )
-    angles: Angles = key("System and unit of the angles", Angles.model_construct())
-    role: Annotated[str, *choice(("observed", "approximate"))] = key(
+    angles: Angles = key("System and unit of the angles", Angles())
+    role: Annotated[str, choice(("observed", "approximate"))] = key(
         "`observed`: observations with their standard deviations; `approximate`: a start, without influence", "observed"
     )
     sigma: Sigma3 | None = key(SIGMA, None, unit="m")
@@ -140,4 +124,4 @@ class Output(Section):
     geoid_undulation: Number | None = UNDULATION
     epoch: Positive | None = EPOCH
     ellipsoid: Ellipsoid | None = ELLIPSOID
-    angles: Angles = key("Angles of the exterior orientations", Angles.model_construct())
+    angles: Angles = key("Angles of the exterior orientations", Angles())

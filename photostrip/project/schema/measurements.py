@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import AfterValidator, BeforeValidator
-
 from photostrip.formats.measured.control import CONTROL
 from photostrip.formats.measured.models import MODEL_CENTERS, MODEL_POINTS
 from photostrip.formats.measured.observations import FIDUCIALS, OBSERVATIONS
@@ -13,7 +11,8 @@ from photostrip.formats.measured.pairs import LAYOUTS
 from photostrip.formats.measured.repeated import POLICIES
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.project.schema.values import Positive, Section, Sigma3, Words, YAxis, choice, if_empty, key, wrong
+from photostrip.project.schema.sections import After, Before, Section, key, wrong
+from photostrip.project.schema.values import Positive, Sigma3, Words, YAxis, choice, if_empty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from photostrip.formats.text.tables import Column
 
 
-def header_names(*layouts: Iterable[Column]) -> AfterValidator:
+def header_names(*layouts: Iterable[Column]) -> After:
     """Check of the names that a table has for the columns of some layouts."""
     known = tuple(dict.fromkeys(column.name for layout in layouts for column in layout))
 
@@ -33,12 +32,12 @@ def header_names(*layouts: Iterable[Column]) -> AfterValidator:
                 raise wrong(message, code="word", at=name, expected=f"one of {', '.join(known)}", fix=fix)
         return value
 
-    return AfterValidator(require)
+    return After(require)
 
 
-Unit = Annotated[str, *choice(("mm", "um", "0.1um", "px"))]
-Repeated = Annotated[str, *choice(POLICIES)]
-Columns = Annotated[dict[str, Words], BeforeValidator(if_empty)]
+Unit = Annotated[str, choice(("mm", "um", "0.1um", "px"))]
+Repeated = Annotated[str, choice(POLICIES)]
+Columns = Annotated[dict[str, Words], Before(if_empty)]
 PointColumns = Annotated[Columns, header_names(OBSERVATIONS, *LAYOUTS)]
 MarkColumns = Annotated[Columns, header_names(FIDUCIALS)]
 ControlColumns = Annotated[Columns, header_names(CONTROL)]
@@ -55,7 +54,7 @@ class Observations(Section):
     y_axis: YAxis | None = key(
         "Direction of y, `up` or `down`; x grows to the right. Default: `up`; required for px", None
     )
-    origin: Annotated[str, *choice(("center", "top-left", "first-pixel"))] | None = key(
+    origin: Annotated[str, choice(("center", "top-left", "first-pixel"))] | None = key(
         "Where x = y = 0: `center` of the photo, `top-left` corner of the first pixel, `first-pixel`: its centre."
         " Default: `center`; for px `top-left`. Meaningless with measured fiducial marks",
         None,
@@ -80,8 +79,8 @@ class Models(Section):
     file: Words = key(
         "Table `model,point,x,y,z[,sx,sy,sz]`, .csv or .csv.gz; a point with the id of a photo is its centre"
     )
-    unit: Annotated[str, *choice(("mm", "um", "m"))] = key("Unit of the tables: `mm`, `um` or `m`, at model scale")
-    axes: Annotated[str, *choice(("right-handed", "left-handed"))] = key(
+    unit: Annotated[str, choice(("mm", "um", "m"))] = key("Unit of the tables: `mm`, `um` or `m`, at model scale")
+    axes: Annotated[str, choice(("right-handed", "left-handed"))] = key(
         "Whether x, y, z of the plotter are `right-handed` or `left-handed`", "right-handed"
     )
     centers: ModelCenters | None = key("Perspective centres, when they stand in a table of their own", None)

@@ -5,14 +5,13 @@ Defaults are those of the settings beside the mathematics; none is repeated.
 
 from __future__ import annotations
 
-from typing import Annotated, Self
-
-from pydantic import AfterValidator, BeforeValidator, model_validator
+from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.pipeline import ADJUSTMENTS, Settings
 from photostrip.project.schema.cameras import Parameter
+from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong
 from photostrip.project.schema.values import (
     Flag,
     Fraction,
@@ -23,13 +22,10 @@ from photostrip.project.schema.values import (
     Positive,
     PositiveOrAuto,
     Range,
-    Section,
     bounded,
     choice,
     if_empty,
-    key,
     quoted,
-    wrong,
 )
 from photostrip.triangulation.bundle.settings import CALIBRATION, SCREENINGS, TESTS
 from photostrip.triangulation.gross_errors.pairs.screening import METHODS
@@ -43,7 +39,7 @@ DEFAULTS = Settings()
 class Relative(Section):
     """Relative orientation and its search for gross errors."""
 
-    screening: Annotated[str, *choice(METHODS)] = key(
+    screening: Annotated[str, choice(METHODS)] = key(
         f"How gross errors are searched for: {quoted(METHODS)}", DEFAULTS.relative.screening
     )
     grubbs_alpha: Fraction = key(
@@ -61,7 +57,7 @@ class Relative(Section):
 class Links(Section):
     """Links of independent models and their search for gross errors."""
 
-    screening: Annotated[str, *choice(LINK_METHODS)] = key(
+    screening: Annotated[str, choice(LINK_METHODS)] = key(
         "How gross errors are searched for: `auto` (points of each link one after the other) or `none`",
         DEFAULTS.links.screening,
     )
@@ -75,7 +71,7 @@ class Links(Section):
 class Polynomial(Section):
     """Polynomial adjustment of a strip."""
 
-    degree: Annotated[str, *choice(DEGREES)] = key(
+    degree: Annotated[str, choice(DEGREES)] = key(
         "`auto` (decided by evidence, which is printed), `1`, `2` or `3`", DEFAULTS.polynomial.degree
     )
 
@@ -92,11 +88,11 @@ class Covariance(Section):
 class Interior(Section):
     """Interior orientation by fiducial marks."""
 
-    transform: Annotated[str, *choice(("auto", "conformal", "affine", "bilinear", "projective"))] = key(
+    transform: Annotated[str, choice(("auto", "conformal", "affine", "bilinear", "projective"))] = key(
         "`auto` (affine from four marks on, else conformal), `conformal`, `affine`, `bilinear` or `projective`",
         DEFAULTS.interior.transform,
     )
-    residuals: Annotated[str, *choice(("ignore", "interpolate"))] = key(
+    residuals: Annotated[str, choice(("ignore", "interpolate"))] = key(
         "What the residuals of the marks do: `ignore`, or `interpolate` them to the points",
         DEFAULTS.interior.residuals,
     )
@@ -105,11 +101,11 @@ class Interior(Section):
 class Bundle(Section):
     """Bundle adjustment of all strips together."""
 
-    screening: Annotated[str, *choice(SCREENINGS)] = key(
+    screening: Annotated[str, choice(SCREENINGS)] = key(
         "How gross errors are searched for: `snooping` (one after the other), `robust` (re-weighted first) or `none`",
         DEFAULTS.bundle.screening,
     )
-    test: Annotated[str, *choice(TESTS)] = key(
+    test: Annotated[str, choice(TESTS)] = key(
         "`tau`: residuals against the sigma0 found; `baarda`: against the stated standard deviations",
         DEFAULTS.bundle.test,
     )
@@ -127,58 +123,57 @@ class Bundle(Section):
         DEFAULTS.bundle.variance_components,
     )
     self_calibration: list[Parameter] = key(f"Parameters of the cameras that are estimated: {quoted(CALIBRATION)}", [])
-    calibration_sigma: Annotated[dict[str, Positive], BeforeValidator(if_empty)] = key(
+    calibration_sigma: Annotated[dict[str, Positive], Before(if_empty)] = key(
         "A-priori standard deviations of these parameters, by name; free without one",
         {},
         unit="mm, mm^-2 for k1 and so on; 1 for affinity and shear",
     )
 
-    @model_validator(mode="after")
-    def _known_parameters(self) -> Self:
+    @Rule
+    def _known_parameters(self) -> None:
         for name in self.calibration_sigma:
             if name not in CALIBRATION:
                 message = f"`{shown(name)}` is no parameter of a camera"
                 expected, fix = f"one of {', '.join(CALIBRATION)}", suggestion(name, CALIBRATION)
                 raise wrong(message, code="word", at="calibration_sigma", expected=expected, fix=fix)
-        return self
 
 
-Latitude = Annotated[Number, AfterValidator(bounded(Range(-90.0, 90.0, "deg")))]
+Latitude = Annotated[Number, After(bounded(Range(-90.0, 90.0, "deg")))]
 
 
 class Processing(Section):
     """What is computed and how."""
 
-    adjustment: Annotated[str, *choice(ADJUSTMENTS)] = key(
+    adjustment: Annotated[str, choice(ADJUSTMENTS)] = key(
         "`auto` (polynomial or covariance, by evidence, which is printed), `polynomial` (the strip method), "
         "`similarity` (without a polynomial), `covariance` (each strip with its own covariance) or `bundle` (all "
         "strips rigorously)",
         DEFAULTS.adjustment,
     )
-    polynomial: Polynomial = key("Polynomial adjustment", Polynomial.model_construct())
-    covariance: Covariance = key("Adjustment of a strip with its own covariance", Covariance.model_construct())
-    bundle: Bundle = key("Bundle adjustment", Bundle.model_construct())
-    relative: Relative = key("Relative orientation", Relative.model_construct())
-    links: Links = key("Links of independent models", Links.model_construct())
-    scale_transfer: Annotated[str, *choice(SCALE_TRANSFERS)] = key(
+    polynomial: Polynomial = key("Polynomial adjustment", Polynomial())
+    covariance: Covariance = key("Adjustment of a strip with its own covariance", Covariance())
+    bundle: Bundle = key("Bundle adjustment", Bundle())
+    relative: Relative = key("Relative orientation", Relative())
+    links: Links = key("Links of independent models", Links())
+    scale_transfer: Annotated[str, choice(SCALE_TRANSFERS)] = key(
         "`least_squares`: all common points with their precision; `distances`: the textbook's mean of ratios",
         DEFAULTS.formation.scale_transfer,
     )
-    scale_weights: Annotated[dict[str, NotNegative], BeforeValidator(if_empty)] = key(
+    scale_weights: Annotated[dict[str, NotNegative], Before(if_empty)] = key(
         "Weights of points in the scale transfer, by name, 1 for all others; with 0 a point joins models only where no"
         " other does",
         {},
     )
-    intersection: Annotated[str, *choice(INTERSECTIONS)] = key(
+    intersection: Annotated[str, choice(INTERSECTIONS)] = key(
         "`mean`: Y of a model point is the mean of both rays; `left`: the point lies on the left ray, as printed",
         DEFAULTS.formation.intersection,
     )
-    control_weights: Annotated[str, *choice(("stated", "equal"))] = key(
+    control_weights: Annotated[str, choice(("stated", "equal"))] = key(
         "`stated`: control weighs by its standard deviations and those of the strip's points; `equal`: each coordinate"
         " alike, as printed",
         DEFAULTS.absolute.control_weights,
     )
-    earth_curvature: Annotated[str, *choice(("auto", "model", "image", "none"))] = key(
+    earth_curvature: Annotated[str, choice(("auto", "model", "image", "none"))] = key(
         "`auto` or `none`: the frames carry it, `local` is truly Cartesian; `model`: D^2/2R, for plane map"
         " coordinates of an unknown projection given as `local`; `image`: the same, photo by photo in the image",
         DEFAULTS.absolute.earth_curvature,
@@ -214,11 +209,10 @@ class Processing(Section):
         DEFAULTS.refinement.ground_height,
         unit="m",
     )
-    interior: Interior = key("Interior orientation", Interior.model_construct())
+    interior: Interior = key("Interior orientation", Interior())
 
-    @model_validator(mode="after")
-    def _azimuth_of_a_place(self) -> Self:
+    @Rule
+    def _azimuth_of_a_place(self) -> None:
         if self.earth_azimuth is not None and self.earth_latitude is None:
             message = "a direction has a radius of curvature at a latitude only"
             raise wrong(message, code="missing-key", at="earth_azimuth", fix="give `earth_latitude` as well")
-        return self

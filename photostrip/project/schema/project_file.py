@@ -4,32 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field
-
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.project.schema.cameras import Camera, Strip
 from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
 from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
 from photostrip.project.schema.processing import Processing
-from photostrip.project.schema.values import (
-    Positive,
-    Section,
-    Words,
-    if_empty,
-    key,
-    schema_number,
-    single,
-    text,
-    typed,
-    wrong,
-)
+from photostrip.project.schema.sections import Before, Length, Read, Section, key, wrong
+from photostrip.project.schema.values import Positive, Words, if_empty, schema_number, single, text
 from photostrip.triangulation.plausibility import KINDS
 
 SCHEMA_NUMBER = 1
 _read_schema_number = schema_number("photostrip", SCHEMA_NUMBER)
 SchemaNumber = Annotated[
-    int, *typed(lambda value: _read_schema_number(single(value, str(SCHEMA_NUMBER))), {"const": SCHEMA_NUMBER})
+    int, Read(lambda value: _read_schema_number(single(value, str(SCHEMA_NUMBER))), {"const": SCHEMA_NUMBER})
 ]
 
 
@@ -44,7 +32,7 @@ def _finding(value: object) -> str:
     return text(word)
 
 
-Accepted = Annotated[str, *typed(_finding, {"type": "string", "pattern": "^P[0-9]{3}(/.+)?$"})]
+Accepted = Annotated[str, Read(_finding, {"type": "string", "pattern": "^P[0-9]{3}(/.+)?$"})]
 
 
 class Tolerances(Section):
@@ -68,10 +56,10 @@ class ProjectFile(Section):
     photostrip: SchemaNumber = key("Number of this schema")
     name: Words | None = key("Name of the project; default: the file's name without its ending", None)
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
-    cameras: Annotated[dict[str, Camera], BeforeValidator(if_empty), Field(min_length=1)] = key(
+    cameras: Annotated[dict[str, Camera], Before(if_empty), Length(1)] = key(
         "Cameras by name; needed with `observations`", {}
     )
-    strips: Annotated[list[Strip], Field(min_length=1)] = key("Strips")
+    strips: Annotated[list[Strip], Length(1)] = key("Strips")
     observations: Observations | None = key("Points measured on photos; or `models`", None)
     models: Models | None = key("Independent models measured on a plotter, in place of `observations`", None)
     fiducial_measurements: FiducialMeasurements | None = key("Fiducial marks measured on photos", None)
@@ -80,11 +68,9 @@ class ProjectFile(Section):
     )
     camera_positions: CameraPositions | None = key("Measured positions of the cameras, for the bundle adjustment", None)
     orientations: Orientations | None = key("Given exterior orientations, for the bundle adjustment", None)
-    output: Output = key("Frame and angles of the results", Output.model_construct())
-    processing: Processing = key("What is computed and how", Processing.model_construct())
-    tolerances: Tolerances = key(
-        "Largest allowed values; where one is exceeded the exit code is 1", Tolerances.model_construct()
-    )
+    output: Output = key("Frame and angles of the results", Output())
+    processing: Processing = key("What is computed and how", Processing())
+    tolerances: Tolerances = key("Largest allowed values; where one is exceeded the exit code is 1", Tolerances())
     accept: list[Accepted] = key(
         "Findings that were looked at and are accepted: codes, or `code/id` for one photo, point or strip",
         [],

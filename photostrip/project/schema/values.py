@@ -5,18 +5,14 @@ Values arrive as texts (see ``yaml.document``) and get their type here. ``wrong`
 
 from __future__ import annotations
 
-from copy import deepcopy
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
-
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
-from pydantic_core import PydanticCustomError
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import SMALLEST, NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.tables import CONTROL_CHARACTER
-from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
+from photostrip.project.schema.sections import Read, wrong
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,12 +24,6 @@ class Text(str):
     """A text that the user chose: an id, a name, a path."""
 
     __slots__ = ()
-
-
-def wrong(message: str, *, code: str = "value", expected: str = "", fix: str = "", at: str = "") -> PydanticCustomError:
-    """Make the error of one value; `at` is the key inside a mapping that is at fault."""
-    context = {"message": message, "expected": expected, "fix": fix, "at": at}
-    return PydanticCustomError("photostrip", "{message}", {**context, "code": code})
 
 
 def single(value: object, expected: str) -> str:
@@ -51,21 +41,6 @@ def text(value: object) -> Text:
     if CONTROL_CHARACTER.search(word):
         raise wrong(f"`{shown(word)}` has a control character or a line break in it", expected="a text on one line")
     return Text(word)
-
-
-@dataclass(frozen=True, eq=False)
-class _Described:
-    """What editors show of a type; each key gets a copy of its own, to which its description is added."""
-
-    schema: dict[str, Any]
-
-    def __get_pydantic_json_schema__(self, core: object, handler: object) -> dict[str, Any]:
-        return deepcopy(self.schema)
-
-
-def typed(read: Callable[[object], object], schema: dict[str, Any]) -> tuple[PlainValidator, _Described]:
-    """Type that is read by a function of our own and described to editors by a schema of our own."""
-    return PlainValidator(read), _Described(schema)
 
 
 def number_between(
@@ -103,10 +78,10 @@ def _one_of(allowed: tuple[str, ...]) -> str:
     return allowed[0] if len(allowed) == 1 else f"one of {', '.join(allowed)}"
 
 
-def choice(allowed: tuple[str, ...]) -> tuple[PlainValidator, _Described]:
+def choice(allowed: tuple[str, ...]) -> Read:
     """Type of a word from a list."""
     values = [int(each) if each.isdecimal() else each for each in allowed]
-    return typed(lambda value: known_word(single(value, _one_of(allowed)), allowed), {"enum": values})
+    return Read(lambda value: known_word(single(value, _one_of(allowed)), allowed), {"enum": values})
 
 
 def one_of(*allowed: str) -> Callable[[str], str]:
@@ -209,36 +184,19 @@ _POSITIVE = {"type": "number", "exclusiveMinimum": 0}
 _FRACTION = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
 AUTO = {"const": "auto"}
 _AXES = {"type": "array", "items": {"enum": [*GROUND_AXES, *CARTESIAN_AXES]}, "minItems": 3, "maxItems": 3}
-Id = Annotated[str, *typed(text, _ANY)]
-Words = Annotated[str, *typed(text, {"type": "string", "minLength": 1})]
-Number = Annotated[float, *typed(_read_number, _NUMBER)]
-NotNegative = Annotated[float, *typed(_read_not_negative, {"type": "number", "minimum": 0})]
-Positive = Annotated[float, *typed(_read_positive, _POSITIVE)]
-Fraction = Annotated[float, *typed(_read_fraction, _FRACTION)]
-PositiveOrAuto = Annotated[float | None, *typed(or_auto(_read_positive), {"anyOf": [AUTO, _POSITIVE]})]
-NumberOrAuto = Annotated[float | None, *typed(or_auto(_read_number), {"anyOf": [AUTO, _NUMBER]})]
-Flag = Annotated[bool, *typed(_flag, {"type": "boolean"})]
-Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"type": "integer"})]
+Id = Annotated[str, Read(text, _ANY)]
+Words = Annotated[str, Read(text, {"type": "string", "minLength": 1})]
+Number = Annotated[float, Read(_read_number, _NUMBER)]
+NotNegative = Annotated[float, Read(_read_not_negative, {"type": "number", "minimum": 0})]
+Positive = Annotated[float, Read(_read_positive, _POSITIVE)]
+Fraction = Annotated[float, Read(_read_fraction, _FRACTION)]
+PositiveOrAuto = Annotated[float | None, Read(or_auto(_read_positive), {"anyOf": [AUTO, _POSITIVE]})]
+NumberOrAuto = Annotated[float | None, Read(or_auto(_read_number), {"anyOf": [AUTO, _NUMBER]})]
+Flag = Annotated[bool, Read(_flag, {"type": "boolean"})]
+Whole = Annotated[int, Read(_whole, {"type": "integer"})]
 Pair = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
 Sigma3 = tuple[Positive, Positive, Positive]
-Axes = Annotated[tuple[str, str, str], *typed(_axes, _AXES)]
-YAxis = Annotated[str, *choice(("up", "down"))]
-Height = Annotated[str, *choice(("ellipsoidal", "orthometric"))]
-
-
-def key(description: str, default: Any = ..., *, unit: str = "") -> Any:  # noqa: ANN401 (pydantic's own manner)
-    """Describe one key; without a default it is required."""
-    extra: dict[str, Any] | None = {"unit": unit} if unit else None
-    return Field(default, description=f"{description} [{unit}]" if unit else description, json_schema_extra=extra)
-
-
-class Section(BaseModel):
-    """A mapping of the project file: unknown keys are faults."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _nothing_is_empty(cls, value: object) -> object:
-        return if_empty(value)
+Axes = Annotated[tuple[str, str, str], Read(_axes, _AXES)]
+YAxis = Annotated[str, choice(("up", "down"))]
+Height = Annotated[str, choice(("ellipsoidal", "orthometric"))]

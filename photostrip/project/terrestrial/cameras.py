@@ -5,12 +5,11 @@ from __future__ import annotations
 from importlib import resources
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import AfterValidator, Field
-
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.project.schema.values import Id, Number, Section, Words, bounded, key, one_of
+from photostrip.project.schema.sections import After, Length, Section, key
+from photostrip.project.schema.values import Id, Number, Words, bounded, one_of
 from photostrip.project.terrestrial.ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE
 from photostrip.project.yaml.parsing import parse, read_document
 from photostrip.project.yaml.validation import checked
@@ -23,11 +22,9 @@ OWN_LIST = "phototheodolites.yaml"
 SCHEMA_NUMBER = "1"
 
 
-Distance = Annotated[Number, AfterValidator(bounded(PRINCIPAL_DISTANCE))]
-Place = tuple[
-    Annotated[Number, AfterValidator(bounded(COORDINATE))], Annotated[Number, AfterValidator(bounded(COORDINATE))]
-]
-Size = tuple[Annotated[Number, AfterValidator(bounded(FORMAT))], Annotated[Number, AfterValidator(bounded(FORMAT))]]
+Distance = Annotated[Number, After(bounded(PRINCIPAL_DISTANCE))]
+Place = tuple[Annotated[Number, After(bounded(COORDINATE))], Annotated[Number, After(bounded(COORDINATE))]]
+Size = tuple[Annotated[Number, After(bounded(FORMAT))], Annotated[Number, After(bounded(FORMAT))]]
 
 
 class Preset(Section):
@@ -41,8 +38,8 @@ class Preset(Section):
 class PresetFile(Section):
     """A list of cameras."""
 
-    photostrip_cameras: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
-    cameras: Annotated[dict[Id, Preset], Field(min_length=1)] = key("Cameras by name")
+    photostrip_cameras: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    cameras: Annotated[dict[Id, Preset], Length(1)] = key("Cameras by name")
 
 
 def own_presets() -> dict[str, Phototheodolite]:

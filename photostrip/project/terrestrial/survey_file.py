@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
-
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from typing import Annotated
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.project.schema.values import (
-    Axes,
-    Id,
-    Number,
-    Positive,
-    Section,
-    Words,
-    YAxis,
-    bounded,
-    key,
-    one_of,
-    wrong,
-)
+from photostrip.project.schema.sections import After, Before, Length, Rule, Section, key, wrong
+from photostrip.project.schema.values import Axes, Id, Number, Positive, Words, YAxis, bounded, one_of
 from photostrip.project.terrestrial.cameras import Distance, Place, Size
 from photostrip.project.terrestrial.ranges import (
     BASE,
@@ -36,9 +23,9 @@ from photostrip.terrestrial.monitoring import MOVED_CAMERA, MonitoringSettings
 
 SCHEMA_NUMBER = "1"
 USUAL = MonitoringSettings()
-Coordinate = Annotated[Number, AfterValidator(bounded(POSITION))]
+Coordinate = Annotated[Number, After(bounded(POSITION))]
 Three = tuple[Coordinate, Coordinate, Coordinate]
-Angle = Annotated[Number, AfterValidator(bounded(DEGREES))]
+Angle = Annotated[Number, After(bounded(DEGREES))]
 
 
 def _short_epoch(value: object) -> object:
@@ -64,12 +51,11 @@ class Camera(Section):
     )
     format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
 
-    @model_validator(mode="after")
-    def _has_a_principal_distance(self) -> Self:
+    @Rule
+    def _has_a_principal_distance(self) -> None:
         if self.preset is None and self.principal_distance is None:
             expected = "`preset`, or `principal_distance` in mm"
             raise wrong("nothing says what the camera is", code="missing-key", expected=expected)
-        return self
 
 
 class Station(Section):
@@ -82,10 +68,10 @@ class Station(Section):
         " photo of the first epoch, instead of the angles",
         None,
     )
-    sigma_arcsec: Annotated[Positive, AfterValidator(bounded(DIRECTION_SIGMA))] = key(
+    sigma_arcsec: Annotated[Positive, After(bounded(DIRECTION_SIGMA))] = key(
         "Standard error of these directions in rows without one", 2.0, unit="arcsec"
     )
-    eccentricity: Annotated[Number, AfterValidator(bounded(ECCENTRICITY))] = key(
+    eccentricity: Annotated[Number, After(bounded(ECCENTRICITY))] = key(
         "Perspective centre ahead of `position` on the optical axis, where that is the theodolite's", 0.0, unit="m"
     )
     alpha: Angle | None = key("Azimuth of the optical axis, clockwise from north", None, unit="angle_unit")
@@ -94,8 +80,8 @@ class Station(Section):
         "Roll, the photo's x axis turning counter-clockwise for the photographer; default: 0", None, unit="angle_unit"
     )
 
-    @model_validator(mode="after")
-    def _is_complete(self) -> Self:
+    @Rule
+    def _is_complete(self) -> None:
         turned = [name for name in ("alpha", "omega", "kappa") if getattr(self, name) is not None]
         if self.directions is not None and turned:
             message = f"`directions` gives the orientation of the photo, and `{turned[0]}` another one"
@@ -107,7 +93,6 @@ class Station(Section):
             raise wrong(message, code="missing-key", expected="both, or neither in the normal case")
         if self.position is None and turned:
             raise wrong("angles are given without a position", code="missing-key", expected="position and alpha too")
-        return self
 
     @property
     def free(self) -> bool:
@@ -126,7 +111,7 @@ class Epoch(Section):
     """One epoch."""
 
     id: Id = key("Id of the epoch, as in the table")
-    time: Annotated[Number, AfterValidator(bounded(TIME))] | None = key("Its time, for rates", None, unit="time_unit")
+    time: Annotated[Number, After(bounded(TIME))] | None = key("Its time, for rates", None, unit="time_unit")
 
 
 class Measurements(Section):
@@ -136,15 +121,15 @@ class Measurements(Section):
     pseudo_parallaxes: Words | None = key(
         "Table `point[,epoch],x,z,p[,q],dx,dz,dx_right[,dz_right][,sigma][,sigma_d]`, .csv or .csv.gz", None
     )
-    unit: Annotated[Words, AfterValidator(one_of("mm", "um"))] = key("Unit of the table: `mm` or `um`")
+    unit: Annotated[Words, After(one_of("mm", "um"))] = key("Unit of the table: `mm` or `um`")
     z_axis: YAxis = key("Direction of z, `up` or `down`; x grows to the right", "up")
     sigma: Positive | None = key("Standard deviation of a coordinate in rows without one", None, unit="unit")
     sigma_d: Positive | None = key(
         "Standard deviation of a pseudo-parallax in rows without one; default: `sigma`", None, unit="unit"
     )
 
-    @model_validator(mode="after")
-    def _one_table(self) -> Self:
+    @Rule
+    def _one_table(self) -> None:
         if (self.coordinates is None) == (self.pseudo_parallaxes is None):
             what = "two tables are named" if self.coordinates is not None else "no table is named"
             raise wrong(what, code="missing-key", expected="either `coordinates` or `pseudo_parallaxes`")
@@ -155,16 +140,15 @@ class Measurements(Section):
             if value is not None and not IMAGE_SIGMA.holds(value * MILLIMETRES[self.unit]):
                 message = f"{value:g} {self.unit} is out of range"
                 raise wrong(message, code="range", at=name, expected=f"{IMAGE_SIGMA}: is the unit right?")
-        return self
 
 
 class Processing(Section):
     """How displacements are tested."""
 
-    significance: Annotated[Number, AfterValidator(bounded(SIGNIFICANCE))] = key(
+    significance: Annotated[Number, After(bounded(SIGNIFICANCE))] = key(
         "Probability of calling a point moved that did not move", USUAL.significance
     )
-    moved_camera: Annotated[Words, AfterValidator(one_of(*MOVED_CAMERA))] = key(
+    moved_camera: Annotated[Words, After(one_of(*MOVED_CAMERA))] = key(
         "Turn of a camera that the stable points show: taken out `always`, when significant (`auto`), or `never`",
         USUAL.moved_camera,
     )
@@ -173,29 +157,29 @@ class Processing(Section):
 class TerrestrialFile(Section):
     """Displacements from photos of two stations."""
 
-    photostrip_terrestrial: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    photostrip_terrestrial: Annotated[Words, After(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the survey", "displacements")
     presets: Words | None = key("A list of cameras of your own", None)
-    cameras: Annotated[dict[Id, Camera], Field(min_length=1)] = key("Cameras by name")
+    cameras: Annotated[dict[Id, Camera], Length(1)] = key("Cameras by name")
     stations: Stations = key("The two stations")
-    axes: Annotated[Axes, AfterValidator(_ground_axes)] | None = key(
+    axes: Annotated[Axes, After(_ground_axes)] | None = key(
         "Order of the coordinates of the stations and of the results: a permutation of east, north, up", None
     )
-    angle_unit: Annotated[Words, AfterValidator(one_of("deg", "gon"))] = key("Unit of alpha, omega, kappa", "deg")
-    base: Annotated[Number, AfterValidator(bounded(BASE))] | None = key(
+    angle_unit: Annotated[Words, After(one_of("deg", "gon"))] = key("Unit of alpha, omega, kappa", "deg")
+    base: Annotated[Number, After(bounded(BASE))] | None = key(
         "Base of the normal case, instead of positions and angles", None, unit="m"
     )
-    epochs: list[Annotated[Epoch, BeforeValidator(_short_epoch)]] | None = key(
+    epochs: list[Annotated[Epoch, Before(_short_epoch)]] | None = key(
         "Epochs, the first being the reference; default: as they stand in the table", None
     )
     time_unit: Words = key("Unit of the times of the epochs, for rates", "year")
     measurements: Measurements = key("The table of measurements")
     stable: list[Id] = key("Points that are taken not to move", [])
-    processing: Processing = key("How displacements are tested", Processing.model_construct())
+    processing: Processing = key("How displacements are tested", Processing())
 
-    @model_validator(mode="after")
-    def _one_geometry(self) -> Self:
+    @Rule
+    def _one_geometry(self) -> None:
         left, right = self.stations.left, self.stations.right
         if left.free != right.free:
             side = "right" if left.free else "left"
@@ -212,4 +196,3 @@ class TerrestrialFile(Section):
             raise wrong("nothing says which coordinate of a station is east", code="missing-key", expected=expected)
         if not left.free and self.axes is not None:
             raise wrong("the normal case has axes of its own: right, ahead, up", at="axes", fix="remove it")
-        return self

@@ -13,15 +13,13 @@ from photostrip.project.editors import schema_of
 from photostrip.project.schema.ground import Output
 from photostrip.project.schema.processing import Processing
 from photostrip.project.schema.project_file import ProjectFile, Tolerances
-from photostrip.project.schema.values import Section
+from photostrip.project.schema.sections import Problem, Section, read_section
 from photostrip.project.yaml import validation
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from pydantic import BaseModel
 
 UNITS = {"principal_distance": "mm", "sigma0_um": "um", "check_rms_z": "m", "parallax_limit": "mm", "earth_radius": "m"}
 
@@ -75,17 +73,17 @@ def test_the_schema_is_the_same_on_every_call() -> None:
 
 
 def _bundle() -> dict[str, object]:
-    given = Processing.model_validate({}).bundle.model_dump()
+    given = Processing().bundle.values()
     return given | {"self_calibration": tuple(given["self_calibration"])}
 
 
 @pytest.mark.parametrize(
     ("given", "part"),
     [
-        (Processing.model_validate({}).relative.model_dump(), "relative"),
+        (Processing().relative.values(), "relative"),
         (_bundle(), "bundle"),
-        ({"degree": Processing.model_validate({}).polynomial.degree}, "polynomial"),
-        ({"transform": Processing.model_validate({}).interior.transform}, "interior"),
+        ({"degree": Processing().polynomial.degree}, "polynomial"),
+        ({"transform": Processing().interior.transform}, "interior"),
     ],
 )
 def test_defaults_are_those_of_the_mathematics(given: dict[str, object], part: str) -> None:
@@ -103,16 +101,26 @@ def test_every_setting_of_the_mathematics_has_a_key() -> None:
 
 
 def test_all_of_tolerances_and_output_may_be_left_out() -> None:
-    assert set(Tolerances.model_validate({}).model_dump().values()) == {None}
-    assert Output.model_validate({}).crs is None
+    assert set(Tolerances().values().values()) == {None}
+    assert Output().crs is None
+
+
+def below(kind: type[Section]) -> list[type[Section]]:
+    return [each for inner in kind.__subclasses__() for each in (inner, *below(inner))]
 
 
 def test_every_section_refuses_unknown_keys() -> None:
-    waiting: list[type[BaseModel]] = [Section]
-    while waiting:
-        model = waiting.pop()
-        waiting += model.__subclasses__()
-        assert model.model_config["extra"] == "forbid"
+    for kind in nonempty(below(Section)):
+        problems: list[Problem] = []
+        assert read_section(kind, {"unheard_of": "1"}, problems) is None
+        assert [each.path for each in problems if each.wrong.code == "unknown-key"] == [("unheard_of",)]
+
+
+def expected_at(value: object, path: tuple[str | int, ...]) -> list[str]:
+    """Give what is expected where a key of a project is missing."""
+    problems: list[Problem] = []
+    read_section(ProjectFile, value, problems)
+    return [each.wrong.expected for each in problems if each.path == path]
 
 
 def test_keys_know_their_home() -> None:
@@ -122,9 +130,10 @@ def test_keys_know_their_home() -> None:
 
 
 def test_descriptions_are_found_through_lists_and_names() -> None:
-    assert validation._described(ProjectFile, ("cameras", "format", "principal_distance")) == "principal distance [mm]"
-    assert validation._described(ProjectFile, ("control", 3, "sigma")).endswith("[m]")
-    assert validation._described(ProjectFile, ("nothing", "here")) == ""
+    missing = ("cameras", "format", "principal_distance")
+    assert expected_at({"cameras": {"format": {}}}, missing) == ["principal distance [mm]"]
+    (given,) = expected_at({"control": [{"crs": "local"}]}, ("control", 0, "file"))
+    assert given.startswith("table `point,x,y,z")
 
 
 def test_the_page_of_the_project_file_names_every_key() -> None:
@@ -153,7 +162,7 @@ def test_the_page_tells_every_default_and_unit() -> None:
 
 
 def test_the_model_is_the_contract() -> None:
-    assert list(ProjectFile.model_fields) == [
+    assert list(ProjectFile.keys) == [
         "photostrip",
         "name",
         "extends",
