@@ -20,7 +20,7 @@ FUNCTIONS: dict[str, tuple[int, ...]] = {
 }  # fmt: skip
 # A place in the project file knows where it stands; a table takes row and column before message and code.
 METHODS: dict[str, tuple[int, ...]] = {"_add": (3,), "_refuse": (2,), "fault": (3, 1), "note": (0, 1), "refuse": (2, 1)}
-UNNAMED = {"input", "geometry", "tolerance"}  # what has no code of its own
+UNNAMED = {"input", "geometry", "tolerance", "value"}  # what has no code of its own
 
 
 @cache
