@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -46,6 +47,9 @@ Width = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", envvar="PHOTOSTRIP_QUIET", help="Print the verdict only.")]
 Silent = Annotated[bool, typer.Option("--quiet", "-q", envvar="PHOTOSTRIP_QUIET", help="Say nothing but errors.")]
+Plots = Annotated[
+    Path | None, typer.Option("--plots", metavar="DIR", help="Write the pictures of the report into DIR, as SVG.")
+]
 Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 unless the verdict is GOOD.")]
 Verbose = Annotated[
     bool,

@@ -164,7 +164,7 @@ class Result:
         """Return the accuracy report as text, Markdown, HTML or JSON.
 
         sections: names of the sections that are wanted, as those of ``photostrip report --section``.
-        everything: False for the short report that the command prints by default.
+        everything: False for the short report that the command prints by default; the page always has everything.
         Raises InputError when HTML is asked for and jinja2 is not installed.
         """
         from photostrip.errors import faults_instead
@@ -184,7 +184,7 @@ class Result:
                 from photostrip.report.html import check_html, to_html
 
                 check_html("report")
-                return to_html(self._document, everything=everything)
+                return to_html(self._document)
             names = [SectionName(each) for each in sections]
             chosen = chosen_sections(self._document, names=names, everything=everything, width=layout.USUAL)
             title = "" if sections else title_of(self._document)
@@ -209,13 +209,21 @@ class Result:
         title, sections = trace_title(document), trace_sections(document)
         return text.to_markdown(title, sections) if form == "md" else text.to_text(title, sections, layout.WIDEST)
 
-    def files(self, *, html: bool = False, everything: bool = False) -> dict[str, str]:
+    def files(self, *, html: bool = False) -> dict[str, str]:
         """Return the files of the result, content by name: result.json, the tables, with html the report as a page."""
         from photostrip.formats.output.result_files import refined_csv, result_files
 
-        pages = {"report.html": self.report("html", everything=everything)} if html else {}
+        pages = {"report.html": self.report("html")} if html else {}
         refined = refined_csv(self.computed) if self.computed is not None else ""
         return pages | result_files(self._document, self._resolved, refined)
+
+    def pictures(self) -> dict[str, str]:
+        """Return the pictures of the report as SVG, content by file name."""
+        from photostrip.errors import faults_instead
+        from photostrip.report.pictures.result.pictures import picture_files
+
+        with faults_instead(self.name, "reported"):
+            return picture_files(self._document)
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> None:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none."""

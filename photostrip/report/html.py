@@ -1,28 +1,33 @@
 """The report as one HTML file: the sections of the text report and pictures, nothing loaded from elsewhere.
 
-Looks stand in ``templates/report.html`` and ``templates/report.css``.
+Looks stand in ``templates``: ``report.html``, ``report.css``, ``pictures.css``; ``report.js`` sorts and filters tables.
+Each picture stands in the section it belongs to, those of the ground in one of their own before the others.
 """
 
 from __future__ import annotations
 
 import re
+from base64 import b64encode
+from hashlib import sha256
 from importlib import resources
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
 from photostrip.report.commands.methods import methods_sections
+from photostrip.report.page.links import link
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
-from photostrip.report.pictures.strip import strip_pictures
-from photostrip.report.sections.document import sections_of, title_of
+from photostrip.report.pictures.result.pictures import SECTIONS, pictures_of
+from photostrip.report.sections.document import named_sections, title_of
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from photostrip.report.pictures.svg import Picture
 
 INSTALL = "pip install 'photostrip[report]'"
+FOREMOST = "verdict", "findings"  # sections before the pictures
 
 
 def check_html(key: str = "--html") -> None:
@@ -36,43 +41,77 @@ def check_html(key: str = "--html") -> None:
         raise InputError(Fault(message, "extra", key=key, fix=INSTALL))
 
 
-def to_html(document: Document, *, everything: bool = False) -> str:
-    """Return the report of a result as one HTML file: style and pictures are in it, no script, no link to elsewhere."""
-    sections = sections_of(document, everything=everything)
-    return _page(title_of(document), document["version"], sections, strip_pictures(document))
+def to_html(document: Document) -> str:
+    """Return the report of a result as one HTML file: style, pictures and script are in it, no link to elsewhere."""
+    named = list(named_sections(document, everything=True))
+    return _page(title_of(document), document["version"], _sections(named, pictures_of(document)))
 
 
 def methods_html(document: Document) -> str:
-    return _page(f"Methods: {document['name']}", document["version"], methods_sections(document), [])
+    sections = [("", section) for section in methods_sections(document)]
+    return _page(f"Methods: {document['name']}", document["version"], _sections(sections, []))
 
 
-def _page(title: str, version: str, sections: Iterable[Section], drawn: Iterable[Picture]) -> str:
+def _page(title: str, version: str, sections: list[Document]) -> str:
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     folder = resources.files("photostrip.report") / "templates"
+
+    def template(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
+
     environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
-    template = environment.from_string((folder / "report.html").read_text(encoding="utf-8"))
-    pictures = [each._replace(svg=Markup(each.svg)) for each in drawn]  # noqa: S704 (escaped there)
-    page: str = template.render(
+    script = template("report.js").strip()
+    digest = sha256(f"\n{script}\n".encode()).digest()
+    page: str = environment.from_string(template("report.html")).render(
         title=title,
         version=version,
-        style=Markup((folder / "report.css").read_text(encoding="utf-8").strip()),  # noqa: S704 (ours)
-        sections=list(_sections(sections)),
-        pictures=pictures,
+        style=Markup(f"{template('report.css').strip()}\n{template('pictures.css').strip()}"),  # noqa: S704 (ours)
+        script=Markup(script),  # noqa: S704 (ours)
+        script_hash=f"sha256-{b64encode(digest).decode()}",
+        sections=sections,
     )
     return visible(page)
 
 
-def _sections(sections: Iterable[Section]) -> Iterator[Document]:
+def _sections(named: Iterable[tuple[str, Section]], pictures: Sequence[Picture]) -> list[Document]:
     """Return the sections as the template takes them; ids are made from their titles."""
-    used = {"pictures"}
-    for number, section in enumerate(sections):
-        name = re.sub(r"[^a-z0-9]+", "-", section.title.lower()).strip("-") or f"section-{number}"
-        while name in used:
-            name = f"{name}-{number}"
-        used.add(name)
-        yield {"id": name, "title": section.title, "parts": list(_parts(section.parts))}
+    found: list[Document] = []
+    used: set[str] = set()
+    for number, (name, section) in enumerate(named):
+        identity = re.sub(r"[^a-z0-9]+", "-", section.title.lower()).strip("-") or f"section-{number}"
+        while identity in used:
+            identity = f"{identity}-{number}"
+        used.add(identity)
+        found.append(
+            {
+                "name": name,
+                "id": identity,
+                "title": section.title,
+                "parts": list(_parts(section.parts)),
+                "pictures": [],
+                "further": [],
+            }
+        )
+    _place(found, pictures)
+    link(found)
+    return found
+
+
+def _place(sections: list[Document], pictures: Sequence[Picture]) -> None:
+    """Give each picture to its section, the last one of that name; others get a section of their own."""
+    from markupsafe import Markup
+
+    of_name = {section["name"]: section for section in sections}
+    ground: Document = {"name": "", "id": "pictures", "title": "Pictures", "parts": [], "pictures": []}
+    for each in pictures:
+        section = next((of_name[name] for name in SECTIONS.get(each.name, ()) if name in of_name), ground)
+        drawn = each._asdict() | {"svg": Markup(each.svg), "findings": []}  # noqa: S704 (escaped there)
+        section["pictures"].append(drawn)
+    if pictures:
+        first = max((n for n, section in enumerate(sections) if section["name"] in FOREMOST), default=-1)
+        sections.insert(first + 1, ground | {"further": [each for each in pictures if each.name in SECTIONS]})
 
 
 def _parts(parts: Iterable[Part]) -> Iterator[Document]:
@@ -89,12 +128,19 @@ def _parts(parts: Iterable[Part]) -> Iterator[Document]:
         elif isinstance(part, Facts):
             yield {"kind": "facts", "rows": part.rows}
         elif isinstance(part, Table):
-            table = {"columns": part.columns, "rows": part.rows, "foot": part.foot, "note": part.note}
-            yield {"kind": "table", **table}
+            rows = [{"cells": cells, "id": "", "findings": []} for cells in part.rows]
+            yield {"kind": "table", "columns": part.columns, "rows": rows, "foot": part.foot, "note": part.note}
     yield from _list(waiting)
 
 
-def _list(items: list[Words]) -> Iterator[Document]:
+def _list(words: list[Words]) -> Iterator[Document]:
+    """Give a list; words marked by a blank go on with the item before them."""
+    items: list[Document] = []
+    for each in words:
+        if each.mark.strip() or not items:
+            items.append({"text": each.text, "more": [], "names": each.names, "id": "", "links": [], "pictures": []})
+        else:
+            items[-1]["more"].append(each.text)
     if items:
-        tag = "ol" if items[0].mark.strip()[0].isdigit() else "ul"
-        yield {"kind": "list", "tag": tag, "items_": [item.text for item in items]}
+        tag = "ol" if words[0].mark.strip()[:1].isdigit() else "ul"
+        yield {"kind": "list", "tag": tag, "items_": items}

@@ -20,8 +20,10 @@ from photostrip.report import sections_of
 from photostrip.report.html import to_html
 from photostrip.report.page.parts import Facts, Table, Words
 from photostrip.report.pictures import style
-from photostrip.report.pictures.plan_view import plan_of
-from photostrip.report.pictures.strip import LONGEST, strip_pictures
+from photostrip.report.pictures.ground.image_plane import residuals_of
+from photostrip.report.pictures.ground.plan import LONGEST
+from photostrip.report.pictures.ground.plan_view import plan_of
+from photostrip.report.pictures.result.pictures import picture_files, pictures_of
 from photostrip.report.pictures.svg import Axis, nice
 from tests.loops import nonempty
 from tests.reports import saved
@@ -63,7 +65,7 @@ class Page(HTMLParser):
         assert self._open.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        if self._open and self._open[-1] not in {"style", "title", "desc"}:
+        if self._open and self._open[-1] not in {"style", "script", "title", "desc"}:
             self.words.append(" ".join(data.split()))
 
     def of(self, tag: str) -> list[dict[str, str]]:
@@ -77,7 +79,7 @@ def page() -> Page:
 
 def texts(document: Document) -> Iterator[str]:
     """Give everything that the sections say."""
-    for section in sections_of(document):
+    for section in sections_of(document, everything=True):
         yield section.title
         for part in section.parts:
             if isinstance(part, Words):
@@ -96,7 +98,10 @@ def test_the_page_says_everything_that_the_sections_say() -> None:
 
 
 def test_nothing_is_loaded_from_elsewhere() -> None:
-    assert {tag for tag, _ in page().elements} & {"script", "link", "img", "iframe", "object"} == set()
+    assert {tag for tag, _ in page().elements} & {"link", "img", "iframe", "object"} == set()
+    assert page().of("script") == [{}]  # our own, in the page
+    (policy,) = (each["content"] for each in page().of("meta") if "http-equiv" in each)
+    assert policy.startswith("default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-")
     for tag, attributes in nonempty(page().elements):
         assert not {"src", "srcset", "onclick"} & attributes.keys()
         for name, value in attributes.items():
@@ -119,7 +124,7 @@ def test_readers_that_do_not_see_have_words_for_everything() -> None:
     assert len(found.of("h1")) == len(found.of("main")) == 1
     assert all(each["scope"] in {"col", "row"} for each in nonempty(found.of("th")))
     assert all(each["role"] == "img" for each in nonempty(found.of("svg")))
-    assert len(found.of("svg")) == 3
+    assert len(found.of("svg")) == len(pictures_of(saved())) >= 12
     scrolled = [each for each in found.of("div") if each.get("role") == "region"]
     assert all(each["tabindex"] == "0" and each["aria-label"] for each in nonempty(scrolled))
 
@@ -203,7 +208,7 @@ def test_vectors_and_heights_are_the_differences(frame: str) -> None:
 
 def test_vectors_are_drawn_to_the_scale_of_their_bar() -> None:
     document = case().document
-    picture = ET.fromstring(strip_pictures(document)[0].svg)  # noqa: S314 (we wrote it)
+    picture = ET.fromstring(pictures_of(document)[0].svg)  # noqa: S314 (we wrote it)
     lines = {str(each.get("class")): each for each in picture.iter(f"{SVG}line")}
     words = " ".join(each.text or "" for each in picture.iter(f"{SVG}text"))
     said = re.search(r"residuals (\d+) (mm|m)\b", words)
@@ -224,7 +229,7 @@ def test_vectors_are_drawn_to_the_scale_of_their_bar() -> None:
 
 def test_every_picture_is_sound_and_stays_inside() -> None:
     for frame, strips in (("projected", 1), ("north first", 2)):
-        for each in strip_pictures(case(frame, strips).document):
+        for each in pictures_of(case(frame, strips).document):
             root = ET.fromstring(each.svg)  # noqa: S314 (we wrote it)
             _, _, width, height = (float(value) for value in root.get("viewBox", "").split())
             assert root.find(f"{SVG}title") is not None
@@ -235,13 +240,32 @@ def test_every_picture_is_sound_and_stays_inside() -> None:
                         assert 0 <= float(element.get(name, 0)) <= limit, ET.tostring(element)
 
 
-def test_a_result_without_control_and_precision_has_a_plan() -> None:
-    document = copy.deepcopy(case().document)
+def test_a_result_without_control_and_precision_has_pictures_of_the_rest() -> None:
+    document = json.loads(to_json(case().document))
     document.pop("precision", None)
-    document["control"] = []
+    document["control"], document["misclosures"] = [], []
     for row in document["points"]:
-        row.update(role="new", ellipse_a=None)
-    assert [each.name for each in strip_pictures(document)] == ["plan"]
+        row.update(role="new", ellipse_a=None, sigma_z=None)
+    names = {each.name for each in pictures_of(case().document)}
+    left = {"precision", "precision-plan", "precision-height", "deformation", "check"}
+    assert left < names
+    assert {each.name for each in pictures_of(document)} == names - left
+
+
+@pytest.mark.parametrize("frame", sorted(FRAMES))
+def test_residuals_stand_where_the_points_were_measured(frame: str) -> None:
+    one = case(frame)
+    found = residuals_of(one.document)
+    assert len(found) == sum(len(row["points"]) for row in one.document["residuals"])
+    for each in nonempty(found):
+        assert each.place == pytest.approx(tuple(one.measured[each.photo, each.point]), abs=0.5)  # mm
+
+
+def test_pictures_as_files_need_no_page() -> None:
+    for name, text in nonempty(picture_files(saved()).items()):
+        assert name.endswith(".svg")
+        assert "var(--" not in text
+        assert ET.fromstring(text).find(f"{SVG}style") is not None  # noqa: S314 (we wrote it)
 
 
 @pytest.mark.parametrize(("size", "expected"), [(0.03, 0.05), (1.0, 1.0), (1.01, 2.0), (7.0, 10.0), (0.0, 1.0)])
@@ -269,12 +293,41 @@ def test_run_and_report_write_the_same_page(tmp_path: Path, capsys: pytest.Captu
     assert capsys.readouterr().err == ""
 
 
-def test_long_tables_are_whole_when_everything_is_wanted() -> None:
+def test_long_tables_are_whole() -> None:
     document = copy.deepcopy(saved())
     document["control"] = [row | {"id": f"{row['id']} {n}"} for n in range(9) for row in document["control"]]
     names = {f"{saved()['control'][0]['id']} {n}" for n in range(9)}
-    assert names <= set(Page(to_html(document, everything=True)).words)
-    assert not names <= set(Page(to_html(document)).words)
+    assert names <= set(Page(to_html(document)).words)
+
+
+def test_the_menu_has_the_order_of_the_page() -> None:
+    text = to_html(saved())
+    menu = re.findall(r'href="#([^"]+)"', text[text.index("<nav") : text.index("</nav>")])
+    assert menu == re.findall(r'<section id="([^"]+)" aria-labelledby', text)
+    assert "pictures" in menu
+
+
+def test_findings_lead_to_rows_and_pictures_and_back() -> None:
+    document = copy.deepcopy(saved())
+    point, pair = document["control"][0]["id"], document["models"][0]
+    blank = {"code": "X", "title": "t", "severity": "warning", "accepted": False, "message": "m", "fix": "f"}
+    where = {"evidence": {}, "strips": [], "file": "", "line": 0, "column": 0, "key": ""}
+    document["findings"] = [
+        blank | where | {"points": [point], "photos": []},
+        blank | where | {"points": [], "photos": [pair["left"]]},
+    ]
+    text = to_html(document)
+    for number, start in ((1, point), (2, f"{pair['left']} – ")):
+        finding = re.search(rf'<li id="finding-{number}">(.*?)</li>', text, re.DOTALL)
+        assert finding is not None
+        rows = re.findall(r'href="#([^"]+-row-\d+)"', finding[1])
+        for row in nonempty(rows):
+            head = re.search(rf'<tr id="{row}"><th[^>]*>([^<]*)(.*?)</th>', text)
+            assert head is not None
+            assert head[1].startswith(start.split(" – ")[0]) or start.split(" – ")[0] in head[1]
+            assert f'href="#finding-{number}"' in head[2]
+        assert 'href="#picture-plan"' in finding[1]
+    assert 'href="#picture-deformation"' in text
 
 
 def test_html_needs_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Quiet, Strict, Width
+from photostrip.cli.options import Plots, Quiet, Strict, Width
 from photostrip.cli.section_option import Sections, Verbose, refuse_sections
 from photostrip.cli.stdout import Format, Parts, form_of, print_result, report_text
 
 HTML = ".html"
 
 
-def report(
+def report(  # noqa: PLR0913, PLR0917 (an argument for each option)
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; its ending gives the format.")
@@ -23,6 +23,7 @@ def report(
         Format | None, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the report is printed.")
     ] = None,
     width: Width = None,
+    plots: Plots = None,
     strict: Strict = False,
     section: Sections = None,
     quiet: Quiet = False,
@@ -36,7 +37,7 @@ def report(
     """
     from photostrip.errors import EXIT_DONE, faults_instead
     from photostrip.formats.output.result_json import read_result
-    from photostrip.formats.text.writing import write_text
+    from photostrip.formats.text.writing import write_files, write_text
     from photostrip.report import require_complete
     from photostrip.result.verdict import exit_code
 
@@ -48,13 +49,17 @@ def report(
     document = read_result(file)
     require_complete(document, file)
     with faults_instead(file, "reported"):
+        if plots is not None:
+            from photostrip.report.pictures.result.pictures import picture_files
+
+            write_files(plots, picture_files(document))
         if output is None:
             print_result(document, wanted, width, parts)
         elif page:
             from photostrip.report.html import check_html, to_html
 
             check_html("--output")
-            write_text(output, to_html(document, everything=verbose))
+            write_text(output, to_html(document))
         else:
             write_text(output, report_text(document, wanted, width, parts))
     return exit_code(document["status"], strict=True) if strict else EXIT_DONE

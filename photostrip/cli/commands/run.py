@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Assignments, Quiet, Shape, Strict, Width
+from photostrip.cli.options import Assignments, Plots, Quiet, Shape, Strict, Width
 from photostrip.cli.section_option import Sections, Verbose, refuse_sections
 from photostrip.cli.stdout import Format, Parts, form_of, print_result
 
@@ -35,6 +35,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         bool, typer.Option("--compare-methods", help="Adjust by every method, and compare them at the check points.")
     ] = False,
     html: Annotated[bool, typer.Option("--html", help="Write report.html into DIR, too.")] = False,
+    plots: Plots = None,
     strict: Strict = False,
     section: Sections = None,
     quiet: Quiet = False,
@@ -57,7 +58,8 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.report.page.progress import progress
     from photostrip.result.verdict import exit_code
 
-    _refuse_contradictions(output, depfile=depfile, trace=trace, methods=methods, html=html, strict=strict)
+    alone = {"--depfile": depfile, "--trace": trace, "--plots": plots}  # not for a comparison of methods
+    _refuse_contradictions(output, alone, methods=methods, html=html, strict=strict)
     refuse_sections(section, "a comparison of methods" if methods else form)
     messages = Messages(quiet=quiet, verbose=verbose)
     assignments = [*(["processing.cross_validation=true"] if cross_validate else []), *(assignments or [])]
@@ -86,25 +88,30 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         if depfile is not None and output is not None:  # before the result: it must not be the newer of the two
             write_text(depfile, make_rule(output / RESULT, read.files_read(result)))
         if output is not None:
-            files = result.files(html=html, everything=verbose)
+            files = result.files(html=html)
             write_files(output, files)
             messages.say(f"wrote {len(files)} files to {output}")
+        if plots is not None:
+            pictures = result.pictures()
+            write_files(plots, pictures)
+            messages.say(f"wrote {len(pictures)} pictures to {plots}")
     print_result(result.document, form, width, Parts(quiet, verbose, section or ()))
     return exit_code(result.status, strict=strict)
 
 
 def _refuse_contradictions(
-    output: Path | None, *, depfile: Path | None, trace: Path | None, methods: bool, html: bool, strict: bool
+    output: Path | None, alone: dict[str, Path | None], *, methods: bool, html: bool, strict: bool
 ) -> None:
     """Refuse options that make no sense together, before anything is computed."""
-    if output is None and depfile is not None:
+    trace = alone["--trace"]
+    if output is None and alone["--depfile"] is not None:
         raise typer.BadParameter("a rule for make needs a target: give --output as well", param_hint="--depfile")
     if output is None and html:
         raise typer.BadParameter("report.html needs a folder: give --output as well", param_hint="--html")
     if trace is not None:
         form_of(trace, "--trace")
-    if methods and (depfile is not None or trace is not None):
-        message = "a comparison of methods has no --depfile and no --trace"
+    if methods and any(alone.values()):
+        message = "a comparison of methods has no --depfile, no --trace and no --plots"
         raise typer.BadParameter(message, param_hint="--compare-methods")
     if methods and strict:
         raise typer.BadParameter("a comparison of methods has no verdict: --strict asks for one", param_hint="--strict")

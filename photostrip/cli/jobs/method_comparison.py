@@ -56,7 +56,7 @@ def compare_methods(
             name = result.name
             found[adjustment] = result.document
             if output is not None and adjustment != AUTO:  # one of the others
-                write_files(output / adjustment, result.files(html=html, everything=messages.verbose))
+                write_files(output / adjustment, result.files(html=html))
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
         failures = [each for each in found.values() if not isinstance(each, dict)]
         if len(failures) == len(found):

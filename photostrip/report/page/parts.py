@@ -37,6 +37,7 @@ class Words:
     text: str
     style: str = ""  # ``"good"``, ``"unverified"``, ``"look"``, ``"failed"`` or empty
     mark: str = ""  # what stands before it: a number or a bullet; lines after the first are indented below the text
+    names: tuple[tuple[str, str], ...] = ()  # what it speaks of, ``("point", "K01")``: a page links its rows
 
 
 def numbered(*texts: str) -> tuple[Words, ...]:

@@ -1,6 +1,7 @@
 """Pictures of a document: the same document gives the same bytes.
 
-- ``strip`` draws a result into the page of its report with the elements of ``svg``, on the ground of ``plan_view``;
+- ``ground`` and ``result`` draw a result with the elements of ``svg`` and the axes of ``chart``, for the page of its
+  report and as files;
 - ``plans``, ``plan_strip`` and ``terrestrial`` draw files of their own with matplotlib, through ``drawing``;
 - ``style`` has the colours, marks and sizes of both. docs/design.md says why there are two ways.
 """

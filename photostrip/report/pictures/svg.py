@@ -1,6 +1,6 @@
-"""Elements of SVG for the pictures in a page, whose style sheet gives them their colours.
+"""Elements of SVG for the pictures of a result: in a page, whose style sheet gives them their colours, or as files.
 
-matplotlib draws all pictures in files of their own; docs/design.md says why not those in a page. Hints at marks,
+matplotlib draws plans and terrestrial results; docs/design.md says why not the pictures of a result. Hints at marks,
 colours of a dark screen and ids that are unique on the page would have to be written into its SVG afterwards.
 """
 
@@ -42,6 +42,7 @@ class Axis(NamedTuple):
     high: float
     start: float
     end: float
+    numbered: bool = True  # False: what it has is not numbers, but named by who draws it
 
     def __call__(self, value: float) -> float:
         """Return the place of a number."""
@@ -92,19 +93,44 @@ def path(points: Iterable[Point], kind: str) -> str:
     return element("polyline", points=steps, kind=kind)
 
 
+def titled(hint: str) -> str:
+    """Return what a pointer over an element shows."""
+    return element("title", escape(hint)) if hint else ""
+
+
+def polygon(points: Iterable[Point], kind: str, hint: str = "") -> str:
+    corners = " ".join(f"{number(x)},{number(y)}" for x, y in points)
+    return element("polygon", titled(hint), points=corners, kind=kind)
+
+
+def rectangle(corner: Point, size: Point, kind: str, hint: str = "") -> str:
+    """Return a rectangle by its upper left corner, width and height."""
+    title = titled(hint)
+    return element("rect", title, x=corner[0], y=corner[1], width=size[0], height=size[1], kind=kind)
+
+
+def circle(place: Point, radius: float, kind: str, hint: str = "") -> str:
+    title = titled(hint)
+    return element("circle", title, cx=place[0], cy=place[1], r=radius, kind=kind)
+
+
+def dots(places: Iterable[Point], radius: float, kind: str) -> str:
+    """Return many dots as one path: a tenth of the bytes, and no hints."""
+    steps = "".join(f"M{number(x)} {number(y)}h0" for x, y in places)
+    return element("path", d=steps, kind=f"dots {kind}", stroke_width=2 * radius)
+
+
 def mark(place: Point, shape: str, kind: str, hint: str, size: float = 5.0) -> str:
     """Return a mark: a triangle, a square, a diamond or a dot; the hint is what a pointer over it shows."""
     x, y = place
-    title = element("title", escape(hint)) if hint else ""
     if shape == "dot":
-        return element("circle", title, cx=x, cy=y, r=size * 0.6, kind=kind)
+        return circle(place, size * 0.6, kind, hint)
     corners: dict[str, Sequence[Point]] = {
         "triangle": ((0, -1.2), (1.1, 0.8), (-1.1, 0.8)),
         "square": ((-0.85, -0.85), (0.85, -0.85), (0.85, 0.85), (-0.85, 0.85)),
         "diamond": ((0, -1.2), (1.2, 0), (0, 1.2), (-1.2, 0)),
     }
-    place_of = " ".join(f"{number(x + dx * size)},{number(y + dy * size)}" for dx, dy in corners[shape])
-    return element("polygon", title, points=place_of, kind=kind)
+    return polygon([(x + dx * size, y + dy * size) for dx, dy in corners[shape]], kind, hint)
 
 
 def picture(name: str, size: Point, texts: Texts, content: Iterable[str]) -> Picture:
@@ -125,13 +151,13 @@ def picture(name: str, size: Point, texts: Texts, content: Iterable[str]) -> Pic
 def frame(x: Axis, y: Axis, labels: tuple[str, str]) -> list[str]:
     """Give grid lines, numbers and names of two axes."""
     found = []
-    for value in x.ticks():
+    for value in x.ticks() if x.numbered else ():
         found.append(line((x(value), y.start), (x(value), y.end), "grid"))
-        found.append(text((x(value), y.start + 18.0), f"{value:.10g}", "tick", "middle"))
+        found.append(text((x(value), y.start + 18.0), f"{value:.6g}", "tick", "middle"))
     for value in y.ticks():
         kind = "zero" if abs(value) < 1e-12 * max(abs(y.high), abs(y.low), 1e-300) else "grid"
         found.append(line((x.start, y(value)), (x.end, y(value)), kind))
-        found.append(text((x.start - 8.0, y(value) + 4.0), f"{value:.10g}", "tick", "end"))
+        found.append(text((x.start - 8.0, y(value) + 4.0), f"{value:.6g}", "tick", "end"))
     found.append(text(((x.start + x.end) / 2, y.start + 38.0), labels[0], "axis", "middle"))
     found.append(text((x.start - 8.0, y.end - 12.0), labels[1], "axis", "end"))
     return found

@@ -68,14 +68,14 @@ class SectionName(StrEnum):
 
 
 def sections_of(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
-    return tuple(section for _, section in _named(document, everything=everything))
+    return tuple(section for _, section in named_sections(document, everything=everything))
 
 
-def _named(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:
+def named_sections(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:
     """Give the sections of a report with their names; a name has several where its stage has."""
     name = SectionName
     yield name.VERDICT, verdict_section(document, everything=everything)
-    yield from ((name.FINDINGS, each) for each in findings_sections(document))
+    yield from ((name.FINDINGS, each) for each in findings_sections(document, everything=everything))
     yield name.PROJECT, project_section(document)
     yield name.DECISIONS, decisions_section(document)
     yield name.COUNTS, counts_section(document)
@@ -143,7 +143,7 @@ def chosen_sections(
     last = headline(document)
     end = Section("", (Words(last, document["status"]),))
     if names:
-        named = list(_named(document, everything=True))
+        named = list(named_sections(document, everything=True))
         missing = [each for each in SectionName if each in names and each not in {name for name, _ in named}]
         lacking = [Section("", (Words(f"This result has no section `{each}`."),)) for each in missing]
         return (*(section for name, section in named if name in names), *lacking)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-def findings_sections(document: Document) -> tuple[Section, ...]:
+def findings_sections(document: Document, *, everything: bool) -> tuple[Section, ...]:
     """Return the section of the findings; none when there are none."""
     findings = document.get("findings", [])
     if not findings:
@@ -23,8 +23,9 @@ def findings_sections(document: Document) -> tuple[Section, ...]:
     parts: list[Part] = []
     for _, group in groupby(findings, key=itemgetter("code")):
         kind = list(group)
-        parts += [part for each in kind[:MOST_OF_A_KIND] for part in _paragraphs(each)]
-        parts += _rest(len(kind) - MOST_OF_A_KIND, kind[0])
+        shown = kind if everything else kind[:MOST_OF_A_KIND]
+        parts += [part for each in shown for part in _paragraphs(each)]
+        parts += _rest(len(kind) - len(shown), kind[0])
     return (Section("Plausibility of the data", tuple(parts)),)
 
 
@@ -66,7 +67,8 @@ def _cure(finding: Document) -> str:
 def _paragraphs(finding: Document) -> Iterator[Part]:
     place = before(finding["file"], finding["line"], finding["column"])
     text = f"{finding['code']} {finding['title']} ({_word(finding)}): {place}{finding['message']}."
-    yield Words(text, _colour(finding), "-")
+    names = [(kind, name) for kind in ("point", "photo") for name in finding.get(f"{kind}s") or ()]
+    yield Words(text, _colour(finding), mark="-", names=tuple(names))
     if finding["evidence"]:
         numbers = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in finding["evidence"].items())
         yield Words(f"Evidence: {numbers}.", "", " ")

@@ -140,6 +140,9 @@ def _components(found: Bundle) -> list[Document]:
 
 
 def _calibration(found: Bundle) -> list[Document]:
+    """Return the parameters of the self-calibration: the first of the common unknowns."""
+    covariance = found.screened.precision.common[: len(found.parameters), : len(found.parameters)]
+    sigma = np.sqrt(np.diag(covariance))
     return [
         {
             "camera": each.camera,
@@ -151,8 +154,9 @@ def _calibration(found: Bundle) -> list[Document]:
             "significant": each.significant,
             "sigma_a_priori": each.prior if np.isfinite(each.prior) else None,
             "controlled": each.redundancy,
+            "correlations": row,
         }
-        for each in found.parameters
+        for each, row in zip(found.parameters, covariance / np.outer(sigma, sigma), strict=True)
     ]
 
 

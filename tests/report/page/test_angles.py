@@ -66,7 +66,7 @@ def test_every_angle_of_every_table_has_the_unit(unit: str, adjustment: str) -> 
 
 @pytest.mark.parametrize("adjustment", ADJUSTMENTS)
 def test_the_page_has_no_other_unit(adjustment: str) -> None:
-    page = to_html(document("gon", adjustment), everything=True)
+    page = to_html(document("gon", adjustment))
     assert "gon" in page
     assert re.findall(r"\bdeg\b|″", page) == []
 

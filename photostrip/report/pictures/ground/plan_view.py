@@ -31,10 +31,42 @@ class Plan(NamedTuple):
     strips: list[list[Spot]]
     north: Pair
 
+    @property
+    def everything(self) -> list[Spot]:
+        return [*self.spots, *(spot for strip in self.strips for spot in strip)]
+
+    def turned(self, east: float, north: float) -> Pair:
+        """Return a vector along the first strip and to its left."""
+        sine, cosine = self.north
+        return east * cosine + north * sine, north * cosine - east * sine
+
+
+class Course(NamedTuple):
+    """A strip as an axis of its own, on the plan."""
+
+    start: Pair
+    direction: Pair  # of length 1
+
+    def turned(self, vector: Pair) -> Pair:
+        """Return a vector of the plan along the strip and to its left."""
+        (x, y), (a, b) = vector, self.direction
+        return x * a + y * b, y * a - x * b
+
+    def along(self, place: Pair) -> float:
+        """Return the distance of a place from the first photo, along the strip."""
+        return self.turned((place[0] - self.start[0], place[1] - self.start[1]))[0]
+
+
+def course_of(strip: list[Spot]) -> Course:
+    first, last = strip[0], strip[-1]
+    x, y = last.along - first.along, last.across - first.across
+    length = math.hypot(x, y)
+    return Course((first.along, first.across), (x / length, y / length) if length else (1.0, 0.0))
+
 
 def plan_of(document: Document) -> Plan:
     """Return the plan of a result in metres, turned so that its first strip runs to the right."""
-    grid = _Grid(document)
+    grid = Grid(document)
     photos = document["photos"]
     # single photos are strips of their own, which ``strips`` does not hold: they are drawn as one
     names = [strip["id"] for strip in document["strips"]]
@@ -76,14 +108,15 @@ def _ellipse(row: Document, turned: Any) -> tuple[float, float, float] | None:  
     return a, b, math.atan2(y, x)
 
 
-class _Grid:
-    """Metres to the east and to the north in the frame of a result."""
+class Grid:
+    """Metres to the east, to the north and up in the frame of a result."""
 
     def __init__(self, document: Document) -> None:
         frame = document["frame"]
         self._kind = frame["kind"]
         self._axes: list[str] = list(frame["axes"])
         self._factor = frame.get("plan_factor", 1.0)
+        self._up_factor = frame.get("height_factor", 1.0)
         rows = document["points"]
         self._ellipsoid: list[float] = frame.get("ellipsoid") or [EARTH, EARTH]
         self._middle = [math.fsum(row[axis] for row in rows) / max(len(rows), 1) for axis in "xyz"]
@@ -119,6 +152,34 @@ class _Grid:
             radius = self._factor * self._ellipsoid[0]
             return x * radius * math.cos(latitude), y * radius
         return x * self._factor, y * self._factor
+
+    def up(self, row: Document) -> float:
+        """Return metres above the middle of the points."""
+        x, y, z = self._named([row[axis] - middle for axis, middle in zip("xyz", self._middle, strict=True)])
+        if self._kind == "geocentric":
+            up = self._turn[2]
+            return x * up[0] + y * up[1] + z * up[2]
+        return float(z * self._up_factor)
+
+    def seen_from(self, photo: Document, row: Document) -> tuple[float, float, float]:
+        """Return the way from a perspective centre to a point in metres, along the axes of the photo's rotation."""
+        x, y, z = self._named([row[axis] - photo[axis] for axis in "xyz"])
+        if self._kind == "geocentric":
+            return x, y, z
+        east, north = x * self._factor, y * self._factor
+        if self._kind == "geographic":
+            latitude = self._named([photo[axis] for axis in "xyz"])[1] * self._factor
+            east, north = east * self._ellipsoid[0] * math.cos(latitude), north * self._ellipsoid[0]
+        drop = 0.0 if self._kind == "local" else (east**2 + north**2) / (2.0 * self._ellipsoid[0])
+        return east, north, z * self._up_factor - drop
+
+    def plan_direction(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Bring a vector along the axes of a photo's rotation to east, north and up."""
+        if self._kind != "geocentric":
+            return vector
+        x, y, z = vector
+        east, north, up = (x * axis[0] + y * axis[1] + z * axis[2] for axis in self._turn)
+        return east, north, up
 
     def difference(self, row: Document) -> tuple[Pair | None, float | None]:
         """Return a difference in metres: to the east and north, and in height."""

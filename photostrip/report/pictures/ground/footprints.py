@@ -1,0 +1,130 @@
+"""What each photo shows of the ground, and how many show the same."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from photostrip.notes import counted
+from photostrip.report.pictures import svg
+from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
+from photostrip.report.pictures.ground.image_plane import footprints
+from photostrip.report.pictures.ground.sheet import bars, ids, north_arrow, sheet_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from photostrip.report.page.parts import Document
+    from photostrip.report.pictures.ground.plan_view import Pair, Plan
+    from photostrip.report.pictures.svg import Picture
+
+MARGIN = 20.0
+CELLS = 240  # of the overlap along the picture
+MOST = 6  # photos that are told apart by colour
+
+
+def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
+    """Draw the footprints; nothing where formats or orientations are not known."""
+    outlines = footprints(document, plan)
+    if not outlines:
+        return []
+    corners = [corner for outline in outlines.values() for corner in outline]
+    sheet = sheet_of(corners, MARGIN)
+    drawn_outlines = {photo: [sheet.place(corner) for corner in outline] for photo, outline in outlines.items()}
+    counts = _overlap(list(drawn_outlines.values()), WIDTH / CELLS)
+    drawn = [_area(runs, f"overlap-{count}", WIDTH / CELLS) for count, runs in sorted(counts.items())]
+    drawn += [svg.polygon(outline, "outline", f"photo {photo}") for photo, outline in drawn_outlines.items()]
+    drawn += _scale(counts)
+    drawn += bars(sheet)
+    drawn += north_arrow(plan.north)
+    middles = {photo: _middle(outline) for photo, outline in drawn_outlines.items()}
+    drawn += ids(middles.items(), (), (WIDTH, sheet.height - 30.0))
+    largest = max(outlines, key=lambda photo: _size(outlines[photo]))
+    caption = (
+        "What each photo shows, on level ground at the mean height of its points; colours: how many photos show the "
+        "same. "
+        f"The largest footprint is that of photo {largest}, {_size(outlines[largest]) / 1e6:.3g} km²."
+    )
+    words = f"{counted(len(outlines), 'footprint')}; at most {max(counts, default=0)} photos show the same ground."
+    return [
+        svg.picture("footprints", (WIDTH, sheet.height), svg.Texts("Footprints and overlap", caption, words), drawn)
+    ]
+
+
+def _middle(outline: Sequence[svg.Point]) -> svg.Point:
+    return sum(x for x, _ in outline) / len(outline), sum(y for _, y in outline) / len(outline)
+
+
+def _size(outline: Sequence[Pair]) -> float:
+    following = [*outline[1:], outline[0]]
+    return abs(sum(a * d - c * b for (a, b), (c, d) in zip(outline, following, strict=True))) / 2
+
+
+Runs = list[tuple[int, int, int]]  # row, first cell, cell after the last
+
+
+def _overlap(outlines: Iterable[Sequence[svg.Point]], cell: float) -> dict[int, Runs]:
+    """Count the photos over each cell of the picture; returned are runs of cells in rows, by count."""
+    changes: dict[int, dict[int, int]] = {}
+    for outline in outlines:
+        top, bottom = min(y for _, y in outline), max(y for _, y in outline)
+        for row in range(math.ceil(top / cell - 0.5), math.ceil(bottom / cell - 0.5)):
+            crossed = _crossings(outline, (row + 0.5) * cell)
+            if crossed:
+                line = changes.setdefault(row, {})
+                start, end = (math.ceil(x / cell - 0.5) for x in crossed)
+                line[start] = line.get(start, 0) + 1
+                line[end] = line.get(end, 0) - 1
+    found: dict[int, Runs] = {}
+    for row, line in sorted(changes.items()):
+        count, start = 0, 0
+        for at in sorted(line):
+            if count and at > start:
+                found.setdefault(min(count, MOST), []).append((row, start, at))
+            count, start = count + line[at], at
+    return found
+
+
+def _crossings(outline: Sequence[svg.Point], y: float) -> tuple[float, float] | None:
+    """Return where a line across the picture enters and leaves a quadrangle without dents."""
+    found = [
+        a + (y - b) / (d - b) * (c - a)
+        for (a, b), (c, d) in zip(outline, [*outline[1:], outline[0]], strict=True)
+        if (b <= y) != (d <= y)
+    ]
+    return (min(found), max(found)) if found else None
+
+
+def _area(runs: Runs, kind: str, cell: float) -> str:
+    """Draw cells as one path; runs that are alike in rows that follow each other are one rectangle."""
+    tall: dict[tuple[int, int], tuple[int, int]] = {}
+    parts = []
+
+    def close(span: tuple[int, int], rows: tuple[int, int]) -> None:
+        x, y = (svg.number(value * cell) for value in (span[0], rows[0]))
+        wide, high = (svg.number(value * cell) for value in (span[1] - span[0], rows[1] - rows[0] + 1))
+        parts.append(f"M{x} {y}h{wide}v{high}h-{wide}z")
+
+    for row, start, end in runs:
+        rows = tall.get((start, end))
+        if rows and rows[1] == row - 1:
+            tall[start, end] = rows[0], row
+            continue
+        if rows:
+            close((start, end), rows)
+        tall[start, end] = row, row
+    for span, rows in tall.items():
+        close(span, rows)
+    return svg.element("path", d="".join(parts), kind=f"overlap {kind}")
+
+
+def _scale(counts: Iterable[int]) -> list[str]:
+    found, x = [], LEFT
+    for count in range(1, max(counts, default=0) + 1):
+        words = f"{count}" if count < MOST else f"{MOST} and more"
+        found += [
+            svg.rectangle((x, TOP - 50.0), (22.0, 14.0), f"overlap overlap-{count}"),
+            svg.text((x + 28.0, TOP - 38.5), words),
+        ]
+        x += 62.0
+    return [*found, svg.text((x + 70.0 * (max(counts, default=0) >= MOST), TOP - 38.5), "photos")]

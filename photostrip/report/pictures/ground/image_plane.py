@@ -1,0 +1,127 @@
+"""Photos of a result as their cameras saw the ground: image points from adjusted points, the ground under the corners.
+
+For pictures, not for measuring: distortion is left aside.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from photostrip.report.pictures.ground.plan_view import Grid
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from photostrip.report.page.parts import Document
+    from photostrip.report.pictures.ground.plan_view import Pair, Plan, Spot
+
+LOWEST_RAY = 0.1  # sine of the angle below the horizon from which a corner has a place on the ground
+
+
+class Residual(NamedTuple):
+    """A residual at its place in the photo."""
+
+    photo: str
+    point: str
+    place: Pair  # mm from the principal point, x right, y up
+    size: Pair  # µm, measured minus computed
+    used: bool
+    test: Pair | None  # standardised, where a bundle adjustment knows it
+
+
+class Frame(NamedTuple):
+    """The format of a camera around its principal point, mm."""
+
+    low: Pair
+    high: Pair
+
+    @property
+    def corners(self) -> list[Pair]:
+        (a, b), (c, d) = self.low, self.high
+        return [(a, b), (c, b), (c, d), (a, d)]
+
+
+def cameras_of(document: Document) -> dict[str, Document]:
+    """Return the camera of each photo; of photos that are strips of their own where the result has one camera only."""
+    cameras = {row["id"]: row for row in document["cameras"]}
+    of_strip = {strip["id"]: cameras[strip["camera"]] for strip in document["strips"] if strip["camera"] in cameras}
+    only = next(iter(cameras.values())) if len(cameras) == 1 else None
+    found = {photo["id"]: of_strip.get(photo["strip"], only) for photo in document["photos"]}
+    return {photo: camera for photo, camera in found.items() if camera is not None}
+
+
+def frame_of(camera: Document) -> Frame | None:
+    """Return the frame of a camera; None where its format is not known."""
+    if not camera["format_mm"]:
+        return None
+    (width, height), (x, y) = camera["format_mm"], camera["principal_point_mm"] or (0.0, 0.0)
+    return Frame((-width / 2 - x, -height / 2 - y), (width / 2 - x, height / 2 - y))
+
+
+def residuals_of(document: Document) -> list[Residual]:
+    """Return the image residuals with their places, photo by photo."""
+    grid, cameras = Grid(document), cameras_of(document)
+    photos = {photo["id"]: photo for photo in document["photos"] if photo["rotation"]}
+    points = {point["id"]: point for point in document["points"]}
+    found: list[Residual] = []
+    for row in document["residuals"]:
+        photo, camera = photos.get(row["photo"]), cameras.get(row["photo"])
+        if photo is None or camera is None:
+            continue
+        unknown = [None] * len(row["points"])
+        tests = row.get("test_x") or unknown, row.get("test_y") or unknown
+        columns = row["points"], row["vx_um"], row["vy_um"], row["used"], *tests
+        for name, vx, vy, used, test_x, test_y in zip(*columns, strict=True):
+            place = _image_of(grid, photo, points.get(name), camera["principal_distance_mm"])
+            if place is None or vx is None or vy is None:
+                continue
+            test = None if test_x is None or test_y is None else (test_x, test_y)
+            found.append(Residual(photo=row["photo"], point=name, place=place, size=(vx, vy), used=used, test=test))
+    return found
+
+
+def _image_of(grid: Grid, photo: Document, point: Document | None, distance: float) -> Pair | None:
+    """Return the image of a point; None for one that is not before the camera."""
+    if point is None:
+        return None
+    m, (x, y, z) = photo["rotation"], grid.seen_from(photo, point)
+    right, up, back = (m[n] * x + m[n + 3] * y + m[n + 6] * z for n in range(3))
+    return (-distance * right / back, -distance * up / back) if back < 0 else None
+
+
+def footprints(document: Document, plan: Plan) -> dict[str, list[Pair]]:
+    """Return where the corners of each photo lie on the plan, on level ground at the mean height of its points."""
+    grid, cameras = Grid(document), cameras_of(document)
+    spots = {spot.id: spot for strip in plan.strips for spot in strip}
+    heights = _ground_heights(document, grid)
+    found = {}
+    for photo in document["photos"]:
+        camera, ground = cameras.get(photo["id"]), heights.get(photo["id"])
+        frame = frame_of(camera) if camera else None
+        if camera is None or frame is None or ground is None or not photo["rotation"]:
+            continue
+        rays = [_ray(grid, photo["rotation"], corner, camera["principal_distance_mm"]) for corner in frame.corners]
+        if all(up < -LOWEST_RAY * math.hypot(east, north, up) for east, north, up in rays):
+            found[photo["id"]] = [_reached(plan, spots[photo["id"]], ray, grid.up(photo) - ground) for ray in rays]
+    return found
+
+
+def _ground_heights(document: Document, grid: Grid) -> Mapping[str, float]:
+    """Return the mean height of the points of each photo."""
+    up = {point["id"]: grid.up(point) for point in document["points"]}
+    known = {row["photo"]: [up[name] for name in row["points"] if name in up] for row in document["residuals"]}
+    return {photo: math.fsum(values) / len(values) for photo, values in known.items() if values}
+
+
+def _ray(grid: Grid, m: list[float], corner: Pair, distance: float) -> tuple[float, float, float]:
+    """Return the direction of an image point to east, north and up."""
+    (x, y), z = corner, -distance
+    a, b, c = (m[n] * x + m[n + 1] * y + m[n + 2] * z for n in (0, 3, 6))
+    return grid.plan_direction((a, b, c))
+
+
+def _reached(plan: Plan, spot: Spot, ray: tuple[float, float, float], above: float) -> Pair:
+    east, north, up = ray
+    along, across = plan.turned(-east * above / up, -north * above / up)
+    return spot.along + along, spot.across + across

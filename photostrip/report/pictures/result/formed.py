@@ -1,0 +1,202 @@
+"""How strips were formed: gaps between models, drift of the scale."""
+
+from __future__ import annotations
+
+import math
+from itertools import accumulate, pairwise
+from typing import TYPE_CHECKING
+
+from photostrip.notes import counted
+from photostrip.report.pictures import svg
+from photostrip.report.pictures.chart import WIDTH, Entry, Layout, framed, framed_by_photos, legend, span, steps
+from photostrip.report.pictures.ground.plan_view import Grid, course_of
+from photostrip.report.pictures.result.along import MOST_STRIPS, origin_of, polynomial_at
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.report.page.parts import Document
+    from photostrip.report.pictures.ground.plan_view import Pair, Plan, Spot
+    from photostrip.report.pictures.svg import Picture
+
+SHAPES = {"along": "dot", "across": "square", "up": "triangle"}
+KINDS = {"along": "1", "across": "2", "up": "3"}
+PPM = 1e6
+MOST_MARKS = 200  # on a strip; more are a line without them
+
+
+def _worst(strips: Sequence[str], badness: dict[str, float]) -> list[str]:
+    """Choose the strips that are drawn: all, or the worst of them, in their order."""
+    chosen = sorted(strips, key=lambda strip: -badness.get(strip, 0.0))[: 2 * MOST_STRIPS]
+    return [strip for strip in strips if strip in chosen]
+
+
+def _layout(number: int) -> Layout:
+    return Layout(columns=1 if number == 1 else 2, height=210.0 if number == 1 else 140.0, number=number)
+
+
+def _of(shown: Sequence[str], strips: Sequence[str], what: str) -> str:
+    return "" if len(shown) == len(strips) else f" {len(shown)} of {len(strips)} strips, {what}."
+
+
+def junction_pictures(document: Document) -> list[Picture]:
+    """Draw what neighbouring models differ by at the points that they have in common."""
+    rows = document["junctions"] or document.get("links", [])
+    rows = [row for row in rows if row["discrepancy_um"]["along"] is not None]
+    if not rows:
+        return []
+    strips = list(dict.fromkeys(row["strip"] for row in rows))
+    largest = {
+        strip: max(max(row["discrepancy_um"].values()) for row in rows if row["strip"] == strip) for strip in strips
+    }
+    shown, high = _worst(strips, largest), span(largest.values())
+    layout, drawn = _layout(len(shown)), []
+    for place, strip in enumerate(shown):
+        own = [row for row in rows if row["strip"] == strip]
+        panel = layout.panel(place, (0.0, len(own) + 1.0), high)
+        drawn += framed_by_photos(
+            panel, [row["photo"] for row in own], "µm", f"strip {strip}" if len(strips) > 1 else ""
+        )
+        for name, kind in KINDS.items():
+            values = [(n, row["discrepancy_um"][name]) for n, row in enumerate(own, 1)]
+            drawn.append(steps(panel, values, f"curve curve-{kind} thin"))
+            drawn += (
+                []
+                if len(own) > MOST_MARKS
+                else [
+                    svg.mark(
+                        panel.at(n, size),
+                        SHAPES[name],
+                        f"fill-{kind}",
+                        f"photo {own[n - 1]['photo']}, {name}: {size:.1f} µm",
+                        4.0,
+                    )
+                    for n, size in values
+                ]
+            )
+    drawn += legend(Entry(name, f"fill-{kind}", SHAPES[name]) for name, kind in KINDS.items())
+    worst = max(rows, key=lambda row: max(row["discrepancy_um"].values()))
+    scale = "model" if document.get("links") else "photo"
+    caption = (
+        f"Rms differences of the common points of two models at {scale} scale, at the photo that joins them."
+        f"{_of(shown, strips, 'those with the largest gaps')}"
+    )
+    words = f"{counted(len(rows), 'junction')}; the largest gap is at photo {worst['photo']}."
+    texts = svg.Texts("Gaps between models", caption, words)
+    return [svg.picture("junctions", (WIDTH, layout.whole), texts, drawn)]
+
+
+def scale_pictures(document: Document, plan: Plan) -> list[Picture]:
+    """Draw what the adjustment did to the scale along each strip of photos.
+
+    A strip is formed of models with bases of length 1, so that scale of model and strip give the base that was formed.
+    """
+    grid = Grid(document)
+    up = {photo["id"]: grid.up(photo) for photo in document["photos"]}
+    scale = {} if document.get("links") else {row["strip"]: row["scale"] for row in document["absolute"]}
+    formed = {
+        (row["left"], row["right"]): row["scale_factor"] * scale[row["strip"]]
+        for row in document["models"]
+        if row["strip"] in scale
+    }
+    found = {}
+    for strip, flown in zip(document["strips"], plan.strips, strict=False):
+        values = _base_ratios(flown, formed, up)
+        if len(values) > 1:
+            found[strip["id"]] = values
+    if not found:
+        return []
+    return [_scale_picture(document, plan, found)]
+
+
+def _base_ratios(flown: Sequence[Spot], formed: dict[tuple[str, str], float], up: dict[str, float]) -> list[Pair]:
+    """Return the places of bases, km, and adjusted over formed length, ppm from the mean of the strip."""
+    course, found = course_of(list(flown)), []
+    for left, right in pairwise(flown):
+        before = formed.get((left.id, right.id))
+        if before:
+            after = math.dist((left.along, left.across, up[left.id]), (right.along, right.across, up[right.id]))
+            middle = (left.along + right.along) / 2, (left.across + right.across) / 2
+            found.append((course.along(middle) / 1000, (after / before - 1.0) * PPM))
+    mean = math.fsum(ratio for _, ratio in found) / max(len(found), 1)
+    return [(at, ratio - mean) for at, ratio in found]
+
+
+def _scale_picture(document: Document, plan: Plan, found: dict[str, list[Pair]]) -> Picture:
+    strips = list(found)
+    sizes = {strip: max(abs(size) for _, size in values) for strip, values in found.items()}
+    shown = _worst(strips, sizes)
+    bands = {strip: _band(document, strip, found[strip]) for strip in shown}
+    curves = {strip: _polynomial(document, plan, strip, found[strip]) for strip in shown}
+    high = span(
+        [size for strip in shown for values in (found[strip], curves[strip]) for _, size in values]
+        + [sign * size for band in bands.values() for _, size in band for sign in (1, -1)]
+    )
+    layout, drawn = _layout(len(shown)), []
+    for place, strip in enumerate(shown):
+        panel = layout.panel(place, span((at for at, _ in found[strip]), zero=False, room=0.02), high)
+        band = bands[strip]
+        if band:
+            drawn.append(
+                svg.polygon(
+                    [panel.at(*each) for each in (*band, *((at, -size) for at, size in reversed(band)))], "band"
+                )
+            )
+        drawn += framed(panel, ("km along the strip", "ppm"), f"strip {strip}" if len(strips) > 1 else "")
+        drawn.append(steps(panel, found[strip], "curve curve-1 thin"))
+        if len(found[strip]) <= MOST_MARKS:
+            drawn += [svg.circle(panel.at(*each), 2.6, "fill-1", f"{each[1]:+.0f} ppm") for each in found[strip]]
+        if curves[strip]:
+            drawn.append(steps(panel, curves[strip], "curve curve-2"))
+    entries = [Entry("bases, adjusted against formed", "fill-1", "dot")]
+    if any(curves.values()):
+        taken = document["adjustment"] == "polynomial"
+        entries.append(Entry("polynomial" if taken else "polynomial, not taken", "curve curve-2"))
+    if any(bands.values()):
+        entries.append(Entry("expected, one standard deviation", "band", "square"))
+    drawn += legend(entries)
+    caption = (
+        "How much longer each base became by the adjustment, against the mean of its strip: the drift of the scale."
+        f"{_of(shown, strips, 'those with the largest drift')}"
+    )
+    worst = max(sizes, key=lambda strip: sizes[strip])
+    words = f"{counted(len(strips), 'strip')}; the largest departure is {sizes[worst]:.0f} ppm in strip {worst}."
+    return svg.picture("scale", (WIDTH, layout.whole), svg.Texts("Drift of the scale", caption, words), drawn)
+
+
+def _band(document: Document, strip: str, values: Sequence[Pair]) -> list[Pair]:
+    """Return the standard deviation of the scale that was handed on, against its mean, at each base, ppm."""
+    rows = [row for row in document["junctions"] if row["strip"] == strip]
+    if len(rows) + 1 != len(values) or any(not row["spread_ppm"] or not row["points_used"] for row in rows):
+        return []
+    squares = [row["spread_ppm"] ** 2 / row["points_used"] for row in rows]
+    count = len(values)
+    # a sum of independent steps less its mean: step k counts with its share of the bases before it, or after it
+    shares = [(k + 1) / count for k in range(len(squares))]
+    before = [0.0, *accumulate(s * share**2 for s, share in zip(squares, shares, strict=True))]
+    after = [
+        0.0,
+        *accumulate(s * (1 - share) ** 2 for s, share in zip(reversed(squares), reversed(shares), strict=True)),
+    ]
+    after.reverse()
+    return [(at, math.sqrt(before[n] + after[n])) for n, (at, _) in enumerate(values)]
+
+
+def _polynomial(document: Document, plan: Plan, strip: str, values: Sequence[Pair]) -> list[Pair]:
+    """Return the change of scale by the polynomial at each base, ppm from its mean."""
+    block = next((each for each in document.get("polynomials", []) if each["strip"] == strip), None)
+    if block is None or not block["terms"]["x"]:
+        return []
+    number = [each["id"] for each in document["strips"]].index(strip)
+    course, spots = course_of(plan.strips[number]), {spot.id: spot for spot in plan.spots}
+    given = [spots[row["id"]] for row in document["misclosures"] if row["strip"] == strip and row["id"] in spots]
+    if not given:
+        return []
+    start, step = origin_of(block, [course.along((spot.along, spot.across)) for spot in given]), 1.0
+    slopes = [
+        (polynomial_at(block, "x", 1000 * at + start + step) - polynomial_at(block, "x", 1000 * at + start - step))
+        / (2 * step)
+        for at, _ in values
+    ]
+    mean = math.fsum(slopes) / len(slopes)
+    return [(at, (slope - mean) * PPM) for (at, _), slope in zip(values, slopes, strict=True)]
