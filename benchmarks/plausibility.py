@@ -941,6 +941,8 @@ MISTAKES = (
     Mistake("one of two lists in feet", list_in_feet, ("P403",)),
     Mistake("one of two lists in another frame", list_in_another_frame, ("P407",)),
     Mistake("heights of two kinds in two lists", heights_of_another_kind, ("P404",)),
+    Mistake("one of two lists in another frame, bundle", list_in_another_frame, ("P407",), block, "bundle"),
+    Mistake("heights of two kinds in two lists, bundle", heights_of_another_kind, ("P404",), block, "bundle"),
     Mistake("heights of two kinds in one list", height_points_of_another_kind, ("P404",)),
     Mistake("heights counted downwards", heights_down, ("P401",)),
     Mistake("heights in feet, plan in metres", heights_in_feet, ("P405",)),

@@ -139,7 +139,8 @@ def _control(
             xyz[inside], axes[inside], sigma[inside] = given_positions(
                 control.enu[chosen], control.use[chosen], control.sigma[chosen], frame, start.points[point[chosen]], ids
             )
-    return ControlObservations(point=point[rows], xyz=xyz - origin, axes=axes, sigma=sigma), rows
+    given = ControlObservations(point=point[rows], xyz=xyz - origin, axes=axes, sigma=sigma, frame=control.frame[rows])
+    return given, rows
 
 
 def _positions(

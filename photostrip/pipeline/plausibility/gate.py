@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.independent_models.formation import FormedModels
 
 STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give
+OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
 
 
@@ -93,7 +94,10 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     if result.bundle is not None:
         from photostrip.pipeline.plausibility import shared_errors  # a strip needs nothing of a bundle
 
-        findings += shared_errors.of_bundle(result.bundle, inputs)
+        of_groups = list(shared_errors.of_bundle(result.bundle, inputs))
+        if any(each.code in OF_LISTS for each in of_groups):  # all of the block says it best
+            findings = [each for each in findings if each.code not in OF_LISTS]
+        findings += of_groups
     findings += shared_control.find_shared_errors(stages, findings, joined=result.bundle is not None)
     return accepted(findings, settings.accept)
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Strip
     from photostrip.pipeline.results import StripResult
+    from photostrip.points import ControlPoints
     from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
     from photostrip.triangulation.plausibility.finding import Evidence
 
@@ -42,22 +43,25 @@ def find_shared_errors(
         if shared is None or strip is None or strip.id in misread:
             continue
         if isinstance(shared, ShiftedList):
-            yield _shifted(strip, shared, each, then)
+            yield shifted_list(shared, each.control, f"strip {strip.id}", (strip.id,), then)
         elif strip.id not in named:
             yield _stretched(strip, shared, then)
 
 
-def _shifted(strip: Strip, shared: ShiftedList, result: StripResult, then: str) -> Finding:
+def shifted_list(shared: ShiftedList, control: ControlPoints, whose: str, strips: Sequence[str], then: str) -> Finding:
+    """Name a control list that lies beside the other control, or beside all else that is given (P404, P407).
+
+    control: control that counts, of all lists.
+    """
     plan = bool((np.abs(shared.shift) > SHOWN_SIGMAS * shared.sigma)[:2].any())
     steps = [
         f"{step:+.2f} m {axis} (standard deviation {sigma:.2g} m)"
         for step, sigma, axis in zip(shared.shift, shared.sigma, GROUND_AXES, strict=True)
         if np.isfinite(step)
     ]
-    control = result.control
     points = tuple(name for name, number in zip(control.ids, control.frame, strict=True) if number == shared.number)
     key = f"control[{shared.number}]"
-    message = f"{key} lies beside the other control of strip {strip.id}, all of it by {', '.join(steps)}{then}"
+    message = f"{key} lies beside the other control of {whose}, all of it by {', '.join(steps)}{then}"
     fix = (
         "is its crs the right one: zone, datum, false easting?"
         if plan
@@ -69,7 +73,7 @@ def _shifted(strip: Strip, shared: ShiftedList, result: StripResult, then: str) 
         if np.isfinite(step)
     }
     code = "P407" if plan else "P404"
-    return found(code, message, fix, evidence, points=points, strips=(strip.id,), key=key)
+    return found(code, message, fix, evidence, points=points, strips=strips, key=key)
 
 
 def _stretched(strip: Strip, stretch: StretchedHeights, then: str) -> Finding:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
-from photostrip.triangulation.bundle.common_errors import ALL, DISTANCE, DRIFT
+from photostrip.pipeline.plausibility.shared_control import shifted_list
+from photostrip.triangulation.bundle.common_errors import ALL, DISTANCE, DRIFT, LIST, OFFSET, SHOWN_SIGMAS
 from photostrip.triangulation.bundle.observations.given_orientations import drift_columns
 from photostrip.triangulation.bundle.quality.reliability import CONTROL
 from photostrip.triangulation.plausibility import found
+from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,18 +25,26 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.quality.self_calibration import Parameter
     from photostrip.triangulation.plausibility.finding import Evidence
 
-SHOWN_SIGMAS = 4.0  # standard deviations from which a group, or a camera, is named
 KEY = "camera_positions.correction"
 
 
 def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
-    """Name what a group of observations shares (P105, P107, P208)."""
+    """Name what a group of observations shares (P105, P107, P208, P404, P407)."""
     shared = bundle.screened.common
+    yield from (_list(each, inputs) for each in shared if each.kind == LIST)
     if any(each.kind == DISTANCE for each in shared):
         yield from (_distance(each, inputs) for each in bundle.parameters if _is_distance(each))
-    of_positions = [each for each in shared if each.kind != DISTANCE]
+    of_positions = [each for each in shared if each.kind in {OFFSET, DRIFT}]
     if of_positions:
         yield from _positions(bundle, inputs, of_positions[-1])
+
+
+def _list(error: CommonError, inputs: Inputs) -> Finding:
+    shift = ShiftedList(error.number, np.array(error.shift), np.array(error.sigma), gain=float("nan"))
+    control = inputs.control.take(~inputs.control.check)
+    strips = [each.id for each in inputs.strips]
+    then = "; whether it or the others are wrong cannot be told" if error.rival == LIST else ""
+    return shifted_list(shift, control, "the block", strips, then)
 
 
 def _is_distance(each: Parameter) -> bool:
@@ -86,7 +96,7 @@ def _finding(
         evidence |= {f"drift_{axis}_m": float(each) for axis, each in zip(axes, drift, strict=True)}
         correction = "drift"
     message += f"; the adjustment continued as with `correction: {correction}`"
-    if error.rival:
+    if error.rival == DISTANCE:
         message += ". A wrong principal distance would explain it nearly as well"
     given = int(np.isfinite(bundle.block.problem.control.sigma).sum())
     rejected = sum(each.kind == CONTROL and not each.readmitted for each in bundle.screened.rejections)

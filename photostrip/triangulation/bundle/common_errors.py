@@ -12,7 +12,7 @@ Source: derived, see docs/sources.md.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,34 +20,49 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.observations.problem import CALIBRATION
-from photostrip.triangulation.bundle.selection import Selection, selected
+from photostrip.triangulation.bundle.quality.joint_points import sum_cofactors
+from photostrip.triangulation.bundle.selection import Selection, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from photostrip.arrays import Floats
     from photostrip.rejection import Rejection
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.quality.reliability import Limit
     from photostrip.triangulation.bundle.solution import BundleSolution
 
-OFFSET, DRIFT, DISTANCE = "offset", "drift", "principal distance"
+OFFSET, DRIFT, DISTANCE, LIST = "offset", "drift", "principal distance", "control list"
 ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group, or every camera, have one of their own
+LEAST_SHARE = 1e-6  # of the weight of a list that other observations leave to its shift
+SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
+UP = 2
 
 
 @dataclass(frozen=True)
 class CommonError:
     """What a group of observations shares beside the truth."""
 
-    kind: str  # ``OFFSET`` or ``DRIFT`` (which has an offset too) of camera positions, or ``DISTANCE`` of cameras
+    # ``OFFSET`` or ``DRIFT`` (which has an offset too) of camera positions, ``DISTANCE`` of cameras, or ``LIST``
+    kind: str
     of: str  # ``ALL`` or ``EACH``
     rival: str = ""  # kind of another error that explains nearly as much
+    number: int = -1  # of a control list
+    # shift, sigma: how it lies beside everything else, along its axes, metres; NaN where it gives nothing
+    shift: tuple[float, ...] = ()
+    sigma: tuple[float, ...] = ()
 
 
 def taken_up(problem: BundleProblem, error: CommonError) -> BundleProblem:
-    """Give a problem the unknowns of a common error."""
+    """Give a problem the unknowns of a common error; a control list that is shifted is left out as far as it is off."""
     positions, cameras = problem.positions, problem.cameras
+    if error.kind == LIST:
+        off = np.abs(error.shift) > SHOWN_SIGMAS * np.array(error.sigma)
+        outside = (problem.control.frame == error.number)[:, None] & (off[:UP].any() | (np.arange(3) == UP))
+        control = replace(problem.control, sigma=np.where(outside, np.inf, problem.control.sigma))
+        return replace(problem, control=control)
     if error.kind == DISTANCE:
         sigma = np.zeros((len(cameras.focal), len(CALIBRATION))) if cameras.sigma is None else cameras.sigma.copy()
         sigma[:, CALIBRATION.index("c")] = np.inf
@@ -78,7 +93,7 @@ def find_common_error(
 
     Of several, one with more unknowns, or of another kind, must explain more than chance adds to it.
     """
-    trials = list(_trials(problem, selection))
+    trials = [*_trials(problem, selection), *_trials_of_lists(problem, selection, solution)]
     if not trials:
         return None
     least = min(each.sigma0 for each in trials)
@@ -90,7 +105,11 @@ def find_common_error(
     found, most, unknowns = None, 0.0, 0
     for each in trials:
         fall, error = solution.chi_square - each.chi_square, each.error
-        if found is not None and error.kind == DISTANCE and abs(fall - most) < by_chance(abs(each.unknowns - unknowns)):
+        if (
+            found is not None
+            and error.kind in {DISTANCE, LIST}
+            and abs(fall - most) < by_chance(abs(each.unknowns - unknowns))
+        ):
             found = replace(found, rival=error.kind)
         elif fall > most + by_chance(each.unknowns - unknowns):
             found, most, unknowns = error, fall, each.unknowns
@@ -112,6 +131,69 @@ def _trials(problem: BundleProblem, selection: Selection) -> Iterator[_Trial]:
         if after is not None:
             unknowns = len(tried.common_names()) - known
             yield _Trial(error=error, unknowns=unknowns, chi_square=after.chi_square, sigma0=after.sigma0)
+
+
+def _trials_of_lists(problem: BundleProblem, selection: Selection, solution: BundleSolution) -> Iterator[_Trial]:
+    """Shift control lists, the shortest first, each as a whole; what is left without the list must hold the block."""
+    control = solution.prepared.problem.control
+    lists, sizes = np.unique(control.frame[np.isfinite(control.sigma).any(axis=1)], return_counts=True)
+    for number in lists[np.argsort(sizes, kind="stable")].tolist() if len(lists) > 1 else ():
+        first = _shift_of(number, solution)
+        after = None if first is None else _solved(_moved(problem, number, first.value), selection)
+        further = None if after is None else _shift_of(number, after)  # far from the truth the first is bent
+        if first is None or after is None or further is None:
+            continue
+        error = CommonError(
+            LIST, EACH, number=number, shift=tuple(first.value + further.value), sigma=tuple(further.sigma)
+        )
+        without = taken_up(problem, error)
+        if _solved(without, supported(without, selection)) is not None:
+            chi_square = max(after.chi_square - further.gain, 0.0)
+            unknowns = int(np.isfinite(further.value).sum())
+            redundancy = max(after.redundancy - unknowns, 1)
+            sigma0 = float((chi_square / redundancy) ** 0.5)
+            yield _Trial(error=error, unknowns=unknowns, chi_square=chi_square, sigma0=sigma0)
+
+
+class _Shift(NamedTuple):
+    """How a control list lies beside everything else, linearised at a solution."""
+
+    # value, sigma: (3,): along the axes, metres; NaN where nothing is given
+    value: Floats
+    sigma: Floats
+    gain: float  # what the sum of squares loses by it
+
+
+def _shift_of(number: int, solution: BundleSolution) -> _Shift | None:
+    """Estimate the shift of a list, with C the axes of its coordinates: N^-1 C' W v, N = C' W Qvv W C.
+
+    None where nothing else is given that it could lie beside.
+    """
+    control = solution.prepared.problem.control
+    used = np.isfinite(control.sigma)
+    rows = np.flatnonzero((control.frame == number) & used.any(axis=1))
+    axes = np.flatnonzero(used[rows].any(axis=0))
+    weight = control.sigma[rows] ** -2.0
+    point, at = np.unique(control.point[rows], return_inverse=True)
+    factors = np.zeros((len(point), 3, 3))
+    np.add.at(factors, at, (weight[:, :, None] * control.axes[rows]).swapaxes(1, 2))
+    pull = (weight * solution.control_residuals[rows]).sum(axis=0)[axes]
+    total = weight.sum(axis=0)
+    normal = (np.diag(total) - sum_cofactors(solution, point, factors))[np.ix_(axes, axes)]
+    if np.linalg.eigvalsh(normal)[0] < LEAST_SHARE * total.max():
+        return None
+    inverse = np.linalg.inv(normal)
+    value, sigma = np.full((2, 3), np.nan)
+    sigma0 = max(1.0, solution.sigma0)
+    value[axes], sigma[axes] = -inverse @ pull, np.sqrt(np.diag(inverse)) * sigma0
+    return _Shift(value, sigma, float(pull @ inverse @ pull))
+
+
+def _moved(problem: BundleProblem, number: int, shift: Floats) -> BundleProblem:
+    """Move a control list back."""
+    control, step = problem.control, np.nan_to_num(shift)
+    back = np.where((control.frame == number)[:, None], np.einsum("nai,a->ni", control.axes, step), 0.0)
+    return replace(problem, control=replace(control, xyz=control.xyz - back))
 
 
 def _solved(problem: BundleProblem, selection: Selection) -> BundleSolution | None:

@@ -61,13 +61,14 @@ def supported(problem: BundleProblem, selection: Selection) -> Selection:
     """
     point = problem.images.point
     rays = np.bincount(point[selection.images], minlength=problem.points)
+    control = selection.control & np.isfinite(problem.control.sigma)
     fixed = np.zeros(problem.points, bool)
-    fixed[problem.control.point[selection.control.all(axis=1)]] = True
+    fixed[problem.control.point[control.all(axis=1)]] = True
     images = selection.images & ((rays >= LEAST_RAYS) | fixed)[point]
     images &= np.isfinite(problem.start.points[point]).all(axis=1)
     shown = np.zeros(problem.points, bool)
     shown[point[images]] = True
-    return replace(selection, images=images, control=selection.control & shown[problem.control.point][:, None])
+    return replace(selection, images=images, control=control & shown[problem.control.point][:, None])
 
 
 def selected(problem: BundleProblem, selection: Selection) -> BundleProblem:

@@ -10,8 +10,10 @@ import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
+from photostrip.pipeline.inputs import CameraPositions
 from photostrip.simulation import Control, Flight, GrossError, Spec
 from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Gnss
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,14 +45,39 @@ def test_a_list_that_lies_beside_the_others_is_named(shift: tuple[float, float, 
     assert result.strips[0].wrong_control == ()
 
 
-def test_a_bundle_names_the_list_and_rejects_its_points() -> None:
-    """The strips know it as they are formed; the bundle tests point by point, and does not say that it did not."""
-    result = two_lists((2.0, 1.0, 0.0), adjustment="bundle")
+@pytest.mark.parametrize(("shift", "code", "axes"), [((2.0, 1.0, 0.0), "P407", 3), ((0.0, 0.0, 2.0), "P404", 1)])
+def test_a_bundle_leaves_the_list_out_as_a_whole(shift: tuple[float, float, float], code: str, axes: int) -> None:
+    """Good control of the other list went with it, one point after the other."""
+    result = two_lists(shift, adjustment="bundle")
+    (finding,) = result.findings
+    assert (finding.code, finding.key) == (code, "control[1]")
+    assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.3)
+    assert finding.message.endswith("cannot be told")  # of two lists
+    assert result.bundle is not None
+    screened = result.bundle.screened
+    assert screened.rejections == ()
+    given = np.isfinite(screened.problem.control.sigma).sum(axis=1)
+    assert set(given[screened.problem.control.frame == 1].tolist()) == {3 - axes}
+    assert set(given[screened.problem.control.frame == 0].tolist()) == {3}
+
+
+def test_camera_positions_say_which_list_is_wrong() -> None:
+    """The longer one: the shorter went before."""
+    simulation = simulate(Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4), gnss=Gnss()))
+    inputs = inputs_of(simulation)
+    control = inputs.control
+    wrong = np.arange(len(control)) % 3 > 0
+    control = replace(control, frame=wrong.astype(np.intp), enu=control.enu + np.outer(wrong, (2.0, 1.0, 0.0)))
+    photos, enu = simulation.truth.photo_ids, simulation.gnss
+    assert enu is not None
+    positions = CameraPositions(
+        photos, inputs.frames[0], enu, np.ones(enu.shape, bool), np.full(enu.shape, 0.15), np.full(len(enu), np.nan)
+    )
+    inputs = replace(inputs, control=control, frames=(inputs.frames[0],) * 2, positions=positions)
+    result = triangulate(inputs, replace(settings_of(simulation), adjustment="bundle"))
     (finding,) = result.findings
     assert (finding.code, finding.key) == ("P407", "control[1]")
-    assert "tested by itself" not in finding.message
-    assert result.bundle is not None
-    assert {each.kind for each in result.bundle.screened.rejections if not each.readmitted} == {"control"}
+    assert not finding.message.endswith("cannot be told")
 
 
 @pytest.mark.slow

@@ -19,6 +19,7 @@ from photostrip.triangulation.bundle.observations.problem import (
     PositionObservations,
 )
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
+from photostrip.triangulation.bundle.quality.joint_points import joint_cofactors, sum_cofactors
 from photostrip.triangulation.bundle.solve import solve
 from tests.bundles import dense
 from tests.simulated_bundle import problem_of, truth_of
@@ -165,3 +166,13 @@ def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
         )
     ]
     assert sum(every) + parts.sum() == pytest.approx(solution.redundancy, abs=1e-5)
+
+
+@pytest.mark.parametrize("problem", [strip(), with_everything()])
+def test_sums_of_coordinates_have_the_cofactors_of_the_joint_ones(problem: BundleProblem) -> None:
+    solution = solve(problem)
+    wanted = np.unique(problem.images.point)[::3]
+    factors = np.random.default_rng(2).standard_normal((len(wanted), 3, 2))
+    flat = factors.reshape(-1, 2)
+    expected = flat.T @ joint_cofactors(solution, wanted) @ flat
+    assert sum_cofactors(solution, wanted, factors) == pytest.approx(expected, rel=1e-9)

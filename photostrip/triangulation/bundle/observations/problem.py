@@ -70,6 +70,7 @@ class ControlObservations:
     axes: Floats = field(default_factory=lambda: _no_rows(3, 3))
     # (c, 3): standard deviations along the three axes, metres; infinite: not given
     sigma: Floats = field(default_factory=lambda: _no_rows(3))
+    frame: Numbers = field(default_factory=_no_numbers)  # (c,): list that gives each row; without: all in one
 
     def __len__(self) -> int:
         return len(self.point)

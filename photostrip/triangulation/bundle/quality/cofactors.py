@@ -97,13 +97,13 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
     )
 
 
-class _Factored(NamedTuple):
+class Factored(NamedTuple):
     state: Parameters
     reduced: Reduced
     band: Factor
 
 
-def at_solution(solution: BundleSolution) -> _Factored:
+def at_solution(solution: BundleSolution) -> Factored:
     """Factor the reduced normal equations at the solution."""
     prepared = solution.prepared
     state = parameters_from(prepared, solution.centers, solution.rotations, solution.points, solution.common)
@@ -112,7 +112,7 @@ def at_solution(solution: BundleSolution) -> _Factored:
     band = factored(prepared, reduced, datum.anchor(prepared, state, blocks) if solution.free else None)
     if band is None:
         raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
-    return _Factored(state, reduced, band)
+    return Factored(state, reduced, band)
 
 
 @dataclass(frozen=True, eq=False)

@@ -175,7 +175,7 @@ class _Search:
         done = self.adjust(selection)
         while (worst := self._worst(done)) or reliability.sigma0_test(done.solution).too_large:
             if (not worst or worst[0].kind != IMAGE) and self._take_up_common(done, *worst[:1]):
-                done = self.adjust(done.selection)
+                done = self.adjust(supported(self.problem, done.selection))
                 continue
             if not worst:
                 break
@@ -312,7 +312,7 @@ class _Search:
         by_photos = np.zeros((r, 2, r, PHOTO))
         by_photos[np.arange(r), :, np.arange(r)] = by_photo / sigma[:, :, None]
         at = np.flatnonzero(control.point == images.point[rows[0]])
-        given, axis = np.nonzero(self.control[at])
+        given, axis = np.nonzero(self.control[at] & np.isfinite(control.sigma[at]))
         spread, axes = control.sigma[at[given], axis], control.axes[at[given], axis]
         inside = done.selection.images[rows]
         rays = PointRays(
