@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline import triangulate
 from photostrip.pipeline.precision.photo_precision import propagation
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
@@ -128,26 +128,28 @@ class Placed:
         return self.points - other.points, np.column_stack([self.centers - other.centers, vector])
 
 
-def differenced(inputs: Inputs, settings: Settings, image: tuple[int, int], step: float) -> tuple[Floats, Floats]:
+def differenced(result: Result, image: tuple[int, int], step: float) -> tuple[Floats, Floats]:
     """Central difference of the whole run by one image coordinate, per mm."""
-    frame = triangulate(inputs, settings).strips[0].intermediate
-    placed = []
+    inputs, placed = result.inputs, []
     for sign in (1, -1):
         xy = inputs.observations.xy.copy()
         xy[image] += sign * step
-        moved = replace(inputs, observations=replace(inputs.observations, xy=xy))
-        placed.append(Placed.of(triangulate(moved, settings), frame))
+        placed.append(_again(result, replace(inputs, observations=replace(inputs.observations, xy=xy))))
     points, photos = placed[0].minus(placed[1])
     return points / (2 * step), photos / (2 * step)
 
 
-def differenced_by_control(inputs: Inputs, settings: Settings, row: int, axis: int, step: float) -> Floats:
+def differenced_by_control(result: Result, row: int, axis: int, step: float) -> Floats:
     """Central difference of the points of the whole run by one given coordinate."""
-    frame = triangulate(inputs, settings).strips[0].intermediate
-    placed = []
+    inputs, placed = result.inputs, []
     for sign in (1, -1):
         enu = inputs.control.enu.copy()
         enu[row, axis] += sign * step
-        moved = replace(inputs, control=replace(inputs.control, enu=enu))
-        placed.append(Placed.of(triangulate(moved, settings), frame))
+        placed.append(_again(result, replace(inputs, control=replace(inputs.control, enu=enu))))
     return placed[0].minus(placed[1])[0] / (2 * step)
+
+
+def _again(result: Result, inputs: Inputs) -> Placed:
+    """Run with other inputs, without what it says of its precision, in the frame of a run."""
+    settings = replace(result.settings, precision=False)
+    return Placed.of(triangulate(inputs, settings), result.strips[0].intermediate)

@@ -376,6 +376,7 @@ def test_photos_that_see_no_control_are_carried_by_the_strip() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
 def test_points_beyond_the_control_are_warned_of() -> None:
     """Control in the first three fifths only: a cubic runs away where it is not held, and the report says so."""
     squares: dict[str, list[float]] = {"similarity": [], "3": [], "inside": []}

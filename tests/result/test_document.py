@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
@@ -147,11 +148,12 @@ def geocentric(document: Document, places: Floats) -> Floats:
     crs = document["frame"]["crs"]
     if crs == "local":
         return places
-    source = GEOCENTRIC if crs == "geocentric" else CRS.from_user_input(crs)
-    if not source.is_geocentric:
-        source = source.to_3d()
-    transformer = Transformer.from_crs(source, GEOCENTRIC, always_xy=True)
-    return np.column_stack(transformer.transform(*places.T))
+    return places if crs == "geocentric" else np.column_stack(to_geocentric(crs).transform(*places.T))
+
+
+@cache
+def to_geocentric(crs: str) -> Transformer:
+    return Transformer.from_crs(CRS.from_user_input(crs).to_3d(), GEOCENTRIC, always_xy=True)
 
 
 def axes_at(document: Document, place: Floats) -> Floats:
@@ -159,7 +161,7 @@ def axes_at(document: Document, place: Floats) -> Floats:
     crs = document["frame"]["crs"]
     if crs in {"local", "geocentric"}:
         return np.eye(3)
-    way = Transformer.from_crs(CRS.from_user_input(crs).to_3d(), GEOCENTRIC, always_xy=True)
+    way = to_geocentric(crs)
     middle = np.array(way.transform(place[0], place[1], place[2], direction="INVERSE"))
     step = 100.0 if CRS.from_user_input(crs).is_projected else 1e-3
     east, north = (
@@ -182,9 +184,9 @@ def worst_reprojection(found: Case) -> float:
     for group in nonempty(document["residuals"]):
         photo = photos[group["photo"]]
         center = geocentric(document, in_order(document, xyz(photo))[None])[0]
-        rotation = np.array(photo["rotation"]).reshape(3, 3)
+        rotation = np.array(photo["rotation"]).reshape(3, 3).T @ axes_at(document, center)
         for point, vx, vy in zip(group["points"], group["vx_um"], group["vy_um"], strict=True):
-            x, y, z = rotation.T @ axes_at(document, center) @ (place[point] - center)
+            x, y, z = rotation @ (place[point] - center)
             assert z < 0, "the camera looks along -z"
             projected = -focal * np.array([x, y]) / z
             residual = (measured[group["photo"], point] - projected) * 1000

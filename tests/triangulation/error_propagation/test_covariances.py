@@ -64,7 +64,7 @@ def test_derivatives_are_those_of_the_whole_run(
     rng = np.random.default_rng(2)
     for image in nonempty(rng.choice(len(images.row), 4, replace=False).tolist()):
         axis = int(rng.integers(2))
-        by_points, by_photos = differenced(inputs, wanted, (int(images.row[image]), axis), 2e-4)
+        by_points, by_photos = differenced(result, (int(images.row[image]), axis), 2e-4)
         column, sigma = 2 * image + axis, images.sigma[image, axis]
         assert points[:, :, column] / sigma == pytest.approx(by_points, abs=CLOSE * np.abs(by_points).max())
         for part in (slice(0, 3), slice(3, 6)):
@@ -83,7 +83,7 @@ def test_the_fit_passes_on_errors_of_the_control(adjustment: str, use: dict[str,
     names = [inputs.control.ids.index(name) for name in result.strips[0].control.ids]
     for column in nonempty(range(0, len(found.control.point), 5)):
         row, axis = names[found.control.point[column]], int(found.control.axis[column])
-        expected = differenced_by_control(inputs, wanted, row, axis, 0.01)
+        expected = differenced_by_control(result, row, axis, 0.01)
         # a map's coordinates are those of the ground to within its scale; a level axis turns by the Earth's curvature
         assert by_control[:, :, column] == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
 
@@ -162,7 +162,7 @@ def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
     by_image = written_out(found.errors.points, found.errors) - found.influence @ found.fit.operator @ misclosures
     for row in (rows[0], rows[2], int(np.flatnonzero(observations.photo == 3)[2])):
-        by_points, _ = differenced(inputs, plain, (int(row), 1), 2e-4)
+        by_points, _ = differenced(result, (int(row), 1), 2e-4)
         image = int(np.flatnonzero(found.errors.images.row == row)[0])
         derivative = by_image[place, :, 2 * image + 1] / found.errors.images.sigma[image, 1]
         assert derivative == pytest.approx(by_points[place], abs=CLOSE * np.abs(by_points).max())
