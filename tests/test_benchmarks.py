@@ -39,11 +39,11 @@ def test_accuracy_prints_limits_and_what_was_measured() -> None:
 
 @pytest.mark.slow
 def test_strip_prints_seconds_memory_parts_and_growth() -> None:
-    out = printed("strip.py", "--rows", "short", "check", "--photos", "15", "--sizes", "7", "14", "--repeat", "1")
+    out = printed("strip.py", "--rows", "short", "check", "--photos", "8", "--sizes", "4", "8", "--repeat", "1")
     assert re.search(r"^20 photos +\d+\.\d\d +\d+\.\d +1\.8 +\d+", out, re.MULTILINE)
     assert re.search(r"^check of 1000 photos +\d+\.\d\d +\d+\.\d +2 +\d+", out, re.MULTILINE)
     assert re.search(r"\d+ pairs of 24 points in one batch +\d+ us", out)
-    assert re.search(r"^exponent of triangulate from 7 to 14 photos +-?\d", out, re.MULTILINE)
+    assert re.search(r"^exponent of triangulate from 4 to 8 photos +-?\d", out, re.MULTILINE)
     shares = [float(value) for value in re.findall(r"^\w[\w ,.]+ +\d\.\d{4} +(\d+\.\d)%", out, re.MULTILINE)]
     assert shares[-1] == 100.0
     assert sum(shares[:-1]) == pytest.approx(100.0, abs=0.5)
@@ -80,7 +80,7 @@ def test_bundle_prints_times_ratios_and_growth() -> None:
 
 @pytest.mark.slow
 def test_batch_prints_overhead_and_speed_up() -> None:
-    out = printed("batch.py", "--strips", "4", "--rounds", "1", "--photos", "8")
+    out = printed("batch.py", "--strips", "2", "--rounds", "1", "--photos", "8")
     for words in (
         "batch -j 1, all processes, to the bare computation",
         "batch -j 2 to batch -j 1, speed-up on the clock",
@@ -91,10 +91,10 @@ def test_batch_prints_overhead_and_speed_up() -> None:
 
 @pytest.mark.slow
 def test_planning_prints_predicted_and_actual_deviations() -> None:
-    options = ("--repeat", "60", "--models", "4", "--layouts", "3 bands", "--methods", "similarity", "bundle")
+    options = ("--repeat", "40", "--models", "3", "--layouts", "3 bands", "--methods", "similarity", "bundle")
     out = printed("planning.py", "--part", "model", "strip", "reliability", *options)
     assert len(found := re.findall(r"^3 bands +(?:along|across|up) +\d\.\d{3} +(\d+\.\d) %$", out, re.MULTILINE)) == 3
-    assert all(60 < float(share) < 97 for share in nonempty(found))
+    assert all(55 < float(share) < 98 for share in nonempty(found))
     rows = re.findall(r"^(\S+(?: \S+)?) +(new|control|similarity|bundle)((?: +\d+\.\d{3}){6})   \d", out, re.MULTILINE)
     assert [row[:2] for row in rows][-2:] == [("3 bands", "similarity"), ("3 bands", "bundle")]
     ratios = [float(value) for row in rows for value in (row[2].split()[2], row[2].split()[5])]
@@ -204,13 +204,13 @@ def test_ablation_prints_a_line_for_every_change() -> None:
 
 @pytest.mark.slow
 def test_gate_constants_prints_what_each_change_does() -> None:
-    kinds = ("--of", "principal distance off by 10", "corners")
-    out = printed("gate_constants.py", "1", "--workers", "1", "--only", "units.REACH ", *kinds)
+    kinds = ("--of", "photo in another unit", "corners")
+    out = printed("gate_constants.py", "1", "--workers", "1", "--only", "units.REACH 1.2", *kinds)
     assert out.startswith("1 mistakes, 1 found by run; 1 sound projects\n")
     lines = re.findall(r"^units\.REACH (\S+) -> (\S+) +(.*)$", out, re.MULTILINE)
     assert [line[:2] for line in lines] == [("1.2", "0.6")]  # points of sound photos reach farther
     assert lines[0][2].startswith("- sound: corners, centre, random (run); - sound: corners, centre, random (check)")
-    assert "no difference: units.REACH 0.12 -> 0.24; units.REACH 0.12 -> 0.06; units.REACH 1.2 -> 2.4" in out
+    assert "no difference: units.REACH 1.2 -> 2.4" in out
 
 
 @pytest.mark.slow

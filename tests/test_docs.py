@@ -15,7 +15,7 @@ from tests.source_tree import ROOT, modules
 if TYPE_CHECKING:
     from pathlib import Path
 
-WITHOUT_FORKS = {"README.md", "run.md", "shell.md"}  # what a user types first, as whole processes
+WITHOUT_FORKS = {"README.md"}  # what a user types first, as whole processes
 PAGES = [pytest.param(page, id=page.relative_to(ROOT).as_posix()) for page in pages()]
 LINK = re.compile(r"\]\((?!https?:|mailto:|#)([^)#\s]+)")
 

@@ -53,8 +53,13 @@ def test_the_wheel_holds_the_package_and_nothing_else(tmp_path: Path) -> None:
     assert all(">=" in line for line in nonempty(core))
 
 
-def test_the_source_archive_holds_what_builds_the_wheel(tmp_path: Path) -> None:
-    with tarfile.open(build("sdist", tmp_path)) as archive:
+@pytest.fixture(scope="module")
+def source_archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build("sdist", tmp_path_factory.mktemp("sdist"))
+
+
+def test_the_source_archive_holds_what_builds_the_wheel(source_archive: Path) -> None:
+    with tarfile.open(source_archive) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
     assert {"pyproject.toml", "README.md", "LICENSE", "photostrip/__init__.py"} <= names
     assert {name.partition("/")[0] for name in names} <= {
@@ -68,9 +73,9 @@ def test_the_source_archive_holds_what_builds_the_wheel(tmp_path: Path) -> None:
     }
 
 
-def test_what_is_installed_from_the_source_archive_runs_alone(tmp_path: Path) -> None:
+def test_what_is_installed_from_the_source_archive_runs_alone(tmp_path: Path, source_archive: Path) -> None:
     """The wheel of the source archive, beside the libraries of this environment and away from the clone."""
-    with tarfile.open(build("sdist", tmp_path / "sdist")) as archive:
+    with tarfile.open(source_archive) as archive:
         archive.extractall(tmp_path, filter="data")
     (source,) = tmp_path.glob("photostrip-*")
     subprocess.run(

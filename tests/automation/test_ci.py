@@ -97,6 +97,7 @@ def test_the_script_goes_on_after_a_failure_and_ends_with_the_worst_code(tmp_pat
     assert "a/observations.csv does not exist" in done.stderr
     assert {path.parent.name for path in tmp_path.glob("build/*/result.json")} == {"b", "c"}
     shutil.rmtree(tmp_path / "a")
+    shutil.rmtree(tmp_path / "c")
     assert run_script(tmp_path, f"{sys.executable} -m photostrip").returncode == 1
 
 
