@@ -18,11 +18,12 @@ from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Strip
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
+from photostrip.triangulation.gross_errors.control.control_rejections import WRONG_IMAGE
 from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay, StripAtControl
 from photostrip.triangulation.plausibility.control.shared_by_control import find_shared
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.results import StripResult, StripShape
     from photostrip.points import ControlPoints
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
@@ -71,6 +73,9 @@ class StripStage(Protocol[Errors]):
 
     def control_rays(self, oriented: OrientedStrip[Errors]) -> Sequence[ControlRay]:
         """Rays of the control points that stand on two photos."""
+
+    def without_images(self, wrong: Mapping[str, Rejection]) -> StripStage[Errors]:
+        """Leave out control points, by id, one of whose two images is wrong."""
 
     def screens_control(self, settings: Settings) -> bool:
         """Whether wrong control is looked for."""
@@ -169,7 +174,10 @@ def orient_on_control(
 
 
 def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) -> ScreenedStrip[Errors]:
-    """Take out control that the strip and all other control contradict, and lay the strip on what is left."""
+    """Take out control that the strip and all other control contradict, and lay the strip on what is left.
+
+    A point with a wrong image leaves the strip; what is left is tested again.
+    """
     stage, control = oriented.stage, oriented.control
     if not stage.screens_control(settings):
         return ScreenedStrip(oriented, control_screening.not_screened(control))
@@ -192,9 +200,14 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
     if shared is not None:  # single points prove nothing then
         return ScreenedStrip(oriented, control_screening.not_screened(control), shared)
     screened = control_screening.screen_control(place)
+    images = {control.ids[each.row]: each for each in screened.rejections if each.cause == WRONG_IMAGE}
+    kept = screened.kept
+    if images:
+        stage, kept = stage.without_images(images), control
     if screened.rejections:
-        oriented = to_ground(stage, screened.kept, oriented.control_rows, oriented.frames, oriented.settings)
-    return ScreenedStrip(oriented, screened)
+        inside = control_of(stage.formed, kept, stage.point_ids)
+        oriented = to_ground(stage, *inside, oriented.frames, oriented.settings)
+    return reject_wrong_control(oriented, settings) if images else ScreenedStrip(oriented, screened)
 
 
 def control_of(formed: StripShape, control: ControlPoints, point_ids: Sequence[str]) -> tuple[ControlPoints, Numbers]:

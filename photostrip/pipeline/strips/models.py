@@ -25,13 +25,14 @@ from photostrip.triangulation.independent_models.formation import FormedModels, 
 from photostrip.units import MILLIMETRES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.choice import Deformation
     from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
     from photostrip.triangulation.independent_models.linking import StripModels
@@ -86,6 +87,10 @@ class LinkedModels:
     def control_rays(self, _: Oriented) -> tuple[()]:
         """Models have no rays."""
         return ()
+
+    def without_images(self, _: Mapping[str, Rejection]) -> LinkedModels:
+        """Models have no images."""
+        return self
 
     def screens_control(self, settings: Settings) -> bool:
         return settings.links.screening != "none"

@@ -14,11 +14,12 @@ from photostrip.triangulation.relative_orientation.orientation import CONDITION_
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.inputs import ModelStrip, Strip
-    from photostrip.points import ControlPoints
+    from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
@@ -74,19 +75,26 @@ def wrong_control_notes(strip: Strip | ModelStrip, screened: ScreenedControl) ->
     ids = screened.kept.ids
     for each in screened.rejections:
         point = ids[each.row]
-        parts = ", ".join(f"{GROUND_AXES[axis]} by about {each.size[axis]:+.2f} m" for axis in each.axes)
-        text = (
-            f"control point {point} contradicts the strip and the other control: {parts} (test value "
-            f"{each.value:.1f}, limit {each.limit:.1f}); not used"
-        )
-        if each.cause == WRONG_IMAGE:
-            photo = strip.photos[each.other]
-            text += f"; its image in photo {photo} is wrong, not its coordinates: they agree along its other ray"
-            yield Note("control-image", text, strip=strip.id, photos=(photo,), points=(point,))
-            continue
+        text = f"control point {point} {_contradiction(each)}; not used"
         if each.cause == EXCHANGED:
             text += f"; it fits when exchanged with {ids[each.other]}"
         yield Note("control-rejected", text, strip=strip.id, points=(point,))
+
+
+def wrong_image_notes(strip: Strip, observations: PhotoPoints, wrong: Sequence[Rejection]) -> Iterator[Note]:
+    """Name control points that their own rays place wrongly."""
+    for each in wrong:
+        if each.cause != WRONG_IMAGE:
+            continue
+        point, photo = observations.point_ids[observations.point[each.row]], strip.photos[each.other]
+        text = f"control point {point} {_contradiction(each)}; not used"
+        text += f"; its image in photo {photo} is wrong, not its coordinates: they agree along its other ray"
+        yield Note("control-image", text, strip=strip.id, photos=(photo,), points=(point,))
+
+
+def _contradiction(each: Rejection) -> str:
+    parts = ", ".join(f"{GROUND_AXES[axis]} by about {each.size[axis]:+.2f} m" for axis in each.axes)
+    return f"contradicts the strip and the other control: {parts} (test value {each.value:.1f}, limit {each.limit:.1f})"
 
 
 def junction_notes(strip: Strip, formed: FormedStrip) -> Iterator[Note]:

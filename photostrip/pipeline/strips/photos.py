@@ -21,10 +21,10 @@ from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.resection.resection import Resection, resect, with_residuals
-from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs
+from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs, without_points
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geometry.similarity import Similarity
@@ -115,6 +115,19 @@ class FormedPhotos:
                     found.append(ControlRay(row, other, ray / np.linalg.norm(ray)))
         return found
 
+    def without_images(self, wrong: Mapping[str, Rejection]) -> FormedPhotos:
+        o, photo = self.observations, self.strip.positions(self.observations)
+        points, rays = [], []
+        for name, each in wrong.items():
+            points.append(o.point_ids.index(name))
+            (row,) = np.flatnonzero((o.point == points[-1]) & (photo == each.other))
+            rays.append(replace(each, row=int(row)))
+        return replace(
+            self,
+            formed=without_points(self.formed, self.orientation, np.array(points, np.intp)),
+            wrong_rays=(*self.wrong_rays, *rays),
+        )
+
     def screens_control(self, settings: Settings) -> bool:
         return settings.relative.screening != "none"
 
@@ -156,6 +169,7 @@ class FormedPhotos:
                 *overruling.notes(settings.relative, strip.id, strip.photos),
                 *notes.screening_notes(strip, self.screened, self.sigma),
                 *notes.wrong_control_notes(strip, screened.screened_control),
+                *notes.wrong_image_notes(strip, self.observations, self.wrong_rays),
                 *notes.pair_notes(strip, self.orientation),
                 *notes.junction_notes(strip, formed),
                 *notes.control_notes(strip, oriented.absolute),

@@ -64,7 +64,7 @@ def rejected_of(result: Result) -> list[Document]:
             found += _from_rays(strip, observations)
         else:
             found += _from_links(result, strip)
-        found += [_from_control(strip, wrong) for wrong in strip.wrong_control]
+        found += [_from_control(strip, wrong, strip.control.ids[wrong.row]) for wrong in strip.wrong_control]
     if result.bundle is None:
         return found
     written = kinds(result.settings.angle_unit)
@@ -170,6 +170,9 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
         photo = observations.photo_ids[observations.photo[each.row]]
         point = observations.point_ids[observations.point[each.row]]
         known = bool(np.isfinite(each.worst))
+        if each.cause == WRONG_IMAGE:
+            rows.append((natural(point), photo_of[photo], _from_control(strip, each, point, photo)))
+            continue
         entry = _entry(
             strip=strip.strip.id,
             photo=photo,
@@ -197,8 +200,7 @@ def rejected_by_strip(strip: StripResult) -> list[Rejection]:
     return [each for each in strip.of_photos.wrong_rays if each.row in left]
 
 
-def _from_control(strip: StripResult, wrong: Rejection) -> Document:
-    photo = strip.strip.photos[wrong.other] if wrong.cause == WRONG_IMAGE else ""
+def _from_control(strip: StripResult, wrong: Rejection, point: str, photo: str = "") -> Document:
     reason = "; ".join(f"{GROUND_AXES[axis]} by about {wrong.size[axis]:+.2f} m" for axis in wrong.axes)
     if wrong.cause == EXCHANGED:
         reason += f"; fits when exchanged with {strip.control.ids[wrong.other]}"
@@ -206,7 +208,7 @@ def _from_control(strip: StripResult, wrong: Rejection) -> Document:
         reason += f"; the wrong ray is that of photo {photo}: the error lies along the other ray"
     return _entry(
         strip=strip.strip.id,
-        point=strip.control.ids[wrong.row],
+        point=point,
         stage="control",
         test=wrong.test,
         value=wrong.value,

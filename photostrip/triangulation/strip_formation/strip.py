@@ -214,6 +214,19 @@ def without_rows(formed: FormedStrip, orientation: Orientation, left_out: Flags)
     return replace(formed, model_xyz=model_xyz, point=mean.point, xyz=mean.xyz, model_count=mean.model_count)
 
 
+def without_points(formed: FormedStrip, orientation: Orientation, points: Numbers) -> FormedStrip:
+    """Leave out points that stand in models: nothing places them any more."""
+    stay = ~np.isin(formed.point, points)
+    return replace(
+        formed,
+        model_xyz=np.where(np.isin(orientation.point, points)[:, None], np.nan, formed.model_xyz),
+        point=formed.point[stay],
+        xyz=formed.xyz[stay],
+        model_count=formed.model_count[stay],
+        home=formed.home[stay] if len(formed.home) else formed.home,
+    )
+
+
 def _refuse_vertical_base(directions: Floats, photos: Sequence[str]) -> None:
     steep = np.flatnonzero(np.hypot(directions[:, 0], directions[:, 1]) < STEEPEST_BASE)
     for number in steep.tolist():

@@ -21,7 +21,6 @@ from photostrip.frozen import dataclass
 from photostrip.triangulation.gross_errors.control.control_components import candidates
 from photostrip.triangulation.gross_errors.control.control_deletion import adjust
 from photostrip.triangulation.gross_errors.control.control_rejections import (
-    WRONG_IMAGE,
     Found,
     control_rejections,
     kept_of,
@@ -68,7 +67,6 @@ def screen_control(strip: StripAtControl) -> ScreenedControl:
             rejections += control_rejections(section, found, rows)
             redundancy[rows], detectable[rows] = reliability(section, found)
     rejections.sort(key=lambda each: each.row)
-    use[[each.row for each in rejections if each.cause == WRONG_IMAGE]] = False
     return ScreenedControl(
         kept=replace(strip.control, use=use),
         rejections=tuple(rejections),
