@@ -160,6 +160,18 @@ def test_gross_errors_finds_nearly_all_and_loses_little(kind: str) -> None:
 
 
 @pytest.mark.slow
+def test_detectable_prints_what_tests_can_find_beside_what_is_found() -> None:
+    out = printed("detectable.py", "1", "--first-seed", "200004", "--workers", "1")
+    rows = re.findall(r"^([a-z, ]+?) +(\d+) +(\d+\.\d) +(\d+) +\S+ sd$", out, re.MULTILINE)
+    assert len(rows) == 6
+    assert rows[-1][0] == "all"
+    for column in (1, 3):
+        assert sum(int(row[column]) for row in rows[:-1]) == int(rows[-1][column])
+    assert all(float(missed) <= int(drawn) for _, drawn, missed, _ in rows)
+    assert int(rows[-1][3]) < 0.5 * int(rows[-1][1])
+
+
+@pytest.mark.slow
 def test_screening_prints_how_the_time_grows() -> None:
     out = printed("screening.py", "--growth", "20", "40")
     assert re.findall(r"^ +(\d\.\d) +(20|40)(?: +-?\d+\.\d){3} +-?\d+\.\d{2} +-?\d+\.\d{3}$", out, re.MULTILINE) == [

@@ -122,13 +122,12 @@ def _wrong_image(strip: StripAtControl, found: Found, point: Columns, part: Colu
     coordinates do not.
     """
     others = found.whole.without([column for column in found.out if column not in point])
-    everything = others.deletions([point])[0]
+    everything, photo, best = others.deletions([point])[0], -1, found.whole.level
     if len(part) < len(point):
-        alone = others.deletions([part])[0]
+        best, alone = ALPHA, others.deletions([part])[0]
         if _beside(everything, alone).probability > ALPHA:
             return -1
     row = strip.coordinates.point[point[0]]
-    photo, best = -1, ALPHA
     for column, ray in enumerate(strip.rays, found.whole.first_ray):
         if ray.point == row and len(point) > 1:
             left = _beside(everything, others.deletions([(column,)])[0]).probability
