@@ -101,7 +101,8 @@ def _searched(strip: StripAtControl) -> Found | None:
         key=lambda each: (not each.left.explained, len(each.out), len(each.coordinates)),
         default=Found(found[0].whole, ()),
     )
-    return Found(best.whole, best.whole.completed(best.out))
+    # where much is wrong, little is left to check the rest of wrong points, and to be lost
+    return Found(best.whole, best.whole.completed(best.out)) if best is found[0] else best
 
 
 def _laid(
