@@ -28,6 +28,11 @@ _TEXTS = (
     ("batch", "Adjust many projects, on all cores or many machines.", "photostrip batch strips/* -o results -j 4"),
     ("report", "Print the accuracy report of a saved result again.", "photostrip report result/result.json"),
     (
+        "statement",
+        "State the accuracy of a result by the norms, to be signed.",
+        "photostrip statement result --class-plan 15 --class-height 20",
+    ),
+    (
         "compare",
         "Compare a result with a baseline, within tolerances.",
         "photostrip compare result baseline.json --tol exact.yaml",
@@ -71,6 +76,7 @@ _MODULES = {
     "man": "shell",
     "plan": "plan.plan",
     "sources": "info",
+    "statement": "statements.statement",
 }  # where it is not that of the command's name
 COMMANDS = {
     name: Entry(f"photostrip.cli.commands.{_MODULES.get(name, name)}", text, example) for name, text, example in _TEXTS

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from photostrip.result.numbers import Document
 
 SCHEMA = 1
-# A number of ours, and what the other numbers are made of.
-LEFT_OUT = ("version", "residuals", "parallaxes", "link_residuals")
+# What is ours, what the other numbers are made of, and what is made of them.
+LEFT_OUT = ("version", "statement", "residuals", "parallaxes", "link_residuals")
 RECORDS_IN_SETS = {"photos", "points", "models", "strips", "polynomials"}  # whose records a set counts
 SAME_FRAME = {
     "crs": "the CRS",

@@ -15,7 +15,7 @@ from photostrip.result.records import as_lists
 from photostrip.result.tables import table_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from os import PathLike
 
     from photostrip.arrays import Floats, Numbers
@@ -189,6 +189,32 @@ class Result:
             chosen = chosen_sections(self._document, names=names, everything=everything, width=layout.USUAL)
             title = "" if sections else title_of(self._document)
             return text.to_markdown(title, chosen) if form == "md" else text.to_text(title, chosen, layout.USUAL)
+
+    def statement(
+        self,
+        classes_cm: Mapping[str, float] | None = None,
+        *,
+        profile: str | PathLike[str] | None = None,
+        required: str = "",
+    ) -> Document:
+        """Return the accuracy statement of the result, as ``photostrip statement --format json`` prints it.
+
+        classes_cm: classes that a contract asks for, by ``plan`` and ``height``.
+        profile, required: a profile of accuracy classes (YAML), and the class of it that must be kept.
+        Raises InputError with every reason why nothing can be stated.
+        """
+        from photostrip.errors import faults_instead
+        from photostrip.result.statement.document import statement_document
+
+        classes = None
+        if profile is not None:
+            from pathlib import Path
+
+            from photostrip.project.profiles.classes import load_classes
+
+            classes = load_classes(Path(profile))[0]
+        with faults_instead(self.name, "stated"):
+            return statement_document(self._document, self.name, classes_cm, classes, required)
 
     def trace(self, form: str = "text") -> str:
         """Return every iteration with the symbols of the formulas, as text, Markdown (``md``) or JSON.

@@ -9,6 +9,6 @@ metres, east, north, up. All faults of all files are reported at once, each with
   axes into those of the program, ``hints`` says what is not used, ``resolved`` writes the project with nothing left
   open, ``places`` finds where a finding would be put right;
 - ``checks/``: what can be said before anything is adjusted;
-- ``plans/``, ``terrestrial/``, ``simulation``, ``tolerance_profile``: the other kinds of files;
+- ``plans/``, ``terrestrial/``, ``profiles/``, ``simulation``: the other kinds of files;
 - ``template``: the first files of a new project.
 """

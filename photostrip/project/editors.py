@@ -14,7 +14,8 @@ from photostrip.project.schema.values import AUTO
 KINDS = {  # where the keys of each kind of file stand, and its title
     "project": ("schema.project_file", "ProjectFile", "photostrip project"),
     "simulation": ("simulation", "SimulationFile", "photostrip simulation"),
-    "tolerances": ("tolerance_profile", "ToleranceFile", "photostrip tolerance profile"),
+    "tolerances": ("profiles.tolerances", "ToleranceFile", "photostrip tolerance profile"),
+    "statement": ("profiles.classes", "ClassFile", "photostrip accuracy classes"),
     "model": ("plans.model", "ModelPlanFile", "photostrip plan model"),
     "strip": ("plans.strip", "StripPlanFile", "photostrip plan strip"),
     "camera": ("plans.cameras", "CameraPlanFile", "photostrip plan camera"),

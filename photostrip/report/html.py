@@ -48,8 +48,12 @@ def to_html(document: Document) -> str:
 
 
 def methods_html(document: Document) -> str:
-    sections = [("", section) for section in methods_sections(document)]
-    return _page(f"Methods: {document['name']}", document["version"], _sections(sections, []))
+    return sections_html(f"Methods: {document['name']}", document["version"], methods_sections(document))
+
+
+def sections_html(title: str, version: str, sections: Iterable[Section], pictures: Sequence[Picture] = ()) -> str:
+    """Return a report of another command as one page."""
+    return _page(title, version, _sections([("", section) for section in sections], pictures))
 
 
 def _page(title: str, version: str, sections: list[Document]) -> str:

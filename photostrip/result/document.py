@@ -19,6 +19,7 @@ from photostrip.result.adjustment import (
 )
 from photostrip.result.numbers import Document, natural_rank
 from photostrip.result.points import cross_validation, given, ground, image_coordinates, photos, precision
+from photostrip.result.statement.evidence import statement_of
 from photostrip.result.verdict import verdict_of
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "status": verdict.pop("status"),
         "verdict": verdict,
     }
-    return head | body
+    return head | {"statement": statement_of(result, found, head | body)} | body
 
 
 def _finding(finding: Finding) -> Document:

@@ -124,7 +124,7 @@ def test_a_given_point_that_counts_in_plan_only_is_compared_in_plan() -> None:
 
 def test_the_short_form_leaves_out_single_measurements_only() -> None:
     document = case().document
-    assert document.keys() - baseline_of(document).keys() == {"version", "residuals", "parallaxes"}
+    assert document.keys() - baseline_of(document).keys() == {"version", "statement", "residuals", "parallaxes"}
 
 
 def degree_of_latitude(latitude: float) -> float:

@@ -44,7 +44,7 @@ def compare(
     from photostrip.cli.jobs import baseline as baseline_job
     from photostrip.errors import EXIT_DONE, EXIT_INPUT, EXIT_TOLERANCE, faults_instead
     from photostrip.library.comparison import compare as compared
-    from photostrip.project.tolerance_profile import load_tolerances
+    from photostrip.project.profiles.tolerances import load_tolerances
     from photostrip.report.commands.comparisons import TRUTH
     from photostrip.visible import visible
 

@@ -32,6 +32,7 @@ from photostrip.report.sections.strip import (
     relative_section,
 )
 from photostrip.report.sections.verdict import accuracy, headline, verdict_section
+from photostrip.report.statements.statement import statement_section
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -59,6 +60,7 @@ class SectionName(StrEnum):
     DEFORMATIONS = "deformations"
     CONTROL = "control"
     CHECK = "check"
+    STATEMENT = "statement"
     CROSS_VALIDATION = "cross-validation"
     TIES = "ties"
     IMAGES = "images"
@@ -117,6 +119,8 @@ def _of_the_points(document: Document, *, everything: bool) -> Iterator[tuple[Se
     """Give what is left at points and photos, what was rejected, what is not determined."""
     yield SectionName.CONTROL, control_section(document, everything=everything)
     yield SectionName.CHECK, check_section(document, everything=everything)
+    if "statement" in document:
+        yield SectionName.STATEMENT, statement_section(document)
     if "cross_validation" in document:
         yield SectionName.CROSS_VALIDATION, cross_validation_section(document, everything=everything)
     if document["counts"]["strips"] > 1 and "bundle" not in document:

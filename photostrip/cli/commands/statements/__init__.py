@@ -1,0 +1,1 @@
+"""The accuracy statement as a command."""

@@ -1,0 +1,113 @@
+"""``photostrip statement``: the accuracy of a result in the words of the norms."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from photostrip.cli.options import Quiet, Width
+from photostrip.cli.stdout import Format, form_of, print_json, print_sections
+
+if TYPE_CHECKING:
+    from photostrip.report.page.parts import Document
+
+
+class StatementFormat(StrEnum):
+    """Forms in which a statement is printed."""
+
+    TEXT = "text"
+    JSON = "json"
+    MD = "md"
+
+
+HTML = ".html"
+
+
+def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")],
+    class_plan: Annotated[
+        float | None,
+        typer.Option("--class-plan", metavar="CM", min=0.1, max=1e6, help="Class in plan that is asked for, cm."),
+    ] = None,
+    class_height: Annotated[
+        float | None,
+        typer.Option("--class-height", metavar="CM", min=0.1, max=1e6, help="Class in height that is asked for, cm."),
+    ] = None,
+    profile: Annotated[
+        Path | None, typer.Option("--profile", metavar="FILE", help="Accuracy classes of another norm (YAML).")
+    ] = None,
+    require: Annotated[
+        str, typer.Option("--require", metavar="CLASS", help="Class of the profile that must be kept.")
+    ] = "",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; its ending gives the format.")
+    ] = None,
+    form: Annotated[
+        StatementFormat | None, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How it is printed.")
+    ] = None,
+    width: Width = None,
+    quiet: Quiet = False,
+) -> int:
+    """State the accuracy of a result in the words of the norms, to be signed.
+
+    The ASPRS standard (edition 2, 2024) tests with 30 check points and counts their own error; beside it stand the
+    measures of ISO 19157, CE90 and LE90, the NSSDA, and with --profile the classes of another norm. The exit code is 1
+    when a class that is asked for is not met or the check points are fewer than the standard asks for. Nothing is
+    stated, with exit code 2, where the evidence does not carry it: no check points, check points that stand out or are
+    not known well enough, a result that FAILED or is UNVERIFIED, a local frame. FILE may end in .txt, .md, .html or
+    .json.
+    """
+    from photostrip.cli.failures import failures_as
+    from photostrip.errors import faults_instead
+    from photostrip.formats.output.result_json import read_result
+    from photostrip.project.profiles.classes import load_classes
+    from photostrip.result.statement.document import exit_code, statement_document
+
+    if require and profile is None:
+        raise typer.BadParameter("a class is one of a profile: give --profile as well", param_hint="--require")
+    page = output is not None and form is None and output.suffix.lower() == HTML
+    wanted = Format(form.value) if form else form_of(output) if output is not None and not page else Format.TEXT
+    given = {"plan": class_plan, "height": class_height}
+    file = str(result / "result.json" if result.is_dir() else result)
+    with failures_as(wanted), faults_instead(file, "stated"):
+        classes = None if profile is None else load_classes(profile)[0]
+        asked = {part: size for part, size in given.items() if size is not None}
+        found = statement_document(read_result(file), file, asked, classes, require)
+        if output is not None:
+            from photostrip.formats.text.writing import write_text
+
+            write_text(output, _page(found) if page else _text(found, wanted, width, quiet=quiet))
+        elif wanted is Format.JSON:
+            print_json(found)
+        else:
+            from photostrip.report.statements.statement import statement_report
+
+            print_sections(*statement_report(found, quiet=quiet), width, markdown=wanted is Format.MD)
+    return exit_code(found["status"])
+
+
+def _page(found: Document) -> str:
+    from photostrip.report.html import check_html, sections_html
+    from photostrip.report.statements.statement import statement_report
+
+    check_html("--output")
+    title, sections = statement_report(found)
+    return sections_html(title, found["version"], sections)
+
+
+def _text(found: Document, form: Format, width: int | None, *, quiet: bool) -> str:
+    """Return the statement as a file holds it."""
+    from photostrip.report.page import layout, text
+    from photostrip.report.statements.statement import statement_report
+
+    if form is Format.JSON:
+        from photostrip.formats.output.result_json import to_json
+
+        return to_json(found)
+    title, sections = statement_report(found, quiet=quiet)
+    if form is Format.MD:
+        return text.to_markdown(title, sections)
+    return text.to_text(title, sections, width or layout.USUAL)

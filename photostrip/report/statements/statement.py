@@ -1,0 +1,159 @@
+"""The accuracy statement: a section of the report, and the page of ``photostrip statement``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip.notes import counted, listed
+from photostrip.report.page.numbers import fixed, metres, signed
+from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+STYLES = {"tested": "good", "reduced": "look", "not met": "failed"}
+HEADLINES = {
+    "tested": "TESTED as the standard asks.",
+    "reduced": "DOES NOT MEET THE MINIMUM number of check points of the standard.",
+    "not met": "DOES NOT MEET the class that is asked for.",
+}
+SYMBOLS = {"plan": "RMSE_H", "height": "RMSE_V", "space": "RMSE_3D"}
+CONFIRMED = (
+    "I have seen that the check points took no part in the adjustment, were surveyed independently of the control to "
+    "the standard deviations given above, lie on open ground and are spread over the whole area."
+)
+LINE = "________________________________"
+CENTIMETRES = 100.0
+
+
+def statement_section(document: Document) -> Section:
+    """Return the section of the accuracy report."""
+    block = document["statement"]
+    if block["status"] == "refused":
+        parts: list[Part] = [Words("No accuracy can be stated by a norm:")]
+        parts += [Words(f"{_reason(each)}; {each['fix']}", mark="-") for each in block["reasons"]]
+        return Section("Accuracy statement", tuple(parts))
+    parts = [Words(text, mark="-") for text in block["sentences"]]
+    parts.append(_accuracies(block))
+    parts += [Words(text, mark="-") for text in block["remarks"]]
+    parts.append(Words("photostrip statement writes it with the measures of ISO 19157, to be signed."))
+    return Section("Accuracy statement", tuple(parts))
+
+
+def _reason(reason: Document) -> str:
+    points = f": {listed(reason['points'])}" if reason["points"] else ""
+    return f"{reason['message']}{points}"
+
+
+def statement_report(document: Document, *, quiet: bool = False) -> tuple[str, tuple[Section, ...]]:
+    """Return title and sections of a statement; with `quiet` what is stated alone."""
+    verdict = Words(_headline(document), STYLES[document["status"]])
+    sentences = tuple(Words(text, mark=f"{place}.") for place, text in enumerate(document["sentences"], 1))
+    if quiet:
+        return "", (Section("", (verdict, *sentences)),)
+    found = [
+        Section("Statement", (verdict, *sentences)),
+        Section("What went in", (_facts(document), _accuracies(document))),
+        Section("Measures", (_measures(document),)),
+        Section("Check points", (_check_points(document),)),
+    ]
+    if document["profile"]:
+        found.append(_classes(document["profile"], document["required"]))
+    remarks = tuple(Words(text, mark="-") for text in document["remarks"])
+    sign = Facts(tuple((label, LINE) for label in ("Place, date", "Name, office", "Signature")))
+    end = Section("To be signed", (*remarks, Words(CONFIRMED), sign))
+    return f"Accuracy statement: {document['name']}", (*found, end)
+
+
+def _headline(document: Document) -> str:
+    text = HEADLINES[document["status"]]
+    if document["required"]:
+        profile = document["profile"]
+        kept = any(each["kept"] for each in profile["classes"] if each["name"] == document["required"])
+        text += f" The class {document['required']} of {profile['name']} is {'' if kept else 'not '}kept."
+    return text
+
+
+def _facts(document: Document) -> Facts:
+    counts = " and ".join(f"{document[part]['count']} in {part}" for part in ("plan", "height"))
+    asked = " and ".join(f"{size:g} cm in {part}" for part, size in document["asked_cm"].items())
+    return Facts(
+        (
+            ("Result", f"{document['name']}, {document['verdict'].upper()}, adjustment {document['adjustment']}"),
+            ("Frame", document["frame"]),
+            ("Check points", counts),
+            *((("Classes asked for", asked),) if asked else ()),
+            ("Standard", document["standard"]),
+            ("Made by", f"photostrip {document['version']}"),
+        )
+    )
+
+
+def _accuracies(block: Document) -> Table:
+    rows = [{"part": part, "count": None, "rmse": None, "survey": None, **block[part]} for part in SYMBOLS]
+    columns = (
+        words("", "part"),
+        words("", lambda row: SYMBOLS[row["part"]]),
+        number("points", lambda row: row["count"], lambda count: "" if count is None else str(count)),
+        number("rms", "rmse", _centimetres, "cm"),
+        number("survey", "survey", _centimetres, "cm"),
+        number("together", "accuracy", _centimetres, "cm"),
+        number("class", "class_cm", lambda size: fixed(size, 0), "cm"),
+    )
+    note = "rms: of the differences; survey: of the check points themselves; class: the narrowest of whole centimetres"
+    return tabulated(rows, columns, note=note)
+
+
+def _centimetres(value: float | None) -> str:
+    return fixed(None if value is None else CENTIMETRES * value, 1)
+
+
+def _measures(document: Document) -> Table:
+    circle, line = document["circle"], document["line"]
+    rows = [{"norm": f"ISO 19157, {each['id']}", **each} for each in document["iso_19157"]]
+    nssda = {"alias": "", "norm": "NSSDA"}
+    rows += [
+        {**nssda, "name": "1.7308 RMSE_r, 95 %", "part": "plan", "value_m": circle["radial95"]},
+        {**nssda, "name": "2.4477 (RMSE_x + RMSE_y) / 2, 95 %", "part": "plan", "value_m": circle["ce95"]},
+        {**nssda, "name": "1.9600 RMSE_z, 95 %", "part": "height", "value_m": line["le95"]},
+    ]
+    columns = (
+        words("norm", "norm"),
+        words("measure", lambda row: row["name"] + (f" ({row['alias']})" if row["alias"] else "")),
+        words("of", "part"),
+        number("value", lambda row: row, lambda row: (signed if row.get("id") == 128 else metres)(row["value_m"]), "m"),
+    )
+    return tabulated(rows, columns, note="of the differences at the check points, without the error of their survey")
+
+
+def _check_points(document: Document) -> Table:
+    axes = zip(document["axes_of_frame"], ("dx", "dy", "dz"), strict=True)
+    columns = (
+        words("point", "id"),
+        *(number(f"d {axis}", key, signed, "m") for axis, key in axes),
+        number("plan", "plan", metres, "m"),
+        number("height", "height", signed, "m"),
+    )
+    return tabulated(document["check_points"], columns, note="adjusted minus given")
+
+
+def _classes(profile: Document, required: str) -> Section:
+    best = profile["best"]
+    text = f"The narrowest class that is kept: {best}." if best else "No class is kept."
+    if profile["check_points"] > 1:
+        text += f" It asks for {counted(profile['check_points'], 'check point')}."
+    columns = (
+        words("class", lambda row: f"{row['name']}{' (asked for)' if row['name'] == required else ''}"),
+        words("measure", "meaning"),
+        number("found", "found", 3, "m"),
+        number("allowed", "limit", 3, "m"),
+        words("", lambda row: "kept" if row["kept"] else "NOT KEPT"),
+    )
+    rows = [{**limit, "name": each["name"]} for each in profile["classes"] for limit in each["limits"]]
+    return Section(profile["name"], (Words(text), tabulated(rows, columns), *_sources(profile)))
+
+
+def _sources(profile: Document) -> Iterator[Words]:
+    yield Words(f"Source: {profile['source']}")
+    yield from (Words(f"{each['name']}: {each['source']}", mark="-") for each in profile["classes"] if each["source"])

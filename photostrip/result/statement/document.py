@@ -1,0 +1,108 @@
+"""The document of ``photostrip statement``: what is stated, the numbers that went in, the measures of the norms."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, Fault, InputError
+from photostrip.notes import listed
+from photostrip.result.statement.classes import classified
+from photostrip.result.statement.stating import NOT_MET, REFUSED, STANDARD, TESTED, stated
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from photostrip.result.numbers import Document
+    from photostrip.result.statement.classes import ClassProfile
+
+SCHEMA = 1
+# Measures of ISO 19157:2013, annex D: identifier, name, alias, where it stands in the block `statement`.
+ISO_MEASURES = (
+    (128, "bias of positions", "", "axes.east.mean", "east"),
+    (128, "bias of positions", "", "axes.north.mean", "north"),
+    (128, "bias of positions", "", "axes.up.mean", "height"),
+    (28, "mean value of positional uncertainties", "", "plan.mean", "plan"),
+    (28, "mean value of positional uncertainties", "", "height.mean", "height"),
+    (47, "root mean square error of planimetry", "RMSEP", "plan.rmse", "plan"),
+    (44, "circular error at 90 % significance level", "CE90", "circle.ce90", "plan"),
+    (45, "circular error at 95 % significance level", "CE95", "circle.ce95", "plan"),
+    (39, "root mean square error", "RMS", "height.rmse", "height"),
+    (35, "linear map accuracy at 90 % significance level", "LE90(r)", "line.le90", "height"),
+    (36, "linear map accuracy at 95 % significance level", "LE95(r)", "line.le95", "height"),
+)
+
+
+def statement_document(
+    document: Document,
+    file: str,
+    wanted: Mapping[str, float] | None = None,
+    profile: ClassProfile | None = None,
+    required: str = "",
+) -> Document:
+    """Return the statement on a result.
+
+    wanted: classes in centimetres that a contract asks for, by ``plan`` and ``height``.
+    profile, required: classes of another norm, and the one of them that must be kept.
+    Raises InputError with every reason why nothing can be stated.
+    """
+    if "statement" not in document:
+        fix = "run the project again with this version of photostrip"
+        raise InputError(Fault("holds nothing on its check points", "result-incomplete", file, fix=fix))
+    block = stated({**document["statement"], "reasons": _own(document["statement"]["reasons"])}, wanted)
+    if block["status"] == REFUSED:
+        raise InputError(_fault(each, file) for each in block["reasons"])
+    classes = None if profile is None else classified(block, profile)
+    if classes is not None and required:
+        row = next((each for each in classes["classes"] if each["name"] == required), None)
+        if row is None:
+            names = listed([each["name"] for each in classes["classes"]])
+            raise InputError(Fault(f"the profile has no class `{required}`", "word", key="--require", expected=names))
+        if not row["kept"]:
+            block = block | {"status": NOT_MET}
+    return {
+        "photostrip_statement": SCHEMA,
+        "version": document["version"],
+        "result": file,
+        "name": document["name"],
+        "verdict": document["status"],
+        "adjustment": document["adjustment"],
+        "frame": document["frame"]["description"],
+        "standard": STANDARD,
+        **{key: block[key] for key in ("status", "sentences", "remarks", *FIGURES)},
+        "asked_cm": dict(wanted or {}),
+        "iso_19157": [_measure(block, *each) for each in ISO_MEASURES],
+        "profile": classes,
+        "required": required,
+        "axes_of_frame": document["frame"]["axes"],
+        "check_points": [
+            {key: row[key] for key in ("id", "dx", "dy", "dz", "plan", "height")}
+            for row in document["control"]
+            if row["role"] == "check" and row["measured"]
+        ],
+    }
+
+
+FIGURES = ("plan", "height", "space", "axes", "circle", "line", "not_measured")
+
+
+def exit_code(status: str) -> int:
+    """Exit code of a statement: 0 when the class was tested as the standard asks, otherwise 1."""
+    return EXIT_DONE if status == TESTED else EXIT_TOLERANCE
+
+
+def _own(reasons: list[Document]) -> list[Document]:
+    """Leave out the reasons that depend on the class: they are found anew for the class that is claimed."""
+    return [each for each in reasons if each["code"] != "statement-survey"]
+
+
+def _fault(reason: Document, file: str) -> Fault:
+    points = tuple(reason["points"])
+    message = f"no accuracy can be stated: {reason['message']}" + (f": {listed(points)}" if points else "")
+    return Fault(message, reason["code"], file, fix=reason["fix"], points=points)
+
+
+def _measure(block: Document, number: int, name: str, alias: str, path: str, part: str) -> Document:
+    value = block
+    for key in path.split("."):
+        value = value[key]
+    return {"id": number, "name": name, "alias": alias, "part": part, "value_m": value}

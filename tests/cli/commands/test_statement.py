@@ -1,0 +1,111 @@
+"""``photostrip statement`` as it is typed: forms, exit codes, what is refused."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.formats.output.result_json import to_json
+from tests.loops import nonempty
+from tests.result.statement.test_evidence import GOOD, block
+from tests.results import case
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.fixture
+def result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """A result with thirty check points in the working folder; what a test changes it writes again."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    given = GOOD | {"largest": 0.3}
+    height = block()["height"] | {"largest": 0.3}
+    document = case().document | {"statement": block(plan=given, height=height), "status": "good"}
+    written(document)
+    return document
+
+
+def written(document: dict[str, Any]) -> None:
+    with open("result.json", "w", encoding="utf-8") as file:  # noqa: PTH123 (the working folder)
+        file.write(to_json(document))
+
+
+@pytest.mark.usefixtures("result")
+def test_a_statement_is_printed_with_what_went_in(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["statement", "result.json"]) == 0
+    text = capsys.readouterr().out
+    assert "TESTED as the standard asks." in text
+    assert "ISO 19157, 44" in text
+    assert "Signature" in text
+    checks = [row["id"] for row in case().document["control"] if row["role"] == "check"]
+    assert [name for name in nonempty(checks) if f"\n{name} " not in text] == []
+
+
+@pytest.mark.usefixtures("result")
+def test_every_form_says_the_same(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert main(["statement", ".", "--format", "json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["status"] == "tested"
+    for name in ("s.txt", "s.md", "s.html", "s.json"):
+        assert main(["statement", "result.json", "-o", name]) == 0
+    assert json.loads((tmp_path / "s.json").read_text())["sentences"] == found["sentences"]
+    for name in ("s.txt", "s.md", "s.html"):
+        text = " ".join((tmp_path / name).read_text(encoding="utf-8").replace("\\_", "_").split())
+        assert found["sentences"][0] in text
+    assert "http" not in (tmp_path / "s.html").read_text(encoding="utf-8").split("<main>")[1]
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.usefixtures("result")
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (["--class-plan", "15", "--class-height", "20"], 0),
+        (["--class-plan", "11"], 1),
+        (["--class-plan", "5"], 2),  # the check points are not good enough to say so
+        (["--class-plan", "nan"], 2),
+        (["--class-plan", "0"], 2),
+        (["--require", "1 m"], 2),
+        (["--profile", str(ROOT / "configs/tolerances/contour-interval.yaml"), "--require", "1 m"], 0),
+        (["--profile", str(ROOT / "configs/tolerances/contour-interval.yaml"), "--require", "0.25 m"], 1),
+        (["--profile", str(ROOT / "configs/tolerances/contour-interval.yaml"), "--require", "3 m"], 2),
+        (["--profile", str(ROOT / "configs/tolerances/exact.yaml")], 2),
+        (["--profile", "missing.yaml"], 2),
+        (["-o", "statement.pdf"], 2),
+    ],
+)
+def test_the_exit_code_says_whether_it_is_met(options: list[str], code: int) -> None:
+    assert main(["statement", "result.json", "--quiet", *options]) == code
+
+
+def test_fewer_points_end_with_1(result: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    few = block(plan=GOOD | {"count": 12, "largest": 0.3})
+    written(result | {"statement": few})
+    assert main(["statement", "result.json", "--quiet"]) == 1
+    assert "DOES NOT MEET THE MINIMUM" in capsys.readouterr().out
+
+
+def test_what_is_refused_says_why(result: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    written(case("local").document)
+    assert main(["statement", "result.json"]) == 2
+    assert "no accuracy can be stated: the frame is local" in capsys.readouterr().err
+    assert main(["statement", "result.json", "--format", "json"]) == 2
+    assert "statement-frame" in capsys.readouterr().out
+    written(result | {"statement": {}})
+    assert main(["statement", "result.json"]) == 2
+    assert "key 'statement." in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00\xff\x00", b"{", b"[]", b'{"photostrip_result": 1}', b"NaN"])
+def test_what_is_no_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], content: bytes) -> None:
+    (tmp_path / "bad.json").write_bytes(content)
+    assert main(["statement", str(tmp_path / "bad.json")]) == 2
+    assert main(["statement", str(tmp_path / "missing.json")]) == 2
+    printed = capsys.readouterr()
+    assert "Traceback" not in printed.err
+    assert "bad.json" in printed.err
