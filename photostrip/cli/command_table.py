@@ -33,6 +33,11 @@ _TEXTS = (
         "photostrip statement result --class-plan 15 --class-height 20",
     ),
     (
+        "verify",
+        "Make a result again from its certificate, and say what differs.",
+        "photostrip verify result --project project.yaml",
+    ),
+    (
         "compare",
         "Compare a result with a baseline, within tolerances.",
         "photostrip compare result baseline.json --tol exact.yaml",
@@ -77,6 +82,7 @@ _MODULES = {
     "plan": "plan.plan",
     "sources": "info",
     "statement": "statements.statement",
+    "verify": "statements.verify",
 }  # where it is not that of the command's name
 COMMANDS = {
     name: Entry(f"photostrip.cli.commands.{_MODULES.get(name, name)}", text, example) for name, text, example in _TEXTS

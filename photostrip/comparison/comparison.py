@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 # What is ours, what the other numbers are made of, and what is made of them.
-LEFT_OUT = ("version", "statement", "residuals", "parallaxes", "link_residuals")
+LEFT_OUT = ("version", "statement", "certificate", "residuals", "parallaxes", "link_residuals")
 RECORDS_IN_SETS = {"photos", "points", "models", "strips", "polynomials"}  # whose records a set counts
 SAME_FRAME = {
     "crs": "the CRS",

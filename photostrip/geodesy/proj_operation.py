@@ -38,6 +38,13 @@ def load_pyproj() -> Any:  # noqa: ANN401 (a module; pyproj does not say what it
     return pyproj
 
 
+def proj_versions() -> dict[str, str | None]:
+    """Return the version of PROJ, and that of the EPSG data set that it knows."""
+    from pyproj.database import get_database_metadata
+
+    return {"proj": load_pyproj().proj_version_str, "epsg": get_database_metadata("EPSG.VERSION")}
+
+
 class ProjOperation:
     """One PROJ operation between two CRSs, chosen once and then kept for all points.
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from photostrip.formats.text.source import Source
+    from photostrip.pipeline import Result as Computed
     from photostrip.project.checks.check import Checked
     from photostrip.project.loading import Project as Loaded
 
@@ -25,10 +26,16 @@ _WORD = re.compile(r"[\w-]+")
 class Project:
     """A project that was read without a fault, ready to run; made by ``photostrip.load``."""
 
-    def __init__(self, loaded: Loaded, assignments: Sequence[str] = (), source: Source | None = None) -> None:
+    def __init__(
+        self,
+        loaded: Loaded,
+        assignments: Sequence[str] = (),
+        source: Source | None = None,
+        digests: Mapping[str, str] | None = None,
+    ) -> None:
         self.loaded = loaded
         """What the pipeline takes: ``inputs`` and ``settings``, with the places of all values in the files."""
-        self._assignments, self._source = assignments, source
+        self._assignments, self._source, self._digests = assignments, source, digests or {}
 
     @property
     def name(self) -> str:
@@ -64,7 +71,23 @@ class Project:
         with reading_from(self._source):
             computed = self.loaded.result(adjust_project(self.loaded))
             document = document_of(computed, self.loaded.remarks)
+            document["certificate"] = self._certificate(document, computed)
         return Result(document, computed=computed, resolved=self.loaded.resolved)
+
+    def _certificate(self, document: dict[str, Any], computed: Computed) -> dict[str, Any]:
+        """Say what the result was made from, by hashes that any machine can repeat."""
+        from photostrip.formats.text.source import digest
+        from photostrip.result.statement.certificate import certificate_of
+
+        loaded, inputs = self.loaded, self.loaded.inputs
+        grids = {Path(grid) for frame in (*computed.frames, computed.output) for grid in frame.grids}
+        return certificate_of(
+            document,
+            frames=[*inputs.frames, inputs.output or inputs.frames[0]],
+            inputs={loaded.seen(file): content for file, content in self._digests.items()},
+            grids={grid.name: digest(grid.read_bytes()) for grid in grids if grid.is_file()},
+            settings={"set": list(self._assignments), "resolved_sha256": digest(loaded.resolved.encode())},
+        )
 
     def files_read(self, result: Result) -> tuple[Path, ...]:
         """Return every file that a run of it read, grids of geoids and datum shifts included."""
@@ -176,10 +199,13 @@ def assignments_of(overrides: Mapping[str, Any], above: str = "") -> list[str]:
 
 def loaded_from(path: Path, assignments: Sequence[str], source: Source | None = None) -> Project:
     """Read a project from files, or from a source in memory."""
+    from photostrip.formats.text.source import Source, current
+    from photostrip.formats.text.source import reading_from as accounted
     from photostrip.project.loading import load_project
 
-    with reading_from(source):
-        return Project(load_project(path, assignments), assignments, source)
+    with reading_from(source), accounted(current() or Source()) as account:
+        loaded = load_project(path, assignments)
+        return Project(loaded, assignments, source, dict(account.digests))
 
 
 def _checked(path: Path, assignments: Sequence[str], source: Source | None) -> Check:

@@ -74,6 +74,10 @@ class Project:
         """Give findings the place in the files where they would be put right."""
         return tuple(places_of(findings, self.tree, self.tables, self.inputs.flights))
 
+    def seen(self, file: str) -> str:
+        """Return a file that was read as seen from the project's folder."""
+        return _seen_from(file, self.directory)
+
     def result(self, result: Result) -> Result:
         """Return a result whose findings say where, with files as seen from the project's folder."""
         placed = (replace(each, file=_seen_from(each.file, self.directory)) for each in self.placed(result.findings))

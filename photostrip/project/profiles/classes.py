@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from photostrip.project.schema.values import Positive, Section, Whole, Words, key, schema_number, typed
+from photostrip.project.schema.sections import Read, Section, key
+from photostrip.project.schema.values import Positive, Whole, Words, schema_number
 from photostrip.project.yaml.reading import Reading
 from photostrip.result.statement.classes import MEASURES, AccuracyClass, ClassProfile
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 SCHEMA_NUMBER = 1
 _read_schema_number = schema_number("photostrip_statement", SCHEMA_NUMBER, " of accuracy classes")
-SchemaNumber = Annotated[int, *typed(_read_schema_number, {"const": SCHEMA_NUMBER})]
+SchemaNumber = Annotated[int, Read(_read_schema_number, {"const": SCHEMA_NUMBER})]
 
 
 class PlanLimits(Section):
@@ -47,8 +48,8 @@ class ClassBlock(Section):
     """A class of the norm."""
 
     name: Words = key("What the norm calls it")
-    plan: PlanLimits = key("Limits in plan", PlanLimits.model_construct())
-    height: HeightLimits = key("Limits in height", HeightLimits.model_construct())
+    plan: PlanLimits = key("Limits in plan", PlanLimits())
+    height: HeightLimits = key("Limits in height", HeightLimits())
     source: Words | None = key("Where its numbers come from, when not from that of the profile", None)
 
 
@@ -85,8 +86,7 @@ def load_classes(path: Path) -> tuple[ClassProfile, Sequence[str]]:
 
 
 def _limits(block: Section) -> dict[str, float]:
-    named = {name: getattr(block, name) for name in type(block).model_fields}
-    return {name: value for name, value in named.items() if value is not None}
+    return {name: value for name, value in block.values().items() if value is not None}
 
 
 def _check(reading: Reading, given: ClassFile) -> None:

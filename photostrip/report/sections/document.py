@@ -32,7 +32,7 @@ from photostrip.report.sections.strip import (
     relative_section,
 )
 from photostrip.report.sections.verdict import accuracy, headline, verdict_section
-from photostrip.report.statements.statement import statement_section
+from photostrip.report.statements.statement import certificate_section, statement_section
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -67,6 +67,7 @@ class SectionName(StrEnum):
     REJECTED = "rejected"
     UNDETERMINED = "undetermined"
     NOTES = "notes"
+    CERTIFICATE = "certificate"
 
 
 def sections_of(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
@@ -130,6 +131,8 @@ def _of_the_points(document: Document, *, everything: bool) -> Iterator[tuple[Se
     yield SectionName.REJECTED, rejected_section(document, everything=everything)
     yield SectionName.UNDETERMINED, not_determined_section(document, everything=everything)
     yield SectionName.NOTES, notes_section(document, everything=everything)
+    if "certificate" in document:
+        yield SectionName.CERTIFICATE, certificate_section(document)
 
 
 def chosen_sections(

@@ -1,4 +1,4 @@
-"""The accuracy statement: a section of the report, and the page of ``photostrip statement``."""
+"""The accuracy statement, a section of the report and the page of ``photostrip statement``; the certificate."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.notes import counted, listed
 from photostrip.report.page.numbers import fixed, metres, signed
-from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ CONFIRMED = (
 )
 LINE = "________________________________"
 CENTIMETRES = 100.0
+NAMES = {"photostrip": "photostrip", "python": "Python", "numpy": "numpy", "scipy": "scipy", "pyproj": "pyproj"}
+OF_FRAMES = {"proj": "PROJ", "epsg": "EPSG data set"}
 
 
 def statement_section(document: Document) -> Section:
@@ -86,6 +88,7 @@ def _facts(document: Document) -> Facts:
             *((("Classes asked for", asked),) if asked else ()),
             ("Standard", document["standard"]),
             ("Made by", f"photostrip {document['version']}"),
+            *((("SHA-256", document["result_sha256"]),) if document["result_sha256"] else ()),
         )
     )
 
@@ -157,3 +160,21 @@ def _classes(profile: Document, required: str) -> Section:
 def _sources(profile: Document) -> Iterator[Words]:
     yield Words(f"Source: {profile['source']}")
     yield from (Words(f"{each['name']}: {each['source']}", mark="-") for each in profile["classes"] if each["source"])
+
+
+def certificate_section(document: Document) -> Section:
+    block = document["certificate"]
+    found = block["versions"]
+    epochs = list(dict.fromkeys(f"{epoch:.3f}" for epoch in block["epochs"] if epoch is not None))
+    facts = Facts(
+        (
+            ("Result", block["result_sha256"]),
+            ("Project with all defaults", block["resolved_sha256"]),
+            ("Overridden", "; ".join(block["set"]) or "nothing"),
+            ("Epochs", ", ".join(epochs) or "none given"),
+            ("Computed by", ", ".join(f"{NAMES[name]} {found[name]}" for name in NAMES)),
+            ("Frames by", ", ".join(f"{OF_FRAMES[name]} {found[name]}" for name in OF_FRAMES if found[name]) or DASH),
+        )
+    )
+    files = tabulated([*block["inputs"], *block["grids"]], (words("file", "file"), words("SHA-256", "sha256")))
+    return Section("Certificate", (facts, files))

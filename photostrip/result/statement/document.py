@@ -63,6 +63,7 @@ def statement_document(
         "photostrip_statement": SCHEMA,
         "version": document["version"],
         "result": file,
+        "result_sha256": (document.get("certificate") or {}).get("result_sha256"),
         "name": document["name"],
         "verdict": document["status"],
         "adjustment": document["adjustment"],

@@ -1,1 +1,1 @@
-"""The accuracy statement as a command."""
+"""What is signed, as commands: the accuracy statement, the verification of a certificate."""

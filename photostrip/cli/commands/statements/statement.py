@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from photostrip.cli.commands.statements.forms import StatementFormat
 from photostrip.cli.options import Quiet, Width
 from photostrip.cli.stdout import Format, form_of, print_json, print_sections
 
 if TYPE_CHECKING:
     from photostrip.report.page.parts import Document
-
-
-class StatementFormat(StrEnum):
-    """Forms in which a statement is printed."""
-
-    TEXT = "text"
-    JSON = "json"
-    MD = "md"
 
 
 HTML = ".html"

@@ -1,0 +1,108 @@
+"""The certificate of a result: the content of everything that went in, what computed it, and a hash of what came out.
+
+The hash of the result is that of its numbers as reports print them, so that another machine finds the same: adjustment,
+frame, points, photos, differences at given points, rejected measurements. Versions, paths, words, statistics and
+residuals are left out. Metres have 3 decimals, degrees of longitude and latitude 8, angles of photos 4 (radians 6).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sys
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from photostrip import __version__
+from photostrip.geodesy.proj_operation import proj_versions
+from photostrip.result.records import Records
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from photostrip.geodesy.frame_spec import FrameSpec
+    from photostrip.result.numbers import Document
+
+LIBRARIES = ("numpy", "scipy", "pyproj")  # whose version can change a number
+WITHOUT_PROJ = {"local", "geocentric"}
+METRES, DEGREES, ANGLES = 3, 8, {"deg": 4, "gon": 4, "rad": 6}
+
+
+def certificate_of(
+    document: Document,
+    frames: Sequence[FrameSpec],
+    inputs: Mapping[str, str],
+    grids: Mapping[str, str],
+    settings: Document,
+) -> Document:
+    """Return the block ``certificate``.
+
+    frames: those of the lists of given coordinates, and that of the result last.
+    inputs, grids: SHA-256 of every file that was read, by its path from the project's folder, of grids by their name.
+    settings: ``set``, what the command line overrode, and ``resolved_sha256``, the hash of the resolved project.
+    """
+    return {
+        "result_sha256": result_hash(document),
+        **settings,
+        "epochs": [frame.epoch for frame in frames],
+        "inputs": [{"file": name, "sha256": inputs[name]} for name in sorted(inputs)],
+        "grids": [{"file": name, "sha256": grids[name]} for name in sorted(grids)],
+        "versions": versions(with_proj=any(frame.crs.casefold() not in WITHOUT_PROJ for frame in frames)),
+    }
+
+
+def result_hash(document: Document) -> str:
+    """Return the hash of the numbers of a result as reports print them; the same on every machine."""
+    return hashlib.sha256("\n".join(_lines(document)).encode()).hexdigest()
+
+
+def _lines(document: Document) -> Iterator[str]:
+    frame = document["frame"]
+    yield f"{document['adjustment']} {frame['crs']} {' '.join(frame['axes'])}"
+    places = [DEGREES if frame["kind"] == "geographic" and axis != "up" else METRES for axis in frame["axes"]]
+    yield from _rows("point", document["points"], ("id", "role"), dict(zip("xyz", places, strict=True)))
+    yield from _rows("photo", document["photos"], ("id",), dict(zip("xyz", places, strict=True)))
+    for photo in document["photos"]:
+        angles = photo["angles"]
+        yield f"angles {' '.join(_number(value, ANGLES[angles['unit']]) for value in angles['values'] or ())}"
+    yield from _rows("given", document["control"], ("id", "role", "use"), dict.fromkeys(("dx", "dy", "dz"), METRES))
+    yield from _rows("rejected", document["rejected"], ("photo", "point", "stage"), {})
+
+
+def _rows(what: str, rows: Records | list[Document], texts: Sequence[str], numbers: Mapping[str, int]) -> Iterator[str]:
+    """Write a line for each record, with these texts and these numbers."""
+
+    def column(key: str) -> Sequence[object]:
+        return rows.columns[key] if isinstance(rows, Records) else [row[key] for row in rows]
+
+    cells = [[str(value) for value in column(key)] for key in texts]
+    cells += [[_number(value, places) for value in column(key)] for key, places in numbers.items()]
+    yield from (f"{what} {' '.join(row)}" for row in zip(*cells, strict=True))
+
+
+def _number(value: object, decimals: int) -> str:
+    return f"{value:z.{decimals}f}" if isinstance(value, int | float) else "-"
+
+
+@cache
+def versions(*, with_proj: bool) -> Document:
+    """Return the versions of what computes; without PROJ where no frame asks for it."""
+    proj = proj_versions() if with_proj else {"proj": None, "epsg": None}
+    python = ".".join(map(str, sys.version_info[:3]))
+    return {"photostrip": __version__, "python": python, **{name: _version(name) for name in LIBRARIES}, **proj}
+
+
+def _version(package: str) -> str:
+    """Return the version of a package from the name of its metadata, without importing either."""
+    spec = find_spec(package)
+    folder = Path(spec.origin).parents[1] if spec is not None and spec.origin else None
+    names = [each.name for each in folder.glob(f"{package}-*")] if folder is not None else []
+    found = (re.fullmatch(rf"{package}-([^-]+)(-.*)?\.(dist|egg)-info", name) for name in sorted(names))
+    known = next((match[1] for match in found if match), None)
+    if known is None:
+        from importlib.metadata import version
+
+        known = version(package)
+    return known

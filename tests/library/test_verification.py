@@ -1,0 +1,157 @@
+"""Results made again from their certificates: what is the same, what has changed, what was edited."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import photostrip
+from photostrip.cli.main import main
+from photostrip.library import verification
+from photostrip.library.verification import verify
+from photostrip.result.statement.certificate import result_hash
+from tests.loops import nonempty
+from tests.source_tree import ROOT
+
+SAMPLE = ROOT / "sample_data" / "sxb-strasbourg"
+FILES = sorted(path.name for path in SAMPLE.iterdir() if path.suffix in {".yaml", ".csv"})
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a project and its result."""
+    folder = tmp_path_factory.mktemp("certified")
+    for name in nonempty(FILES):
+        shutil.copy(SAMPLE / name, folder / name)
+    photostrip.run(folder / "project.yaml").write(folder / "result")
+    return folder
+
+
+@pytest.fixture
+def copied(made: Path, tmp_path: Path) -> Path:
+    shutil.copytree(made, tmp_path / "copy")
+    return tmp_path / "copy"
+
+
+def document(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "result" / "result.json").read_text(encoding="utf-8"))
+    return found
+
+
+def edited(folder: Path, found: dict[str, Any]) -> Path:
+    path = folder / "edited.json"
+    path.write_text(json.dumps(found), encoding="utf-8")
+    return path
+
+
+def test_a_certificate_has_the_hash_of_every_file_and_no_path(made: Path) -> None:
+    from hashlib import sha256
+
+    block = document(made)["certificate"]
+    assert {each["file"]: each["sha256"] for each in block["inputs"]} == {
+        name: sha256((SAMPLE / name).read_bytes()).hexdigest()
+        for name in ("project.yaml", "observations.csv", "control.csv")
+    }
+    assert str(made) not in json.dumps(block)
+    assert block["result_sha256"] == result_hash(document(made))
+
+
+def test_the_bytes_do_not_depend_on_where_a_project_is_run_from(
+    made: Path, copied: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(copied)
+    here = photostrip.run("project.yaml").files()["result.json"]
+    assert here == (made / "result" / "result.json").read_text(encoding="utf-8")
+
+
+def test_presets_and_overrides_stand_in_the_certificate(copied: Path) -> None:
+    preset = copied.parent / "preset.yaml"
+    preset.write_text("processing: {polynomial: {degree: 1}}\n", encoding="utf-8")
+    project = copied / "project.yaml"
+    project.write_text(project.read_text(encoding="utf-8") + "\nextends: ../preset.yaml\n", encoding="utf-8")
+    block = photostrip.load(project, name="other").run().document["certificate"]
+    assert "../preset.yaml" in [each["file"] for each in block["inputs"]]
+    assert block["set"] == ['name="other"']
+
+
+def test_what_has_not_changed_comes_out_again(copied: Path) -> None:
+    found = verify(copied / "result")
+    assert found["status"] == "same"
+    assert Path(found["project"]) == copied / "project.yaml"
+    assert found["result_sha256"]["now"] == found["result_sha256"]["certificate"]
+
+
+def test_a_file_that_has_changed_is_named(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with (copied / "control.csv").open("a", encoding="utf-8") as file:
+        file.write("\n")  # changes the content and no number
+    assert main(["verify", str(copied / "result")]) == 1
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "DIFFERENT: changed: control.csv." in printed
+    (copied / "control.csv").unlink()
+    assert main(["verify", str(copied / "result"), "--quiet"]) == 1
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "missing: control.csv; the project cannot be adjusted any more" in printed
+
+
+@pytest.mark.slow
+def test_an_edited_result_is_told(copied: Path) -> None:
+    project = copied / "project.yaml"
+    found = document(copied)
+    found["points"][0]["x"] += 0.5
+    answer = verify(edited(copied, found), project)
+    assert (answer["status"], answer["edited"], answer["numbers"]["status"]) == ("different", True, "different")
+    found["certificate"]["result_sha256"] = result_hash(found)  # edited by someone who knows of the hash
+    answer = verify(edited(copied, found), project)
+    assert (answer["status"], answer["edited"]) == ("different", False)
+    assert answer["result_sha256"]["now"] != answer["result_sha256"]["certificate"]
+    found = document(copied)
+    found["statement"]["reasons"] = []  # neither hashed nor compared
+    answer = verify(edited(copied, found), project)
+    assert (answer["status"], answer["words"]) == ("different", ["statement"])
+
+
+@pytest.mark.slow
+def test_other_versions_are_named_and_are_no_difference(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = document(copied)
+    found["certificate"]["versions"]["numpy"] = "1.0"
+    path = edited(copied, found)
+    assert main(["verify", str(path), "--project", str(copied / "project.yaml")]) == 0
+    assert "it was 1.0" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\x00\xff", b"{", b'{"photostrip_result": 1}', b'{"photostrip_result": NaN}']
+)
+def test_what_cannot_be_read_ends_with_2(tmp_path: Path, capsys: pytest.CaptureFixture[str], content: bytes) -> None:
+    (tmp_path / "result.json").write_bytes(content)
+    assert main(["verify", str(tmp_path)]) == 2
+    assert main(["verify", str(tmp_path / "none.json")]) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_result_without_its_project_ends_with_2(
+    copied: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    shutil.copy(copied / "result" / "result.json", "result.json")
+    assert main(["verify", "result.json"]) == 2
+    assert "its project is not found" in capsys.readouterr().err
+    found = document(copied)
+    del found["certificate"]
+    assert main(["verify", os.fspath(edited(copied, found)), "--format", "json"]) == 2
+    assert "no-certificate" in capsys.readouterr().out
+
+
+def test_small_differences_of_another_machine_are_none() -> None:
+    other = verification._other
+    assert not other({"a": [1.0, "x", None]}, {"a": [1.0001, "x", None]})
+    assert other({"a": 1.0}, {"a": 1.01})
+    assert other({"a": 1.0}, {"b": 1.0})
+    assert other([1.0], [1.0, 2.0])
+    assert other(None, 1.0)
