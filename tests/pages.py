@@ -133,7 +133,7 @@ class Scratch:
     """A folder with what a user has, in which the blocks of one page run one after the other."""
 
     def __init__(self, folder: Path, command: Path | None = None) -> None:
-        """`command` is the ``photostrip`` to take; without it, the one that is installed."""
+        """`command` is that of ``Forks``, whose ``python`` is taken, too; without it, what is installed."""
         self.folder = folder / "project"
         self.folder.mkdir()
         for name in COPIED:
@@ -142,7 +142,7 @@ class Scratch:
         self.environment = os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "PYTHONUTF8": "1"}
         path = [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
         if command is not None:
-            path.insert(0, str(command.parent))
+            path[:0] = [str(command.parent), str(command.parent.parent)]  # and the ``python`` beside it
         elif not (Path(sys.executable).parent / "photostrip").exists():
             self.environment["PYTHONPATH"] = str(ROOT)
             path.insert(0, str(self._stand_in(folder / "bin")))
@@ -183,7 +183,7 @@ def faults_of_page(page: Path, folder: Path, command: Path | None = None) -> lis
         if block.runs:
             found += [fault for step in steps(block) for fault in _faults_of_step(block, step, scratch)]
         elif block.kind == "python" and not block.option("file"):
-            outcome = scratch.run([sys.executable, str(scratch.write("block.py", block.lines))])
+            outcome = scratch.run(["python", str(scratch.write("block.py", block.lines))])
             if outcome.code:
                 found.append(f"{block.place}: {outcome.err}")
         elif block.words[:2] == ("yaml", "project"):

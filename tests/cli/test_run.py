@@ -83,7 +83,7 @@ def test_quiet_prints_the_verdict(project: Path, tmp_path: Path, capsys: pytest.
 @pytest.mark.slow
 def test_strict_refuses_what_nothing_verifies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Without check points every number looks as good as before: a job that asks for more must hear of it."""
-    project = write_project(tmp_path, spec("projected", 2))
+    project = write_project(tmp_path, spec())
     assert run(capsys, "run", project, "--strict", "--quiet")[0] == 0
     control = tmp_path / "control.csv"
     lines = control.read_text(encoding="utf-8").splitlines(keepends=True)
