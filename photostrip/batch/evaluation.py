@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.batch.outcomes import BROKEN, FAULTY, WEAK, failure, out_of_memory, outcome_of
 from photostrip.batch.parcel import Parcel, unpack_grids
+from photostrip.batch.places import place_of
 from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.source import Source, digest, reading_from
@@ -48,8 +49,8 @@ def _computed(task: Task, source: Source) -> Answer:
     with reading_from(source):
         project = loaded_from(Path(task.project), task.overrides)
         result = project.run()
-        files = result.files()
-    outcome = outcome_of(result.document, result_findings(result.document))
+        files = result.files(html=task.html)
+    outcome = outcome_of(result.document, result_findings(result.document)) | place_of(result)
     return Answer(number=task.number, outcome=outcome, files=files, inputs=_inputs(project.loaded, source))
 
 

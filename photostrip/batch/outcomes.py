@@ -65,6 +65,8 @@ def failure(status: str, error: InputError | GeometryError | Fault) -> Document:
         **nothing,
         "messages": [line_of(each).removeprefix("error: ") for each in findings],
         "findings": findings,
+        "body": None,
+        "track": None,
     }
 
 

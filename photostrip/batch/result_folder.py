@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 LOCK = ".batch.lock"
 RECORD = "batch.json"
-SUMMARIES = ("summary.txt", "summary.csv", "summary.json", "junit.xml")
+PAGE = "report.html"
+SUMMARIES = ("summary.txt", "summary.csv", "summary.json", "summary.html", "junit.xml")
 LIBRARIES = ("numpy", "scipy", "pyproj")  # whose version can change a number
 _TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
 
@@ -55,8 +56,11 @@ class ResultFolder:
     def __init__(self, path: Path, overrides: Sequence[str] = ()) -> None:
         self.path, self.overrides = path, list(overrides)
 
-    def unchanged(self, chosen: ChosenProject) -> Document | None:
-        """Return the line of the summary of a result that can be trusted; None when the project must be computed."""
+    def unchanged(self, chosen: ChosenProject, *, with_page: bool = False) -> Document | None:
+        """Return the line of the summary of a result that can be trusted; None when the project must be computed.
+
+        with_page: whether its report must be there as a page, too.
+        """
         place = self.path / chosen.output
         _sweep(place)
         record = self._record(place)
@@ -67,6 +71,8 @@ class ResultFolder:
         if chosen.project not in inputs or not all(_is(Path(name), content) for name, content in inputs.items()):
             return None
         outputs = record["outputs"]
+        if with_page and PAGE not in outputs:
+            return None
         if "result.json" not in outputs or not all(_is(place / name, content) for name, content in outputs.items()):
             return None
         outcome: Document = record["outcome"]

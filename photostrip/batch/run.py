@@ -92,9 +92,10 @@ class Run:
         *,
         force: bool,
         strict: bool = False,
+        html: bool = False,
     ) -> None:
         self.projects, self.overrides, self.folder = projects, tuple(overrides), folder
-        self.force, self.strict = force, strict
+        self.force, self.strict, self.html = force, strict, html
         self.batch = Batch([named(not_run(), chosen, written=folder is not None) for chosen in projects])
 
     def go(self, executor: Executor, listener: Listener, stop: Stop) -> Batch:
@@ -118,7 +119,7 @@ class Run:
                 return
             outcome = self._without_computing(chosen)
             if outcome is None:
-                yield Task(chosen.number, chosen.project, self.overrides)
+                yield Task(number=chosen.number, project=chosen.project, overrides=self.overrides, html=self.html)
             else:
                 self._note(chosen, outcome, None, listener)
                 yield None
@@ -127,7 +128,7 @@ class Run:
         """Return the outcome of a project that need not, or must not, be computed; None: compute it."""
         if self.folder is None or self.force:
             return None
-        outcome = self.folder.unchanged(chosen)
+        outcome = self.folder.unchanged(chosen, with_page=self.html)
         if outcome is not None:
             self.batch.unchanged += 1
             return outcome

@@ -19,6 +19,7 @@ class Task:
     number: int
     project: str  # path of the project file as the user knows it
     overrides: tuple[str, ...] = ()
+    html: bool = False  # whether its report is wanted as a page, too
     parcel: Parcel | None = None  # its files, when it goes to another machine; None: they are read from the disk
 
 

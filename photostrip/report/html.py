@@ -14,9 +14,11 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
+from photostrip.report.commands.batch import batch_page_sections
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.links import link
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.pictures.batch_map import batch_maps
 from photostrip.report.pictures.result.pictures import SECTIONS, pictures_of
 from photostrip.report.sections.document import named_sections, title_of
 from photostrip.visible import visible
@@ -51,9 +53,16 @@ def methods_html(document: Document) -> str:
     return sections_html(f"Methods: {document['name']}", document["version"], methods_sections(document))
 
 
-def sections_html(title: str, version: str, sections: Iterable[Section], pictures: Sequence[Picture] = ()) -> str:
+def batch_html(outcomes: Sequence[Document], version: str) -> str:
+    """Return the summary of a batch as a page that leads to the reports."""
+    verdict, *others = batch_page_sections(outcomes)
+    named = [("verdict", verdict), *(("", section) for section in others)]
+    return _page("Batch", version, _sections(named, batch_maps(outcomes)))
+
+
+def sections_html(title: str, version: str, sections: Iterable[Section]) -> str:
     """Return a report of another command as one page."""
-    return _page(title, version, _sections([("", section) for section in sections], pictures))
+    return _page(title, version, _sections([("", section) for section in sections], []))
 
 
 def _page(title: str, version: str, sections: list[Document]) -> str:
@@ -132,7 +141,11 @@ def _parts(parts: Iterable[Part]) -> Iterator[Document]:
         elif isinstance(part, Facts):
             yield {"kind": "facts", "rows": part.rows}
         elif isinstance(part, Table):
-            rows = [{"cells": cells, "id": "", "findings": []} for cells in part.rows]
+            pages = part.pages or ("",) * len(part.rows)
+            rows = [
+                {"cells": cells, "id": "", "findings": [], "page": page}
+                for cells, page in zip(part.rows, pages, strict=True)
+            ]
             yield {"kind": "table", "columns": part.columns, "rows": rows, "foot": part.foot, "note": part.note}
     yield from _list(waiting)
 

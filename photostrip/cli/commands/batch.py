@@ -42,6 +42,9 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = BatchFormat.TEXT,
     width: Width = None,
     depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make.")] = None,
+    html: Annotated[
+        bool, typer.Option("--html", help="Write summary.html into DIR, and report.html for each project.")
+    ] = False,
     strict: Strict = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -49,7 +52,8 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """Adjust many projects, each in a process of its own, and sum them up.
 
     With -o, the result of each project goes into a folder of its own below DIR, and DIR gets summary.txt, summary.csv,
-    summary.json and junit.xml. A failure does not stop the other projects. What has not changed since it was last
+    summary.json and junit.xml; with --html also summary.html, with a map and links to a report.html for each
+    project. A failure does not stop the other projects. What has not changed since it was last
     computed is not computed again; a batch that was interrupted or killed goes on where it was. The exit code is that
     of the worst project, the highest: 0, 1, 2, 3 or 70.
     """
@@ -59,6 +63,12 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
 
     if depfile is not None and output is None:
         raise typer.BadParameter("a rule for make needs a target: give --output as well", param_hint="--depfile")
+    if html:
+        if output is None:
+            raise typer.BadParameter("summary.html needs a folder: give --output as well", param_hint="--html")
+        from photostrip.report.html import check_html
+
+        check_html()
     if executor != "local" and not executor.startswith("dask:"):
         raise typer.BadParameter(f"'{executor}' is not 'local' and does not begin with 'dask:'", param_hint="executor")
     try:
@@ -77,5 +87,6 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
         force=force,
         depfile=depfile,
         strict=strict,
+        html=html,
     )
     return run_batch(options, form, width, quiet=quiet, verbose=verbose)

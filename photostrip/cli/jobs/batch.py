@@ -7,6 +7,7 @@ import sys
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
+from photostrip import __version__
 from photostrip.batch.local_pool import Executor, LocalPool
 from photostrip.batch.result_folder import ResultFolder, opened
 from photostrip.batch.run import Batch, Run, Stop, on_signals
@@ -44,6 +45,7 @@ class BatchOptions:
     force: bool
     depfile: Path | None
     strict: bool
+    html: bool = False
 
 
 def cores() -> int:
@@ -63,7 +65,7 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
             if options.output is not None:
                 folder = stack.enter_context(opened(options.output, options.overrides))
         table = stack.enter_context(batch_table(sys.stderr, len(projects), quiet=quiet))
-        run = Run(projects, options.overrides, folder, force=options.force, strict=options.strict)
+        run = Run(projects, options.overrides, folder, force=options.force, strict=options.strict, html=options.html)
         trouble: list[PhotostripError] = []
         try:
             with executor_of(options, len(projects), table) as executor:
@@ -75,7 +77,7 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
             code = max((run.batch.exit_code, *(each.exit_code for each in trouble)))
             code = EXIT_SIGNAL + stop.signal if stop.signal else code
             if folder is not None:
-                trouble += write_summaries(run.batch, code, folder)
+                trouble += write_summaries(run.batch, code, folder, html=options.html)
     print_summary(run.batch.outcomes, code, form, width, quiet=quiet, verbose=verbose)
     if options.depfile is not None and options.output is not None:
         write_text(options.depfile, make_rule(options.output / "summary.json", run.files_read()))
@@ -124,14 +126,20 @@ class BatchMessages:
         self.table.say(f"{count}  {outcome_line(outcome)}{how}\n{trace}".rstrip("\n"))
 
 
-def write_summaries(batch: Batch, code: int, folder: ResultFolder) -> list[InputError]:
+def write_summaries(batch: Batch, code: int, folder: ResultFolder, *, html: bool = False) -> list[InputError]:
     """Write the files of the summary; give what went wrong, which must not hide what became of the projects."""
+    pages = {}
+    if html:
+        from photostrip.report.html import batch_html
+
+        pages["summary.html"] = batch_html(batch.outcomes, __version__)
     try:
         write_files(
             folder.path,
             {
                 "summary.txt": text.to_text("", batch_sections(batch.outcomes, everything=True)),
                 "summary.csv": formats.summary_csv(batch.outcomes),
+                **pages,
                 "junit.xml": batch_junit(batch.outcomes),
                 "summary.json": formats.summary_json(batch.outcomes, code),
             },

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from photostrip.notes import counted
 from photostrip.report.page.junit import Case, to_junit
@@ -52,6 +54,20 @@ def batch_sections(outcomes: Sequence[Document], *, quiet: bool = False, everyth
     return [*sections, Section("Verdict" if sections else "", (Words(counts(outcomes), _style(outcomes)),))]
 
 
+def batch_page_sections(outcomes: Sequence[Document]) -> list[Section]:
+    """Return the summary as sections of a page: every project with a link to its report, then the worst things."""
+    table = tabulated(outcomes, COLUMNS)
+    pages = tuple(f"{quote(each['output'])}/report.html" if each["output"] else "" for each in outcomes)
+    found = [
+        Section("Verdict", (Words(counts(outcomes), _style(outcomes)),)),
+        Section("Projects", (replace(table, pages=pages),)),
+    ]
+    worst = [each for each in _worst_first(outcomes) if each["messages"]]
+    if worst:
+        found.append(Section("The worst things", tuple(_messages(worst[:ROWS], everything=False))))
+    return found
+
+
 def _worst_first(outcomes: Sequence[Document]) -> list[Document]:
     return sorted(outcomes, key=lambda each: ORDER.index(each["status"]))
 
@@ -73,7 +89,7 @@ def _messages(wrong: Sequence[Document], *, everything: bool) -> list[Words]:
     found = []
     for each in shown:
         messages = each["messages"] if everything else each["messages"][:MESSAGES]
-        found.append(Words(f"{each['project']}: {each['status']}", "failed"))
+        found.append(Words(f"{each['project']}: {each['status']}", STYLES.get(each["status"], "failed")))
         found += [Words(message, mark="-") for message in messages]
         if len(each["messages"]) > len(messages):
             found.append(Words(f"and {len(each['messages']) - len(messages)} more", mark="-"))

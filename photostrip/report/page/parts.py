@@ -23,6 +23,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     foot: tuple[tuple[str, ...], ...] = ()
     note: str = ""  # a sentence below: what is not shown, and where it is
+    pages: tuple[str, ...] = ()  # of each row, the page to which it leads, or empty; where a page is shown
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import xml.etree.ElementTree as ET
 from io import StringIO
 from typing import TYPE_CHECKING
@@ -309,3 +310,19 @@ def test_a_project_that_is_not_there_is_a_fault_among_others(here: Path) -> None
     done = run(here, "strips/s1", "strips/s9/project.yaml", "--format", "csv", "--quiet")
     assert done.returncode == 2
     assert [row["status"] for row in csv.DictReader(StringIO(done.stdout))] == ["good", "faulty"]
+
+
+@pytest.mark.slow
+def test_a_page_leads_to_the_reports(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["batch", "strips/s1", "-o", "results"]
+    assert main([*asked, "--quiet"]) == 0
+    assert not (here / "results/summary.html").exists()
+    assert main([*asked, "--html"]) == 0
+    assert "unchanged" not in capsys.readouterr().err, "it had no report as a page yet"
+    page = (here / "results/summary.html").read_text(encoding="utf-8")
+    (target,) = re.findall(r'<a href="([^"#]+)"', page)
+    assert (here / "results" / target).read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert main([*asked, "--html"]) == 0
+    assert "1 unchanged" in capsys.readouterr().err
+    assert (here / "results/summary.html").read_text(encoding="utf-8") == page
+    assert main(["batch", "strips/s1", "--html"]) == 2

@@ -1,0 +1,71 @@
+"""Where the strips of a batch lie: a picture for each body, the strips of all projects by their verdicts."""
+
+from __future__ import annotations
+
+from math import cos, radians
+from typing import TYPE_CHECKING
+
+from photostrip.notes import counted
+from photostrip.report.pictures import svg
+from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
+from photostrip.report.pictures.ground.sheet import bars, sheet_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from photostrip.report.page.parts import Document
+
+MARGIN = 60.0
+NAMED = 40  # projects whose names are written
+SHAPES = {"good": "dot", "unverified": "square", "look": "diamond", "failed": "triangle"}
+
+
+def batch_maps(outcomes: Sequence[Document]) -> list[svg.Picture]:
+    """Draw the projects whose place on a body is known; of several bodies, that of the most projects first."""
+    bodies: dict[float, list[Document]] = {}
+    for each in outcomes:
+        if each.get("track"):
+            bodies.setdefault(each["body"], []).append(each)
+    ranked = sorted(bodies.values(), key=len, reverse=True)
+    return [_map(number, projects) for number, projects in enumerate(ranked, 1)]
+
+
+def _map(number: int, projects: Sequence[Document]) -> svg.Picture:
+    ends = [end for each in projects for strip in each["track"] for end in strip]
+    middle = sum(latitude for _, latitude in ends) / len(ends)
+    degree = radians(1.0) * projects[0]["body"]
+    narrow = cos(radians(middle))
+
+    def ground(end: Sequence[float]) -> tuple[float, float]:
+        return degree * narrow * end[0], degree * end[1]
+
+    sheet = sheet_of([ground(end) for end in ends], MARGIN)
+    found = [*legend(_entries(projects)), *bars(sheet)]
+    for each in projects:
+        found += [
+            svg.line(sheet.place(ground(one)), sheet.place(ground(other)), f"track {each['status']}")
+            for one, other in each["track"]
+        ]
+        spot = sheet.place(ground(each["track"][0][0]))
+        hint = f"{each['project']}: {each['status']}"
+        found.append(svg.mark(spot, SHAPES[each["status"]], f"verdict-mark {each['status']}", hint))
+        if len(projects) <= NAMED:
+            side, anchor = (-8.0, "end") if spot[0] > WIDTH / 2 else (8.0, "start")
+            found.append(svg.text((spot[0] + side, spot[1] - 6.0), _name(each), "id", anchor))
+    places = ", ".join(f"{_name(each)} ({each['status']})" for each in projects[:NAMED])
+    texts = svg.Texts(
+        f"{counted(len(projects), 'project')} on a body of {projects[0]['body'] / 1000:.0f} km radius",
+        f"A line for each strip, a mark at its first photo; north is up, true lengths at latitude {middle:.1f}°",
+        f"Strips of {places}",
+    )
+    return svg.picture(f"map-{number}", (WIDTH, max(sheet.height, TOP)), texts, found)
+
+
+def _entries(projects: Iterable[Document]) -> list[Entry]:
+    there = {each["status"] for each in projects}
+    return [Entry(status, f"verdict-mark {status}", shape) for status, shape in SHAPES.items() if status in there]
+
+
+def _name(outcome: Document) -> str:
+    """Return the folder of a project, by which its result is called."""
+    return str(outcome["output"] or outcome["project"])
