@@ -110,6 +110,10 @@ def test_nothing_is_loaded_from_elsewhere() -> None:
     assert "@import" not in CSS
 
 
+def test_the_reader_needs_no_other_file() -> None:
+    assert [words for words in page().words if re.search(r"result\.json|--\w|\.csv", words)] == []
+
+
 def test_ids_are_there_once_and_links_lead_to_them() -> None:
     ids = [attributes["id"] for _, attributes in page().elements if "id" in attributes]
     assert len(ids) == len(set(ids))

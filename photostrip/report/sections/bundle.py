@@ -27,7 +27,7 @@ CORRELATIONS_SHOWN = 12
 NAMED = 6
 
 
-def bundle_sections(document: Document) -> list[Section]:
+def bundle_sections(document: Document, *, everything: bool) -> list[Section]:
     """Return the sections of a bundle adjustment; none without the block ``bundle``."""
     block = document.get("bundle")
     if block is None:
@@ -36,7 +36,7 @@ def bundle_sections(document: Document) -> list[Section]:
     if block["variance_components"]:
         found.append(_components(block["variance_components"]))
     if block["calibration"] or block["corrections"]:
-        found.append(_parameters(block))
+        found.append(_parameters(block, everything=everything))
     return found
 
 
@@ -170,7 +170,7 @@ CORRELATIONS = (
 )
 
 
-def _parameters(block: Document) -> Section:
+def _parameters(block: Document, *, everything: bool) -> Section:
     """Calibration parameters, offsets and drifts, and what is hard to tell apart."""
     parts: list[Part] = []
     if block["calibration"]:
@@ -180,7 +180,8 @@ def _parameters(block: Document) -> Section:
         note = "added to the given positions of a strip; a drift is per unit of time"
         parts.append(tabulated(block["corrections"], CORRECTIONS, note=note))
     if block["correlations"]:
-        more = len(block["correlations"]) - CORRELATIONS_SHOWN
+        shown = block["correlations"] if everything else block["correlations"][:CORRELATIONS_SHOWN]
+        more = len(block["correlations"]) - len(shown)
         note = f"{counted(more, 'more pair')} in `bundle.correlations`" if more > 0 else ""
-        parts.append(tabulated(block["correlations"][:CORRELATIONS_SHOWN], CORRELATIONS, note=note))
+        parts.append(tabulated(shown, CORRELATIONS, note=note))
     return Section("Parameters that photos share", tuple(parts))

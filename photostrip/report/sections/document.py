@@ -103,7 +103,7 @@ def _of_the_strips(document: Document, *, everything: bool) -> Iterator[tuple[Se
         yield SectionName.POLYNOMIAL, polynomial_section(document, everything=everything)
     if "covariance" in document:
         yield SectionName.COVARIANCE, covariance_section(document, everything=everything)
-    yield from ((SectionName.BUNDLE, each) for each in bundle_sections(document))
+    yield from ((SectionName.BUNDLE, each) for each in bundle_sections(document, everything=everything))
 
 
 def _of_the_accuracy(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:

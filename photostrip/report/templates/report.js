@@ -6,6 +6,7 @@ for (const table of document.querySelectorAll("main table")) {
   const size = (words) => /^[<+-]?[\d.]/.test(words) ? parseFloat(words.replace(/^[<+]/, "")) : NaN;
   const heads = [...table.tHead.rows[0].cells];
   heads.forEach((head, n) => {
+    if (!head.textContent) return;
     const button = document.createElement("button");
     button.type = "button";
     button.append(...head.childNodes);
