@@ -1,7 +1,8 @@
 """Frozen dataclasses, made without compiling code.
 
 The decorator of the standard library writes and compiles four functions for each class, 0.5 ms; a run loads 150. Here
-all classes share theirs. For type checkers, ``fields``, ``replace`` and ``asdict`` they are dataclasses.
+all classes share theirs, and the standard library sees a class when it is asked for its fields. For type checkers,
+``fields``, ``replace`` and ``asdict`` they are dataclasses.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["dataclass"]
 
 T = TypeVar("T")
+FIELDS = "__dataclass_fields__"  # where the standard library keeps them
 
 
 def _dataclass(*, frozen: bool, eq: bool = True) -> Callable[[type[T]], type[T]]:
@@ -26,23 +28,62 @@ def _dataclass(*, frozen: bool, eq: bool = True) -> Callable[[type[T]], type[T]]
         shared |= {"__eq__": _same, "__hash__": _hash}
 
     def made(cls: type[T]) -> type[T]:
-        dataclasses.dataclass(init=False, repr=False, eq=False)(cls)
-        for name, function in {"__init__": _builder(cls), **shared}.items():
+        for name, function in {"__init__": _builder(cls), **shared, FIELDS: _Fields(cls)}.items():
             setattr(cls, name, function)
         return cls
 
     return made
 
 
+class _Fields:
+    """Stands for the fields of a class until somebody asks for them."""
+
+    def __init__(self, cls: type) -> None:
+        self.cls = cls
+
+    def __get__(self, value: object, owner: type) -> object:
+        dataclasses.dataclass(init=False, repr=False, eq=False)(self.cls)  # puts the fields in the place of this
+        return vars(self.cls)[FIELDS]
+
+
+def _declared(cls: type) -> dict[str, Any]:
+    """Fields of a class and those above it: default, or ``Field``, or nothing."""
+    found: dict[str, Any] = {}
+    for each in reversed(cls.__mro__):
+        own = vars(each)
+        if isinstance(own.get(FIELDS), _Fields):
+            kinds = own.get("__annotations__", {}).items()
+            names = (name for name, kind in kinds if not str(kind).startswith("ClassVar"))
+            found.update((name, own.get(name, dataclasses.MISSING)) for name in names)
+        else:
+            found.update(own.get(FIELDS, {}))
+    return found
+
+
+def _values_left_out(cls: type) -> tuple[dict[str, None], dict[str, Any], dict[str, Callable[[], object]]]:
+    """Names of all fields, defaults, and functions that make one."""
+    names: dict[str, None] = {}
+    defaults: dict[str, Any] = {}
+    factories: dict[str, Callable[[], object]] = {}
+    for name, declared in _declared(cls).items():
+        names[name] = None
+        default = declared.default if isinstance(declared, dataclasses.Field) else declared
+        if default is not dataclasses.MISSING:
+            defaults[name] = default
+        elif callable(factory := getattr(declared, "default_factory", None)):
+            factories[name] = factory
+    return names, defaults, factories
+
+
 def _builder(cls: type) -> Callable[..., None]:
     """Make the ``__init__`` of a class."""
-    fields = dataclasses.fields(cls)
-    names = {each.name: None for each in fields}
-    defaults = {each.name: each.default for each in fields if each.default is not dataclasses.MISSING}
-    factories = {each.name: each.default_factory for each in fields if callable(each.default_factory)}
+    known: list[tuple[dict[str, None], dict[str, Any], dict[str, Callable[[], object]]]] = []
     finish = getattr(cls, "__post_init__", None)
 
     def build(self: object, *values: object, **named: object) -> None:
+        if not known:
+            known.append(_values_left_out(cls))
+        names, defaults, factories = known[0]
         given = dict(zip(names, values, strict=False))
         state = {**defaults, **given, **named}
         for name, factory in factories.items():
