@@ -33,23 +33,38 @@ def to_json(document: Document, *, ascii_only: bool = False) -> str:
     Each element of a list of records stands on a line of its own, so that results can be compared line by line.
     """
     encode = _encode_ascii if ascii_only else _encode
-    body = ",\n".join(f"{encode(key)}: {_block(value, encode)}" for key, value in document.items())
-    return visible_json(f"{{\n{body}\n}}\n")
+    return visible_json("".join(_pieces(document, encode)))
 
 
-def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
+def _pieces(document: Document, encode: Callable[[Plain], str]) -> Iterator[str]:
+    """Give the text piece by piece, to be joined once: a text of many points is not copied from block to whole."""
+    before = "{\n"
+    for key, value in document.items():
+        yield f"{before}{encode(key)}: "
+        yield from _block(value, encode)
+        before = ",\n"
+    yield "\n}\n"
+
+
+def _block(value: Plain, encode: Callable[[Plain], str]) -> Iterator[str]:
     if isinstance(value, Records) and len(value):
-        return "[\n" + ",\n".join(_lines(value, encode)) + "\n]"
+        for start in range(0, len(value), LINES):
+            yield ",\n" if start else "[\n"
+            yield ",\n".join(_lines(value[start : start + LINES], encode))
+        yield "\n]"
+        return
     if isinstance(value, list) and value and isinstance(value[0], dict):
         # One call for the whole list, lines broken afterwards, in front of the first key of each record. Inside a
         # string these signs cannot stand, its quotation marks being escaped; between records a line feed is a blank.
         begin = f"{{{encode(next(iter(value[0])))}: "
-        return "[\n" + encode(value)[1:-1].replace(f"}}, {begin}", f"}},\n{begin}") + "\n]"
+        yield "[\n" + encode(value)[1:-1].replace(f"}}, {begin}", f"}},\n{begin}") + "\n]"
+        return
     if isinstance(value, dict):
         parts = [f"{encode(key)}: {_text(each, encode)}" for key, each in value.items()]
         if sum(map(len, parts)) + 2 * len(parts) > LINE:
-            return "{\n" + ",\n".join(f"  {part}" for part in parts) + "\n}"
-    return _text(value, encode)
+            yield "{\n" + ",\n".join(f"  {part}" for part in parts) + "\n}"
+            return
+    yield _text(value, encode)
 
 
 def _text(value: Plain, encode: Callable[[Plain], str]) -> str:
@@ -62,11 +77,9 @@ def _text(value: Plain, encode: Callable[[Plain], str]) -> str:
 
 
 def _lines(records: Records, encode: Callable[[Plain], str]) -> Iterator[str]:
-    """Write records from their columns, so many at a time that they take no memory to speak of."""
+    """Write records from their columns."""
     line = f"{{{', '.join(f'{encode(key)}: %s' for key in records.columns)}}}"
-    for start in range(0, len(records), LINES):
-        some = records[start : start + LINES]
-        yield from (line % row for row in zip(*(_cells(each, encode) for each in some.columns.values()), strict=True))
+    return (line % row for row in zip(*(_cells(each, encode) for each in records.columns.values()), strict=True))
 
 
 def _cells(column: Sequence[Plain], encode: Callable[[Plain], str]) -> Iterable[Plain]:

@@ -9,12 +9,13 @@ import numpy as np
 from photostrip.frozen import dataclass
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.error_propagation import control_errors, covariances
+from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 from photostrip.triangulation.error_propagation.joint_covariances import after_fit
+from photostrip.triangulation.error_propagation.photo_errors import differentiate_photos
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.error_propagation.covariances import ParameterCovariances
-    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
+    from photostrip.triangulation.error_propagation.photo_errors import PhotoErrors, Sightings
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+    from photostrip.triangulation.resection.resection import Resection
 
 LARGEST = 100  # check points of a strip that are tested together, spread over it
 
@@ -37,9 +39,12 @@ class Propagation:
     control: control_errors.Misclosures  # control coordinates that count
     fit: control_errors.FitOperator
     influence: Floats  # (q, 3, t): points by the parameters of the fit
-    photos: ErrorRows  # photos that could be oriented
-    photo_influence: Floats  # (k, 6, t): the same of them
-    oriented: Numbers  # (k,): their places in the strip
+    sightings: Sightings  # of the points on the photos
+    resection: Resection
+
+    def photos(self) -> Iterator[PhotoErrors]:
+        """Rows of the photos that could be oriented, some at a time."""
+        return differentiate_photos(self.errors, self.sightings, self.resection, self.influence)
 
 
 class CheckPoints(NamedTuple):
@@ -89,8 +94,7 @@ def by_fit(
     """
     at = compared.coordinates
     influence = np.einsum("wi,wit->wt", at.direction, found.influence[compared.checks.rows][at.point])
-    along = covariances.along_strip(found.errors)
-    return _errors(compared, after_fit(found.errors, at.rows, along, parameters, influence), factor)
+    return _errors(compared, after_fit(found.errors, at.rows, parameters, influence), factor)
 
 
 def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> CheckErrors:

@@ -42,7 +42,8 @@ def of_photos(
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
     points = covariances.covariances(errors, errors.points, parameters, found.influence) * factor
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
-    photos[found.oriented] = covariances.covariances(errors, found.photos, parameters, found.photo_influence) * factor
+    for some in found.photos():
+        photos[some.photos] = covariances.covariances(errors, some.rows, parameters, some.influence) * factor
     compared = check_points.compare_with_checks(strip, errors, checks, oriented.frames)
     axes = strip.intermediate.axes
     return StripPrecision(
@@ -97,13 +98,11 @@ def propagation(strip: StripResult, oriented: OrientedStrip[StripErrors], observ
         xyz=strip.xyz[point],
         focal=flown.camera.principal_distance,
     )
-    photos = photo_errors.differentiate_photos(errors, sightings, strip.of_photos.resection, influence)
     return Propagation(
         errors=errors,
         control=found,
         fit=fit,
         influence=influence,
-        photos=photos.rows,
-        photo_influence=photos.influence,
-        oriented=photos.photos,
+        sightings=sightings,
+        resection=strip.of_photos.resection,
     )

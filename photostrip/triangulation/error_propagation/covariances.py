@@ -60,6 +60,7 @@ class ParameterCovariances:
     components: Floats  # (p, 6, t): with the error components
     images: Floats  # (n, 2, t): with the image coordinates
     parameters: Floats  # (t, t): among themselves
+    along: SimilarityCovariances  # of the formed strip
 
 
 def along_strip(errors: StripErrors) -> SimilarityCovariances:
@@ -99,6 +100,7 @@ def of_parameters(
         components=sums.with_components,
         images=with_images,
         parameters=(parameters + parameters.T) / 2,
+        along=along_strip(errors),
     )
 
 
@@ -183,12 +185,11 @@ def covariances(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances,
     ``influence`` (n, d, t) is Phi, what each fitted parameter subtracts (eq. 6): Cov = S - C Phi^T - Phi C^T +
     Phi Sigma Phi^T with S of the formed strip, C with the parameters.
     """
-    along = along_strip(errors)
     size = rows.by_similarity.shape[1]
     result = np.empty((len(rows.first), size, size))
     for start, stop in _slices(rows):
         part, phi = rows.part(start, stop), influence[start:stop]
-        formed = _formed(errors, part, along)
+        formed = _formed(errors, part, fit.along)
         mixed = with_parameters(part, fit) @ phi.transpose(0, 2, 1)
         result[start:stop] = formed - mixed - mixed.transpose(0, 2, 1) + phi @ fit.parameters @ phi.transpose(0, 2, 1)
     return result

@@ -58,15 +58,13 @@ def joint_covariance(errors: StripErrors, rows: ErrorRows, along: SimilarityCova
     return result
 
 
-def after_fit(
-    errors: StripErrors, rows: ErrorRows, along: SimilarityCovariances, fit: ParameterCovariances, influence: Floats
-) -> Floats:
+def after_fit(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, influence: Floats) -> Floats:
     """Covariances (n, n) of rows with d = 1 less what the fit to the control takes away, as eq. 6 has them.
 
     ``influence``: (n, t), what each fitted parameter subtracts.
     """
     mixed = with_parameters(rows, fit)[:, 0] @ influence.T
-    return joint_covariance(errors, rows, along) - mixed - mixed.T + influence @ fit.parameters @ influence.T
+    return joint_covariance(errors, rows, fit.along) - mixed - mixed.T + influence @ fit.parameters @ influence.T
 
 
 def _components(errors: StripErrors, rows: ErrorRows, models: Numbers) -> Floats:

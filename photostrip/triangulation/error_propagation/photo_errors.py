@@ -16,6 +16,8 @@ from photostrip.triangulation.resection.collinearity import partials
 from photostrip.triangulation.resection.resection import runs
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
     from photostrip.triangulation.resection.resection import Resection
@@ -40,7 +42,7 @@ class Sightings:
 
 @dataclass(frozen=True, eq=False)
 class PhotoErrors:
-    """Errors of the k photos that were oriented: centre, then small rotation, in the frame of the ground."""
+    """Errors of k photos that were oriented: centre, then small rotation, in the frame of the ground."""
 
     rows: ErrorRows  # d = 6
     influence: Floats  # (k, 6, t): what the parameters fitted to the control take away
@@ -49,23 +51,19 @@ class PhotoErrors:
 
 def differentiate_photos(
     errors: StripErrors, sightings: Sightings, resection: Resection, point_influence: Floats
-) -> PhotoErrors:
-    """Differentiate the resections; ``point_influence`` (q, 3, t) is what the fit takes away from the points.
+) -> Iterator[PhotoErrors]:
+    """Differentiate the resections, some photos at a time: all their rows together are the largest table of a run.
+
+    point_influence: (q, 3, t), what the fit takes away from the points.
 
     The points carry the photo with them, and its measurements move it once more: do = sum by_point dX + by_image dl.
     """
     sightings = sightings.take(resection.solved[sightings.photo])
     distance = float(np.linalg.norm(sightings.xyz - resection.centers[sightings.photo], axis=1).mean())
     ends = np.searchsorted(sightings.photo, np.arange(len(resection.centers) + 1))
-    parts = [
-        _some_photos(errors, sightings.take(np.arange(ends[low], ends[high])), resection, point_influence, distance)
-        for low, high in runs(ends, SIGHTINGS)
-    ]
-    return PhotoErrors(
-        rows=ErrorRows.joined([part.rows for part in parts]),
-        influence=np.concatenate([part.influence for part in parts]),
-        photos=np.concatenate([part.photos for part in parts]),
-    )
+    for low, high in runs(ends, SIGHTINGS):
+        some = sightings.take(np.arange(ends[low], ends[high]))
+        yield _some_photos(errors, some, resection, point_influence, distance)
 
 
 def _some_photos(

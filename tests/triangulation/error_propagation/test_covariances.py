@@ -60,7 +60,8 @@ def test_derivatives_are_those_of_the_whole_run(
     images, operator = found.errors.images, found.fit.operator
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
     points = written_out(found.errors.points, found.errors) - found.influence @ operator @ misclosures
-    photos = written_out(found.photos, found.errors) - found.photo_influence @ operator @ misclosures
+    (of_photos,) = found.photos()
+    photos = written_out(of_photos.rows, found.errors) - of_photos.influence @ operator @ misclosures
     rng = np.random.default_rng(2)
     for image in nonempty(rng.choice(len(images.row), 4, replace=False).tolist()):
         axis = int(rng.integers(2))
@@ -97,9 +98,10 @@ def test_sums_along_the_strip_equal_the_whole_matrices(photos: int, lap: float, 
     factor = 1.7
     fit = precision.of_parameters(found.errors, found.control, found.fit.operator, factor)
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
+    (of_photos,) = found.photos()
     for rows, influence in (
         (found.errors.points, found.influence),
-        (found.photos, found.photo_influence),
+        (of_photos.rows, of_photos.influence),
     ):
         by_control = influence @ found.fit.operator
         by_image = written_out(rows, found.errors) - by_control @ misclosures
@@ -134,10 +136,11 @@ def test_a_photo_goes_where_all_its_points_go() -> None:
     result = triangulate(without_noise(spec(6)), settings("similarity"))
     found = errors_of(result)
     centers = result.strips[0].of_photos.resection.centers - found.errors.origin
-    assert found.photos.by_similarity[:, :3, :3] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
-    assert found.photos.by_similarity[:, :3, 6] == pytest.approx(centers, abs=1e-6)
-    assert found.photos.by_similarity[:, 3:, 3:6] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
-    assert found.photos.by_similarity[:, 3:, [0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-9)
+    (photos,) = found.photos()
+    assert photos.rows.by_similarity[:, :3, :3] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
+    assert photos.rows.by_similarity[:, :3, 6] == pytest.approx(centers, abs=1e-6)
+    assert photos.rows.by_similarity[:, 3:, 3:6] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
+    assert photos.rows.by_similarity[:, 3:, [0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.slow

@@ -58,4 +58,4 @@ def test_joint_covariances_are_products_of_whole_rows(
         by_control = influence @ found.fit.operator
         left = whole - by_control @ misclosures
         expected = left @ left.T + (by_control * found.control.variance / factor) @ by_control.T
-        assert close(joint_covariances.after_fit(errors, rows, along, fit, influence), expected)
+        assert close(joint_covariances.after_fit(errors, rows, fit, influence), expected)
