@@ -42,6 +42,21 @@ def test_console_blocks_are_run_or_say_why_not(page: Path) -> None:
     assert [block.place for block in silent if not block.above.startswith("<!--")] == [], "say above why it is not run"
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_formulas_stand_alone(page: Path) -> None:
+    """A formula between lines of two dollars has empty lines around it; signs of others come in pairs."""
+    inside = {number for block in blocks(page) for number in range(block.line - 2, block.line + len(block.lines) + 1)}
+    lines = ["", *page.read_text(encoding="utf-8").splitlines(), ""]
+    marks = [number for number, line in enumerate(lines) if line == "$$" and number not in inside]
+    around = [number - 1 for number in marks[::2]] + [number + 1 for number in marks[1::2]]
+    assert [number for number in around if lines[number]] == []
+    within = {number for first, last in zip(marks[::2], marks[1::2], strict=True) for number in range(first, last + 1)}
+    prose = "\n".join(line for number, line in enumerate(lines) if number not in inside | within)
+    text = re.sub(r"`[^`]*`", "", prose)
+    assert [each for each in text.split("\n\n") if each.count("$") % 2] == []
+    assert not re.search(r"\$\s[^$]*\\|\\operatorname", text)
+
+
 def test_the_site_has_every_page_in_its_menu() -> None:
     menu = re.findall(r'"([\w/-]+\.md)"', (ROOT / "zensical.toml").read_text(encoding="utf-8"))
     assert len(menu) == len(set(menu))
