@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from photostrip.library.project import assignments_of, reading_from
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from os import PathLike
 
     from photostrip.result.numbers import Document
@@ -20,9 +20,11 @@ PlanKind = Literal["model", "strip", "camera", "displacement", "screening"]
 class Plan:
     """What a plan lets expect."""
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Document, files: Iterable[str] = ()) -> None:
         self.document = document
         """What ``photostrip plan --format json`` prints."""
+        self.files = tuple(files)
+        """Every file that was read."""
 
     def report(self, form: Literal["text", "md"] = "text") -> str:
         """Return the plan as text or Markdown."""
@@ -51,12 +53,14 @@ def plan(
 
     assignments = assignments_of(overrides)
     if isinstance(specification, Mapping):
-        with reading_from(source_of(SPECIFICATION, specification, {})):
-            return Plan(_document(kind, Path(SPECIFICATION), assignments))
-    return Plan(_document(kind, None if specification is None else Path(specification), assignments))
+        number = f"photostrip_plan_{'cameras' if kind == 'camera' else kind}"  # of the schema
+        with reading_from(source_of(SPECIFICATION, {number: 1, **specification}, {})):
+            return planned(kind, Path(SPECIFICATION), assignments)
+    return planned(kind, None if specification is None else Path(specification), assignments)
 
 
-def _document(kind: str, path: Path | None, assignments: Sequence[str]) -> Document:
+def planned(kind: str, path: Path | None, assignments: Sequence[str]) -> Plan:
+    """Read a plan from its file, or from assignments to its keys alone, and compute it."""
     match kind:
         case "model":
             from photostrip.formats.output.plans.model import model_document
@@ -64,13 +68,14 @@ def _document(kind: str, path: Path | None, assignments: Sequence[str]) -> Docum
             from photostrip.project.plans.model import load_model_plan
 
             model = load_model_plan(path, assignments)
-            return model_document(model.name, model.camera, plan_model(model.spec), given_errors(model.spec), None)
+            document = model_document(model.name, model.camera, plan_model(model.spec), given_errors(model.spec), None)
+            return Plan(document, model.files)
         case "strip":
             from photostrip.formats.output.plans.strip import strip_document
             from photostrip.project.plans.strip import load_strip_plan
 
             strip = load_strip_plan(path, assignments)
-            return strip_document(strip.name, strip.computed())
+            return Plan(strip_document(strip.name, strip.computed()), strip.reading.files)
         case "camera":
             from photostrip.errors import Fault, InputError
             from photostrip.formats.output.plans.cameras import camera_document
@@ -79,19 +84,20 @@ def _document(kind: str, path: Path | None, assignments: Sequence[str]) -> Docum
             if path is None:
                 raise InputError(Fault("no cameras are given", "plan-cameras", fix="give a file or a mapping"))
             cameras = load_camera_plan(path, assignments)
-            return camera_document(cameras.name, cameras.cameras, cameras.reference, cameras.survey)
+            document = camera_document(cameras.name, cameras.cameras, cameras.reference, cameras.survey)
+            return Plan(document, cameras.files)
         case "displacement":
             from photostrip.formats.output.plans.displacement import displacement_document
             from photostrip.project.plans.displacement import load_displacement_plan
 
             survey = load_displacement_plan(path, assignments)
-            return displacement_document(survey.name, survey.spec)
+            return Plan(displacement_document(survey.name, survey.spec), survey.files)
         case "screening":
             from photostrip.formats.output.plans.screening import screening_document
             from photostrip.planning.screening import screening_experiment
             from photostrip.project.plans.screening import load_screening_plan
 
             experiment = load_screening_plan(path, assignments)
-            return screening_document(experiment.name, screening_experiment(experiment.spec))
+            return Plan(screening_document(experiment.name, screening_experiment(experiment.spec)), experiment.files)
     message = f"there is no plan {kind!r}: model, strip, camera, displacement or screening"
     raise ValueError(message)

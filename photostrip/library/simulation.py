@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from photostrip.library.project import Project, assignments_of, loaded_from, reading_from
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
     from os import PathLike
 
     from photostrip.formats.text.source import Source
@@ -19,10 +20,13 @@ KEY = "photostrip_simulation"  # number of the schema
 class Simulation:
     """A simulated project: its files, and the truth that they were made from."""
 
-    def __init__(self, files: Mapping[str, str], summary: str) -> None:
+    def __init__(self, files: Mapping[str, str], summary: str, read: Iterable[str] = ()) -> None:
         self.files = dict(files)
         """Content by name: project.yaml, its tables, truth.json."""
-        self._summary = summary
+        self.summary = summary
+        """What was simulated, in a line."""
+        self.files_read = tuple(read)
+        """Every file that was read."""
 
     @property
     def truth(self) -> dict[str, Any]:
@@ -51,7 +55,7 @@ class Simulation:
 
     def __repr__(self) -> str:
         """Say in a line what was simulated."""
-        return f"<Simulation: {self._summary}>"
+        return f"<Simulation: {self.summary}>"
 
 
 def simulate(
@@ -64,12 +68,19 @@ def simulate(
     overrides: keys with other values: ``flight={"photos": 20}, seed=3``.
     Raises InputError with every fault of the specification.
     """
-    from photostrip.formats.output.simulation import project_files, summary
     from photostrip.project.in_memory import SPECIFICATION, source_of
-    from photostrip.project.simulation import load_specification
 
     source = source_of(SPECIFICATION, {KEY: 1, **specification}, {}) if isinstance(specification, Mapping) else None
     path = Path(SPECIFICATION) if isinstance(specification, Mapping) else Path(specification)
     with reading_from(source):
-        found = load_specification(path, assignments_of(overrides)).simulate()
-    return Simulation(project_files(found), summary(found))
+        return simulated(path, assignments_of(overrides))
+
+
+def simulated(path: Path, assignments: Sequence[str]) -> Simulation:
+    """Read a specification and simulate it."""
+    from photostrip.formats.output.simulation import project_files, summary
+    from photostrip.project.simulation import load_specification
+
+    specification = load_specification(path, assignments)
+    found = specification.simulate()
+    return Simulation(project_files(found), summary(found), specification.reading.files)

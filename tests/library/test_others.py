@@ -90,7 +90,9 @@ def test_plans_are_those_of_the_command(
 def test_a_plan_of_cameras_from_a_mapping() -> None:
     cameras = {"wide": {"principal_distance": 152, "format": [230, 230], "image_sigma_um": 5}}
     plan = {"cameras": {**cameras, "normal": {**cameras["wide"], "principal_distance": 300}}}
-    assert "wide" in repr(photostrip.plan("camera", {"photostrip_plan_cameras": 1, **plan}))
+    assert "wide" in repr(photostrip.plan("camera", plan))
+    model = {"end_lap_percent": 70}
+    assert photostrip.plan("model", model).document == photostrip.plan("model", **model).document
     with pytest.raises(photostrip.InputError, match="no cameras are given"):
         photostrip.plan("camera")
     with pytest.raises(ValueError, match="there is no plan 'block'"):

@@ -23,14 +23,14 @@ PARAMETERS = {
 MEMBERS = {
     "Check": ["document", "faults", "findings", "notes", "ok"],
     "Comparison": ["differences", "document", "report", "same"],
-    "Plan": ["document", "report"],
+    "Plan": ["document", "files", "report"],
     "Project": ["check", "files_read", "loaded", "name", "overridden", "photos", "resolved", "run"],
     "Result": [
         "accuracy", "computed", "control", "covariance_of", "document", "files", "findings", "name", "notes", "pairs",
         "parallaxes", "photos", "points", "rejected", "report", "residuals", "statement", "status", "strips", "summary",
         "trace", "write",
     ],
-    "Simulation": ["files", "project", "truth", "write"],
+    "Simulation": ["files", "files_read", "project", "summary", "truth", "write"],
     "Table": ["columns", "meanings", "name", "to_arrow", "to_pandas", "units", "where"],
 }  # fmt: skip
 STEPS = [

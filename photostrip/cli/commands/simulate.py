@@ -23,15 +23,13 @@ def simulate(
     DIR gets project.yaml with its tables, and truth.json: the true coordinates, perspective centres and rotations,
     and the gross errors that were put in. The same SPEC gives the same files on every machine.
     """
-    from photostrip.formats.output.simulation import project_files, summary
-    from photostrip.formats.text.writing import make_rule, write_files, write_text
-    from photostrip.project.simulation import load_specification
+    from photostrip.formats.text.writing import make_rule, write_text
+    from photostrip.library.simulation import simulated
 
-    specification = load_specification(spec, assignments or [])
-    simulation = specification.simulate()
-    write_files(output, project_files(simulation))
+    simulation = simulated(spec, assignments or [])
+    simulation.write(output)
     target = str(output / "project.yaml")
     if depfile is not None:
-        write_text(depfile, make_rule(target, specification.reading.files))
+        write_text(depfile, make_rule(target, simulation.files_read))
     if not quiet:
-        typer.echo(f"{target}: {summary(simulation)}", err=True)
+        typer.echo(f"{target}: {simulation.summary}", err=True)

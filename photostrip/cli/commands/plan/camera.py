@@ -22,8 +22,8 @@ def camera(
     """Compare cameras by their efficiency coefficient K = f m_p: the smaller, the fewer photos."""
     with failures_as(delivery.form):
         from photostrip.errors import Fault, InputError
-        from photostrip.formats.output.plans.cameras import camera_document, source_document
-        from photostrip.project.plans.cameras import load_camera_plan
+        from photostrip.formats.output.plans.cameras import source_document
+        from photostrip.library.plan import planned
 
         if source_table == (file is not None):
             message = "a list of cameras and --source-table exclude each other" if file else "no cameras are given"
@@ -32,5 +32,5 @@ def camera(
         if file is None:
             delivery.deliver(source_document(), ())
         else:
-            given = load_camera_plan(file, delivery.assignments or [])
-            delivery.deliver(camera_document(given.name, given.cameras, given.reference, given.survey), given.files)
+            plan = planned("camera", file, delivery.assignments or [])
+            delivery.deliver(plan.document, plan.files)

@@ -36,10 +36,9 @@ class SurveyOptions(PlanOptions):
 def displacement(*, file: PlanFile = None, survey: SurveyOptions, delivery: Delivery) -> None:
     """Compute how well displacements will be known, and the smallest that will be found."""
     with failures_as(delivery.form):
-        from photostrip.formats.output.plans.displacement import displacement_document
-        from photostrip.project.plans.displacement import load_displacement_plan
+        from photostrip.library.plan import planned
 
         delivery.require_output()
         with delivery.assigned(survey.keys()) as assignments:
-            given = load_displacement_plan(file, assignments)
-        delivery.deliver(displacement_document(given.name, given.spec), given.files)
+            plan = planned("displacement", file, assignments)
+        delivery.deliver(plan.document, plan.files)

@@ -60,11 +60,9 @@ def screening(*, file: PlanFile = None, experiment: Experiment, delivery: Delive
     Tells what each method finds, by zone and by size, and what an error that is not found does to the elements.
     """
     with failures_as(delivery.form):
-        from photostrip.formats.output.plans.screening import screening_document
-        from photostrip.planning.screening import screening_experiment
-        from photostrip.project.plans.screening import load_screening_plan
+        from photostrip.library.plan import planned
 
         delivery.require_output()
         with delivery.assigned(experiment.keys()) as assignments:
-            given = load_screening_plan(file, assignments)
-        delivery.deliver(screening_document(given.name, screening_experiment(given.spec)), given.files)
+            plan = planned("screening", file, assignments)
+        delivery.deliver(plan.document, plan.files)

@@ -82,14 +82,12 @@ def strip(
 ) -> None:
     """Compute the expected accuracy along a strip, for layouts of control and methods of adjustment."""
     with failures_as(delivery.form):
-        from photostrip.formats.output.plans.strip import strip_document
-        from photostrip.project.plans.strip import load_strip_plan
+        from photostrip.library.plan import planned
 
         options = {**camera.keys(), **flight.keys(), **length.keys(), **control.keys()}
         if control.into is not None and control.place is None and file is None:
             raise typer.BadParameter("there is nothing to be placed: give --place as well", param_hint="--into")
         delivery.require_output()
         with delivery.assigned(options) as assignments:
-            given = load_strip_plan(file, assignments)
-            document = strip_document(given.name, given.computed())
-        delivery.deliver(document, given.reading.files)
+            plan = planned("strip", file, assignments)
+        delivery.deliver(plan.document, plan.files)
