@@ -46,8 +46,10 @@ def test_the_wheel_holds_the_package_and_nothing_else(tmp_path: Path) -> None:
     assert {name.partition("/")[0] for name in names} == {"photostrip", info}
     assert "photostrip/py.typed" in names
     assert {"photostrip/report/templates/report.html", "photostrip/report/templates/report.css"} <= set(names)
-    source = {path.relative_to(ROOT).as_posix() for path in (ROOT / "photostrip").rglob("*.py")}
-    assert source == {name for name in names if name.endswith(".py")}
+    source = {path.relative_to(ROOT).as_posix() for path in (ROOT / "photostrip").rglob("*") if path.is_file()}
+    source = {name for name in source if "__pycache__" not in name}
+    assert source == {name for name in names if name.startswith("photostrip/")}
+    assert {name.rpartition(".")[2] for name in source} >= {"py", "csv", "txt", "yaml", "html", "css", "typed"}
     assert entry_points.split() == ["[console_scripts]", "photostrip", "=", "photostrip.cli.main:main"]
     core = [line for line in metadata.get_all("Requires-Dist", []) if "extra ==" not in line]
     assert all(">=" in line for line in nonempty(core))
