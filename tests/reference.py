@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 ARGUMENT = re.compile(r"(?:[a-z_]\w*(?:, (?=[a-z_]))?)+: ")  # ``left, right: ...`` in a docstring
 PARAGRAPH = re.compile(r"(Returns|Raises|Source:?) ?")
 WIDTH = 100  # of a signature on one line
-STEPS = ("interior", "refine", "relative", "chain", "intersection", "scale_transfer", "absolute", "polynomial",
+STEPS = ("interior", "refine", "relative", "chain", "intersection", "scale_transfer", "strip", "absolute", "polynomial",
          "resection", "bundle")  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from photostrip.arrays import Floats
-    from photostrip.library.steps import Absolute, Interior, Relative
+    from photostrip.library.steps import Absolute, Interior, Relative, Strip
     from photostrip.triangulation.resection.closed_form import OrientedPhoto
     from photostrip.triangulation.strip_formation.intersection import Intersection
 
@@ -63,6 +64,21 @@ def intersection_document(ids: Sequence[str], found: Intersection, unit: str) ->
     return _document("intersection", [], ids, [*_places(found.xyz, unit), ("gap", unit, 4, found.gap)])
 
 
+def strip_document(photos: Sequence[str], points: Sequence[str], found: Strip, unit: str) -> Document:
+    """Return the photos of a strip, the scale factors of its models, and the points that have a place."""
+    values = [
+        _value(f"k {left}-{right}", factor)
+        for (left, right), factor in zip(pairwise(photos), found.factors, strict=True)
+    ]
+    placed = np.flatnonzero(found.models)
+    columns = _places(found.points[placed], unit)
+    columns.append(("models", "", 0, found.models[placed].astype(float)))
+    document = _document("strip", values, [points[number] for number in placed.tolist()], columns)
+    turned = np.degrees(np.array([angles(each, SYSTEM) for each in found.rotations]))
+    of_photos = [*_places(found.centers, unit), *_turns(turned)]
+    return {**document, "photos": _document("strip", [], photos, of_photos)["points"]}
+
+
 def absolute_document(ids: Sequence[str], found: Absolute, unit: str) -> Document:
     """Return an absolute orientation: seven parameters, and the residuals of the points."""
     similarity = found.similarity
@@ -76,8 +92,7 @@ def absolute_document(ids: Sequence[str], found: Absolute, unit: str) -> Documen
 def chain_document(ids: Sequence[str], rotations: Floats) -> Document:
     """Return the angles of the photos in the strip."""
     turned = np.degrees(np.array([angles(each, SYSTEM) for each in rotations]))
-    columns = [(name, "deg", 6, turned[:, k]) for k, name in enumerate(SYSTEM.split("-"))]
-    return _document("chain", [], ids, columns)
+    return _document("chain", [], ids, _turns(turned))
 
 
 def scale_document(ids: Sequence[str], factor: float, departures: Floats) -> Document:
@@ -121,6 +136,10 @@ def _angles(rotation: Floats) -> list[Document]:
 
 def _image_residuals(residuals: Floats) -> list[tuple[str, str, int, Floats]]:
     return [(f"v{axis}", "um", 2, residuals[:, k] * MICROMETRES) for k, axis in enumerate("xy")]
+
+
+def _turns(degrees: Floats) -> list[tuple[str, str, int, Floats]]:
+    return [(name, "deg", 6, degrees[:, k]) for k, name in enumerate(SYSTEM.split("-"))]
 
 
 def _places(xyz: Floats, unit: str) -> list[tuple[str, str, int, Floats]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.camera import Camera
-    from photostrip.library.steps import Absolute, Interior, Relative
+    from photostrip.library.steps import Absolute, Interior, Relative, Strip
     from photostrip.triangulation.resection.closed_form import OrientedPhoto
 
     Document = dict[str, Any]
@@ -144,6 +145,18 @@ def chain_trace(ids: Sequence[str], given: Floats, handed: Floats) -> Trace:
     return [
         _matrices("Given: each photo in the photo before it, by rows", ids, given),
         _matrices("In the strip, by rows", ids, handed, "A(i+1) = A(i) A(i, i+1); eq. 131-134"),
+    ]
+
+
+def strip_trace(photos: Sequence[str], found: Strip) -> Trace:
+    """Show what each model adds to the strip."""
+    pairs = [f"{left} - {right}" for left, right in pairwise(photos)]
+    bases = np.diff(found.centers, axis=0)
+    rows: list[Column] = [("k", "", 7, found.factors), ("sigma0", "um", 2, found.sigma0 * MICROMETRES)]
+    words = "B = k A (bx, by, bz) with A of the left photo; X = S + k (x, y, z); eq. 134-141"
+    return [
+        _table("Models", pairs, [*rows, *_plane("BX BY BZ", "", 4, bases)], words),
+        _matrices("Rotations A, photo to strip, by rows", photos, found.rotations),
     ]
 
 

@@ -18,6 +18,7 @@ from photostrip.frozen import dataclass
 from photostrip.geometry import plane
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.bundle.observations.problem import (
     BundleCameras,
     BundleProblem,
@@ -31,10 +32,11 @@ from photostrip.triangulation.image_coordinates.corrections import Bending, undi
 from photostrip.triangulation.image_coordinates.refraction import refraction_constant
 from photostrip.triangulation.polynomial.terms import POWERS, columns
 from photostrip.triangulation.relative_orientation.orientation import orient_pairs
-from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs, collect_pairs
 from photostrip.triangulation.resection.closed_form import OrientedPhoto, space_resection
 from photostrip.triangulation.strip_formation.intersection import Intersection, intersect
-from photostrip.triangulation.strip_formation.strip import hand_on_rotations
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.triangulation.strip_formation.strip import FirstPhoto, form_from_pairs, hand_on_rotations
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,6 +55,7 @@ __all__ = [
     "Intersection",
     "OrientedPhoto",
     "Relative",
+    "Strip",
     "absolute",
     "bundle",
     "chain",
@@ -63,6 +66,7 @@ __all__ = [
     "relative",
     "resection",
     "scale_transfer",
+    "strip",
 ]
 ON_A_LINE = 1e-6  # ratio of the spreads of points that lie on one line
 
@@ -221,6 +225,58 @@ def scale_transfer(first: ArrayLike, second: ArrayLike) -> tuple[float, Floats]:
     ratios = np.linalg.norm(one, axis=1) / np.linalg.norm(other, axis=1)
     factor = float(ratios.mean())
     return factor, ratios / factor - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """A strip in model coordinates: the frame of its first photo."""
+
+    centers: Floats  # (p, 3): perspective centres, in the unit of the base
+    rotations: Floats  # (p, 3, 3): photos to the frame of the first
+    points: Floats  # (q, 3): means over the models that hold the point; NaN for a point of no model
+    models: Numbers  # (q,): number of those models
+    factors: Floats  # (p - 1,): scale factor k of each model; 1 for the first
+    sigma0: Floats  # (p - 1,): standard deviation of an image coordinate by pair, mm; NaN without redundancy
+
+
+def strip(
+    rays: tuple[ArrayLike, ArrayLike, ArrayLike],
+    principal_distance: float,
+    *,
+    base: float = 1.0,
+    scale_transfer: Literal["least_squares", "distances"] = "least_squares",
+) -> Strip:
+    """Form a strip from its photos alone: pairs, chain, intersection, scale transfer, without any search for errors.
+
+    rays: photo (n,) in flight order and point (n,) as numbers from 0, and image coordinates (n, 2).
+    base: length of the first base, in the unit that the strip shall have.
+    scale_transfer: the weights of the pass points.
+    Raises GeometryError where a pair or a junction has too few common points, or cannot be oriented.
+
+    Source: [001] eq. 125-141.
+    """
+    photo, point = (np.asarray(each, np.intp) for each in rays[:2])
+    xy = _rows(rays[2], 2)
+    _same(xy, photo)
+    _same(xy, point)
+    photos = tuple(map(str, range(int(photo.max(initial=0)) + 1)))
+    names = tuple(map(str, range(int(point.max(initial=0)) + 1)))
+    measured = PhotoPoints(
+        photo_ids=photos, point_ids=names, photo=photo, point=point, xy=xy, sigma=np.full(xy.shape, 1.0)
+    )
+    oriented = orient_pairs(collect_pairs(measured, photos, principal_distance), photos)
+    settings, first = StripFormationSettings(scale_transfer=scale_transfer), FirstPhoto(np.eye(3), base)
+    formed = form_from_pairs(oriented, settings, photos, first=first)
+    points, models = np.full((len(names), 3), np.nan), np.zeros(len(names), np.intp)
+    points[formed.point], models[formed.point] = formed.xyz, formed.model_count
+    return Strip(
+        centers=formed.centers,
+        rotations=formed.rotations,
+        points=points,
+        models=models,
+        factors=formed.scale_factor,
+        sigma0=oriented.sigma0,
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,8 +91,8 @@ def test_a_plan_of_cameras_from_a_mapping() -> None:
     cameras = {"wide": {"principal_distance": 152, "format": [230, 230], "image_sigma_um": 5}}
     plan = {"cameras": {**cameras, "normal": {**cameras["wide"], "principal_distance": 300}}}
     assert "wide" in repr(photostrip.plan("camera", plan))
-    model = {"end_lap_percent": 70}
-    assert photostrip.plan("model", model).document == photostrip.plan("model", **model).document
+    plan_of_model = photostrip.plan("model", {"end_lap_percent": 70})
+    assert plan_of_model.document == photostrip.plan("model", end_lap_percent=70).document
     with pytest.raises(photostrip.InputError, match="no cameras are given"):
         photostrip.plan("camera")
     with pytest.raises(ValueError, match="there is no plan 'block'"):

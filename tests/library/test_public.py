@@ -35,10 +35,11 @@ MEMBERS = {
 }  # fmt: skip
 STEPS = [
     "absolute", "bundle", "chain", "interior", "intersection", "polynomial", "refine", "relative", "resection",
-    "scale_transfer",
+    "scale_transfer", "strip",
 ]  # fmt: skip
 STEP_VALUES = [
     "Absolute", "Bundle", "Camera", "Distortion", "Interior", "Intersection", "OrientedPhoto", "Relative",
+    "Strip",
 ]  # fmt: skip
 ERRORS = ["GeometryError", "InputError", "PhotostripError"]
 

@@ -113,6 +113,39 @@ def test_three_photos_make_a_strip(truth: Truth) -> None:
     assert np.abs(departures).max() < 1e-9
 
 
+def test_a_strip_is_formed_at_once(truth: Truth, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    seen = [(photo, name) for photo in range(3) for name in truth.common(photo)]
+    ids = list(dict.fromkeys(name for _, name in seen))
+    xy = np.array([truth.image(photo, [name])[0] for photo, name in seen])
+    rays = np.array([photo for photo, _ in seen]), np.array([ids.index(name) for _, name in seen]), xy
+    found = steps.strip(rays, F, base=92.0)
+    bases = np.linalg.norm(np.diff(truth.centers, axis=0), axis=1)
+    scale, turn = 92.0 / bases[0], truth.rotations[0]
+    np.testing.assert_allclose(found.factors, bases / bases[0])
+    np.testing.assert_allclose(found.centers, scale * (truth.centers - truth.centers[0]) @ turn, atol=1e-6)
+    np.testing.assert_allclose(found.rotations, turn.T @ truth.rotations, atol=1e-9)
+    placed = found.models > 0
+    expected = scale * (truth.xyz(ids) - truth.centers[0]) @ turn
+    np.testing.assert_allclose(found.points[placed], expected[placed], atol=1e-6)
+    assert np.isnan(found.points[~placed]).all()
+    assert found.models.max() == 2
+    assert placed.sum() == len({*truth.common(0, 1), *truth.common(1, 2)})
+
+    images = tmp_path / "images.csv"
+    lines = [f"{photo},{name},{x!r},{y!r}" for (photo, name), (x, y) in zip(seen, xy.tolist(), strict=True)]
+    images.write_text("\n".join(["photo,point,x,y", *lines]), encoding="utf-8")
+    assert main(["step", "strip", str(images), "-f", "153", "--base", "92", "--format", "json"]) == 0
+    out = json.loads(capsys.readouterr().out)
+    assert [row[0] for row in out["points"]] == [name for name, here in zip(ids, placed, strict=True) if here]
+    np.testing.assert_allclose([row[1:4] for row in out["photos"]], found.centers, atol=6e-5)
+    assert out["values"][1] == {"name": "k 1-2", "value": pytest.approx(found.factors[1]), "unit": "", "sigma": None}
+    assert main(["step", "strip", str(images), "-f", "153", "--trace"]) == 0
+    assert f"{found.factors[1]:.7f}" in capsys.readouterr().out
+    images.write_text("\n".join(["photo,point,x,y", *lines, lines[0]]), encoding="utf-8")
+    assert main(["step", "strip", str(images), "-f", "153"]) == 2
+    assert "is already measured on photo 0" in capsys.readouterr().err
+
+
 def test_a_photo_is_found_on_known_points(truth: Truth) -> None:
     ids = truth.common(1)
     found = steps.resection(truth.image(1, ids), truth.xyz(ids), F)

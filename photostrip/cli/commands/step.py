@@ -223,6 +223,36 @@ def scale(*, file: Table, delivery: Delivery) -> None:
         delivery.deliver(document, lambda: scale_trace(ids, first, second, factor))
 
 
+@_command("strip", "photo, point, x, y", "images.csv -f 153 --base 92 --unit mm")
+def strip(
+    *,
+    file: Table,
+    focal: Focal,
+    base: Annotated[float, typer.Option("--base", metavar="B", min=1e-9, help="Length of the first base.")] = 100.0,
+    unit: Unit = "mm",
+    scale_transfer: Annotated[
+        Literal["least_squares", "distances"], typer.Option("--scale-transfer", help="Weights of the pass points.")
+    ] = "least_squares",
+    delivery: Delivery,
+) -> None:
+    """Form a strip from photos alone, in the order of the table: model coordinates in the system of the first photo.
+
+    Image coordinates in mm. The steps in between are `relative`, `chain`, `intersection` and `scale`.
+    """
+    with failures_as(delivery.form):
+        from photostrip.formats.measured.steps import read_rays
+        from photostrip.library import steps
+        from photostrip.library.step_documents import strip_document
+        from photostrip.library.step_traces import strip_trace
+
+        delivery.checked()
+        read = read_rays(str(file))
+        rays = read.photo, read.target, read.xy
+        found = steps.strip(rays, focal, base=base, scale_transfer=scale_transfer)
+        document = strip_document(read.photo_ids, read.target_ids, found, unit)
+        delivery.deliver(document, lambda: strip_trace(read.photo_ids, found))
+
+
 @_command("absolute", "point, x, y, z, x_ground, y_ground, z_ground", "control.csv")
 def absolute(*, file: Table, unit: Unit = "m", delivery: Delivery) -> None:
     """Fit a model to points that are known in Cartesian ground coordinates, by seven parameters."""

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import InputError
 from photostrip.formats.measured.columns import POINT, numbers
+from photostrip.formats.measured.observations import read_measurements
 from photostrip.formats.measured.terrestrial import read_points
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.tables import Column
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
+    from photostrip.formats.measured.measurements import Measurements
 
 IMAGE, XYZ, GROUND = ("x", "y"), ("x", "y", "z"), ("x_ground", "y_ground", "z_ground")
 PHOTOS = (("x_left", "y_left"), ("x_right", "y_right"))
@@ -38,3 +40,13 @@ def read_step(file: str, step: str) -> tuple[list[str], list[Floats]]:
     if table is None:  # cannot be: what is not read has a fault, and stop() raised it
         raise InputError(f"{file} cannot be read")
     return table.cells("point"), [table.columns(*names) for names in systems]
+
+
+def read_rays(file: str) -> Measurements:
+    """Read image coordinates of photos in flight order, or raise every fault of their table."""
+    findings = Findings()
+    read = read_measurements(file, findings)
+    findings.stop()
+    if read is None:  # cannot be, see above
+        raise InputError(f"{file} cannot be read")
+    return read

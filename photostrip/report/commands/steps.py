@@ -6,7 +6,7 @@ from functools import partial
 
 from photostrip.report.page.numbers import fixed, power
 from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.tables import Shown, number, tabulated, words
 
 TITLES = {
     "interior": "Interior orientation",
@@ -15,6 +15,7 @@ TITLES = {
     "intersection": "Space intersection",
     "chain": "Orientation handed on along a strip",
     "scale": "Scale transfer",
+    "strip": "Strip in model coordinates",
     "absolute": "Absolute orientation",
     "polynomial": "Polynomial",
     "resection": "Space resection",
@@ -31,9 +32,20 @@ def step_report(document: Document) -> tuple[str, tuple[Section, ...]]:
         number(each["name"], partial(_cell, place), each["decimals"], each["unit"])
         for place, each in enumerate(document["columns"], 1)
     ]
+    if "photos" in document:
+        unit = document["columns"][0]["unit"]
+        parts.append(tabulated(document["photos"], _photos(unit)))
     sections = [Section("", (*parts, tabulated(document["points"], columns)))]
     sections += [_traced(each) for each in document.get("trace", ())]
     return TITLES[document["step"]], tuple(sections)
+
+
+def _photos(unit: str) -> list[Shown]:
+    """Return the columns of the photos of a strip."""
+    columns = [words("photo", lambda row: row[0])]
+    columns += [number(axis, partial(_cell, place), 4, unit) for place, axis in enumerate("xyz", 1)]
+    turns = ("omega", "phi", "kappa")
+    return [*columns, *(number(name, partial(_cell, place), 6, "deg") for place, name in enumerate(turns, 4))]
 
 
 def _traced(table: Document) -> Section:
