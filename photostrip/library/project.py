@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from photostrip.errors import Fault, InputError
 from photostrip.library.result import Result
+from photostrip.notes import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -96,8 +99,9 @@ class Project:
     def __repr__(self) -> str:
         """Say in a line what there is."""
         inputs = self.loaded.inputs
-        measured = f"{len(inputs.observations)} image points" if inputs.models is None else "independent models"
-        return f"<Project {self.name}: {len(inputs.flights)} strips, {len(self.photos)} photos, {measured}>"
+        measured = counted(len(inputs.observations), "image point") if inputs.models is None else "independent models"
+        flown = f"{counted(len(inputs.flights), 'strip')}, {counted(len(self.photos), 'photo')}"
+        return f"<Project {self.name}: {flown}, {measured}>"
 
 
 class Check:
@@ -175,6 +179,8 @@ def _place_of(
 ) -> tuple[Path, Source | None]:
     """Return the path of a project, and what it is read from where it has no files."""
     if not isinstance(project, Mapping):
+        if tables is not None:
+            raise InputError(Fault("tables in memory go with a project that is a mapping", "type", str(project)))
         return Path(project), None
     from photostrip.project.in_memory import PROJECT, source_of
 
@@ -212,7 +218,13 @@ def _checked(path: Path, assignments: Sequence[str], source: Source | None) -> C
     from photostrip.project.checks.check import check_project
 
     with reading_from(source):
-        return Check(check_project(path, assignments))
+        checked = check_project(path, assignments)
+    if source is not None:
+        from photostrip.project.in_memory import unplaced
+
+        faults, findings, notes = unplaced(checked.faults), unplaced(checked.findings), unplaced(checked.notes)
+        checked = replace(checked, faults=faults, findings=findings, notes=notes)
+    return Check(checked)
 
 
 def reading_from(source: Source | None) -> AbstractContextManager[None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from html import escape
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from photostrip.result.numbers import Document
 
 ReportForm = Literal["text", "md", "html", "json"]
+TraceForm = Literal["text", "md", "json"]
 RESULT = "result.json"
 
 
@@ -165,12 +166,13 @@ class Result:
 
         sections: names of the sections that are wanted, as those of ``photostrip report --section``.
         everything: False for the short report that the command prints by default; the page always has everything.
-        Raises InputError when HTML is asked for and jinja2 is not installed.
+        Raises InputError when HTML is asked for and jinja2 is not installed; ValueError for another form.
         """
         from photostrip.errors import faults_instead
         from photostrip.report import SectionName, chosen_sections, require_complete, title_of
         from photostrip.report.page import layout, text
 
+        _require_form(form, get_args(ReportForm))
         if form == "json":
             from photostrip.formats.output.result_json import to_json
 
@@ -219,10 +221,11 @@ class Result:
     def trace(self, form: str = "text") -> str:
         """Return every iteration with the symbols of the formulas, as text, Markdown (``md``) or JSON.
 
-        Raises InputError for a saved result: it holds no iterations.
+        Raises InputError for a saved result: it holds no iterations; ValueError for another form.
         """
         if self.computed is None:
             raise InputError(Fault("a saved result holds no iterations", "result-saved", fix="run the project again"))
+        _require_form(form, get_args(TraceForm))
         from photostrip.report.commands.trace import trace_sections, trace_title
         from photostrip.report.page import layout, text
         from photostrip.result.trace.trace import trace_of
@@ -277,6 +280,12 @@ class Result:
         table = f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>" if rows else ""
         verdict = f"<p><b>{escape(self.name)}: {self.status.upper()}</b> {escape(self.accuracy)}</p>"
         return verdict + table
+
+
+def _require_form(form: str, known: Sequence[str]) -> None:
+    if form not in known:
+        message = f"there is no form {form!r}: {', '.join(known)}"
+        raise ValueError(message)
 
 
 def read_result(path: str | PathLike[str]) -> Result:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from math import isnan
 from os import fspath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -16,8 +16,11 @@ from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.text.source import Source, reading_from
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
+    from photostrip.notes import Finding, Note
+
+T = TypeVar("T", "Fault", "Finding", "Note")
 PROJECT, SPECIFICATION = "project", "specification"  # what mappings are called in messages
 
 
@@ -50,12 +53,14 @@ def in_memory(source: Source) -> Iterator[None]:
         with reading_from(source):
             yield
     except InputError as error:
-        placed = InputError(
-            replace(fault, line=0, column=0) if fault.file in {PROJECT, SPECIFICATION} else fault
-            for fault in error.faults
-        )
+        placed = InputError(unplaced(error.faults))
         placed.findings = error.findings
         raise placed from None
+
+
+def unplaced(found: Iterable[T]) -> tuple[T, ...]:
+    """Take its line from what was found in a mapping."""
+    return tuple(replace(each, line=0, column=0) if each.file in {PROJECT, SPECIFICATION} else each for each in found)
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 (what JSON does not know)

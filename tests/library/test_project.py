@@ -55,7 +55,7 @@ def in_memory(simulation: photostrip.Simulation) -> tuple[dict[str, Any], dict[s
 
 def test_a_project_says_what_it_holds() -> None:
     project = photostrip.load(SAMPLE)
-    assert repr(project) == "<Project simulated-20: 1 strips, 20 photos, 469 image points>"
+    assert repr(project) == "<Project simulated-20: 1 strip, 20 photos, 469 image points>"
     assert project.photos[:2] == ("1001", "1002")
     assert "degree: auto" in project.resolved
     assert project.files_read(photostrip.Result({}))[0] == SAMPLE
@@ -230,6 +230,10 @@ def test_a_check_raises_nothing(tmp_path: Path) -> None:
     assert not bad.ok
     assert "missing.yaml: does not exist" in repr(bad)
     assert photostrip.check(photostrip.load(SAMPLE), processing={"adjustment": "bundle"}).ok
+    mapping = photostrip.check({"name": "x"})
+    assert repr(mapping).splitlines()[1].startswith("error: project: strips: `strips` is missing")
+    with pytest.raises(photostrip.InputError, match="tables in memory go with a project that is a mapping"):
+        photostrip.run(SAMPLE, tables={})
 
 
 def test_a_refused_adjustment_carries_its_findings(simulation: photostrip.Simulation) -> None:

@@ -230,6 +230,9 @@ def test_reports_are_those_of_the_command(
     assert json.loads(result.report("json")) == result.document
     assert result.report("html").startswith("<!DOCTYPE html>")
     assert "pairs" not in result.report(sections=["verdict"])
+    for function in (result.report, result.trace):
+        with pytest.raises(ValueError, match="there is no form 'pdf': text, md, "):
+            function("pdf")  # type: ignore[arg-type]
     with pytest.raises(photostrip.InputError, match="the report has no section accuracies; expected one of verdict"):
         result.report(sections=["accuracies"])
 
