@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from photostrip.result.numbers import Document
 
 ReportForm = Literal["text", "md", "html", "json"]
-TraceForm = Literal["text", "md", "json"]
 RESULT = "result.json"
 
 
@@ -225,7 +224,7 @@ class Result:
         """
         if self.computed is None:
             raise InputError(Fault("a saved result holds no iterations", "result-saved", fix="run the project again"))
-        _require_form(form, get_args(TraceForm))
+        _require_form(form, ("text", "md", "json"))
         from photostrip.report.commands.trace import trace_sections, trace_title
         from photostrip.report.page import layout, text
         from photostrip.result.trace.trace import trace_of

@@ -18,32 +18,23 @@ from photostrip.frozen import dataclass
 from photostrip.geometry import plane
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity, collinearity
-from photostrip.points import PhotoPoints
-from photostrip.triangulation.bundle.observations.problem import (
-    BundleCameras,
-    BundleProblem,
-    ControlObservations,
-    ImageObservations,
-    StartValues,
-)
-from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
-from photostrip.triangulation.bundle.solve import solve
+from photostrip.library.step_arguments import rows, same
+from photostrip.library.steps_of_all_photos import Bundle, Strip, bundle, strip
 from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
 from photostrip.triangulation.image_coordinates.refraction import refraction_constant
 from photostrip.triangulation.polynomial.terms import POWERS, columns
 from photostrip.triangulation.relative_orientation.orientation import orient_pairs
-from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs, collect_pairs
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.triangulation.resection.closed_form import OrientedPhoto, space_resection
 from photostrip.triangulation.strip_formation.intersection import Intersection, intersect
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.triangulation.strip_formation.strip import FirstPhoto, form_from_pairs, hand_on_rotations
+from photostrip.triangulation.strip_formation.strip import hand_on_rotations
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Floats
 
 
 __all__ = [
@@ -90,8 +81,8 @@ def interior(
 
     Raises GeometryError where the marks do not determine the transformation.
     """
-    source, target = _rows(measured, 2), _rows(calibrated, 2)
-    _same(source, target)
+    source, target = rows(measured, 2), rows(calibrated, 2)
+    same(source, target)
     if kind not in plane.KINDS:
         raise InputError(f"there is no transformation {kind!r}: {', '.join(plane.KINDS)}")
     fitted = plane.KINDS[kind].fit(source, target, np.ones(len(source)))
@@ -108,7 +99,7 @@ def refine(xy: ArrayLike, camera: Camera, *, flying_height: float | None = None,
     Returns ideal image coordinates, reduced to the principal point, shape (n, 2).
     """
     refraction = 0.0 if flying_height is None else refraction_constant(flying_height, ground_height)
-    return undistort(_rows(xy, 2), camera, Bending(refraction=refraction))
+    return undistort(rows(xy, 2), camera, Bending(refraction=refraction))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,8 +128,8 @@ def relative(
 
     Source: [001] eq. 131-137.
     """
-    one, other = _rows(left, 2), _rows(right, 2)
-    _same(one, other)
+    one, other = rows(left, 2), rows(right, 2)
+    same(one, other)
     pair = one_pair(one, other, principal_distance, None if weights is None else np.asarray(weights, float))
     if np.count_nonzero(pair.weight) < MINIMUM_POINTS:
         message = f"{np.count_nonzero(pair.weight)} common points cannot orient a pair; five are needed"
@@ -193,7 +184,7 @@ def intersection(
     Source: [001] eq. 137, 138.
     """
     rays = []
-    for xy, rotation in zip((_rows(left, 2), _rows(right, 2)), rotations, strict=True):
+    for xy, rotation in zip((rows(left, 2), rows(right, 2)), rotations, strict=True):
         rays.append(np.asarray(rotation, float) @ np.vstack([xy.T, np.full(len(xy), -principal_distance)]))
     return intersect(np.asarray(base, float), rays[0], rays[1], principal_distance, left_ray=left_ray)
 
@@ -220,63 +211,11 @@ def scale_transfer(first: ArrayLike, second: ArrayLike) -> tuple[float, Floats]:
 
     Source: [001] eq. 139-141.
     """
-    one, other = _rows(first, 3), _rows(second, 3)
-    _same(one, other)
+    one, other = rows(first, 3), rows(second, 3)
+    same(one, other)
     ratios = np.linalg.norm(one, axis=1) / np.linalg.norm(other, axis=1)
     factor = float(ratios.mean())
     return factor, ratios / factor - 1
-
-
-@dataclass(frozen=True, eq=False)
-class Strip:
-    """A strip in model coordinates: the frame of its first photo."""
-
-    centers: Floats  # (p, 3): perspective centres, in the unit of the base
-    rotations: Floats  # (p, 3, 3): photos to the frame of the first
-    points: Floats  # (q, 3): means over the models that hold the point; NaN for a point of no model
-    models: Numbers  # (q,): number of those models
-    factors: Floats  # (p - 1,): scale factor k of each model; 1 for the first
-    sigma0: Floats  # (p - 1,): standard deviation of an image coordinate by pair, mm; NaN without redundancy
-
-
-def strip(
-    rays: tuple[ArrayLike, ArrayLike, ArrayLike],
-    principal_distance: float,
-    *,
-    base: float = 1.0,
-    scale_transfer: Literal["least_squares", "distances"] = "least_squares",
-) -> Strip:
-    """Form a strip from its photos alone: pairs, chain, intersection, scale transfer, without any search for errors.
-
-    rays: photo (n,) in flight order and point (n,) as numbers from 0, and image coordinates (n, 2).
-    base: length of the first base, in the unit that the strip shall have.
-    scale_transfer: the weights of the pass points.
-    Raises GeometryError where a pair or a junction has too few common points, or cannot be oriented.
-
-    Source: [001] eq. 125-141.
-    """
-    photo, point = (np.asarray(each, np.intp) for each in rays[:2])
-    xy = _rows(rays[2], 2)
-    _same(xy, photo)
-    _same(xy, point)
-    photos = tuple(map(str, range(int(photo.max(initial=0)) + 1)))
-    names = tuple(map(str, range(int(point.max(initial=0)) + 1)))
-    measured = PhotoPoints(
-        photo_ids=photos, point_ids=names, photo=photo, point=point, xy=xy, sigma=np.full(xy.shape, 1.0)
-    )
-    oriented = orient_pairs(collect_pairs(measured, photos, principal_distance), photos)
-    settings, first = StripFormationSettings(scale_transfer=scale_transfer), FirstPhoto(np.eye(3), base)
-    formed = form_from_pairs(oriented, settings, photos, first=first)
-    points, models = np.full((len(names), 3), np.nan), np.zeros(len(names), np.intp)
-    points[formed.point], models[formed.point] = formed.xyz, formed.model_count
-    return Strip(
-        centers=formed.centers,
-        rotations=formed.rotations,
-        points=points,
-        models=models,
-        factors=formed.scale_factor,
-        sigma0=oriented.sigma0,
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,8 +236,8 @@ def absolute(model: ArrayLike, ground: ArrayLike, weights: ArrayLike | None = No
 
     Source: [001] eq. 145-149.
     """
-    source, target = _rows(model, 3), _rows(ground, 3)
-    _same(source, target)
+    source, target = rows(model, 3), rows(ground, 3)
+    same(source, target)
     weight = np.ones(len(source)) if weights is None else np.asarray(weights, float)
     if collinearity(source[weight > 0]) < ON_A_LINE**2:
         message = "fewer than three points, or all on one line: the rotation about it is not determined"
@@ -323,10 +262,10 @@ def polynomial(xyz: ArrayLike, misclosures: ArrayLike, terms: Sequence[str]) -> 
     """
     if unknown := [each for each in terms if each not in POWERS] or ([] if terms else [""]):
         raise InputError(f"there is no term {unknown[0]!r}: {', '.join(POWERS)}")
-    design = columns(_rows(xyz, 3), list(terms))
+    design = columns(rows(xyz, 3), list(terms))
     size = np.linalg.norm(design, axis=0)
-    values = _rows(np.reshape(misclosures, (-1, 1)), 1)[:, 0]
-    _same(design, values)
+    values = rows(np.reshape(misclosures, (-1, 1)), 1)[:, 0]
+    same(design, values)
     if len(design) < design.shape[1] or np.linalg.matrix_rank(design / np.where(size > 0, size, 1)) < design.shape[1]:
         raise GeometryError(f"{len(design)} points do not determine {len(terms)} terms", code="control-deficient")
     found = np.linalg.lstsq(design / size, values, rcond=None)[0] / size
@@ -341,94 +280,9 @@ def resection(xy: ArrayLike, ground: ArrayLike, principal_distance: float, *, si
     Returns centre, rotation (photo to ground), their covariance, and residuals (n, 2).
     Raises GeometryError with fewer than four points, with points on one line, or where no orientation fits.
     """
-    image, points = _rows(xy, 2), _rows(ground, 3)
-    _same(image, points)
+    image, points = rows(xy, 2), rows(ground, 3)
+    same(image, points)
     return space_resection(image, np.full(image.shape, sigma), points, principal_distance)
-
-
-@dataclass(frozen=True, eq=False)
-class Bundle:
-    """Photos and points adjusted together."""
-
-    centers: Floats  # (p, 3): perspective centres
-    rotations: Floats  # (p, 3, 3): photos to the frame of the points
-    points: Floats  # (q, 3)
-    residuals: Floats  # (n, 2): measured minus computed image coordinates, mm
-    sigmas: Floats  # (q, 3): standard deviations of the points, for the stated ones of the measurements
-    sigma0: float  # standard deviation of unit weight; NaN without redundancy
-    redundancy: int
-    iterations: int
-
-
-def bundle(
-    rays: tuple[ArrayLike, ArrayLike, ArrayLike],
-    principal_distance: float,
-    start: tuple[ArrayLike, ArrayLike, ArrayLike],
-    *,
-    ground: ArrayLike | None = None,
-    sigma: float = 0.005,
-    ground_sigma: float = 0.05,
-) -> Bundle:
-    """Adjust all photos and points at once, from approximate values and without any search for errors.
-
-    rays: photo (n,) and point (n,) as numbers from 0, and image coordinates (n, 2).
-    start: centres (p, 3), rotations (p, 3, 3) and points (q, 3), near the truth: from ``resection``, ``intersection``.
-    ground: (q, 3), given coordinates; NaN where none is given. Without any the network is free: it stays as near to the
-        points of the start as its shape lets it.
-    sigma, ground_sigma: standard deviations of an image coordinate, mm, and of a given one.
-    Raises GeometryError where the rays and given coordinates do not determine the photos and points.
-    """
-    photo, point = (np.asarray(each, np.intp) for each in rays[:2])
-    xy, points, centers = _rows(rays[2], 2), _rows(start[2], 3), _rows(start[0], 3)
-    _same(xy, photo)
-    _same(xy, point)
-    if not (np.isin(photo, np.arange(len(centers))).all() and np.isin(point, np.arange(len(points))).all()):
-        raise InputError("a ray has a photo or a point that the start does not have")
-    given = np.full(points.shape, np.nan) if ground is None else np.asarray(ground, float)
-    known = np.isfinite(given)
-    _same(points, given)
-    rows = np.flatnonzero(known.any(axis=1))
-    origin = points.mean(axis=0)
-    problem = BundleProblem(
-        images=ImageObservations(photo=photo, point=point, xy=xy, sigma=np.full(xy.shape, sigma)),
-        cameras=BundleCameras(of_photo=np.zeros(len(centers), np.intp), focal=np.array([principal_distance])),
-        start=StartValues(
-            centers=centers - origin,
-            rotations=np.asarray(start[1], float).reshape(-1, 3, 3),
-            points=points - origin,
-        ),
-        control=ControlObservations(
-            point=rows,
-            xyz=np.where(known, given, points)[rows] - origin,
-            axes=np.broadcast_to(np.eye(3), (len(rows), 3, 3)),
-            sigma=np.where(known, ground_sigma, np.inf)[rows],
-        ),
-    )
-    found = solve(problem)
-    variances = cofactors_of(found).points.diagonal(axis1=1, axis2=2)
-    return Bundle(
-        centers=found.centers + origin,
-        rotations=found.rotations,
-        points=found.points + origin,
-        residuals=found.image_residuals,
-        sigmas=np.sqrt(variances),
-        sigma0=found.sigma0,
-        redundancy=found.redundancy,
-        iterations=len(found.steps),
-    )
-
-
-def _rows(values: ArrayLike, width: int) -> Floats:
-    """Return coordinates as an array (n, width), or refuse them."""
-    found = np.asarray(values, float)
-    if found.ndim != 2 or found.shape[1] != width or not np.isfinite(found).all():
-        raise InputError(f"an array of finite numbers with {width} columns is needed, not one of shape {found.shape}")
-    return found
-
-
-def _same(one: Floats, other: Floats | Numbers) -> None:
-    if len(one) != len(other):
-        raise InputError(f"{len(one)} and {len(other)} rows: each point needs a row in both")
 
 
 def _sigma0(residuals: Floats, redundancy: int) -> float:

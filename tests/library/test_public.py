@@ -27,8 +27,8 @@ MEMBERS = {
     "Project": ["check", "files_read", "loaded", "name", "overridden", "photos", "resolved", "run"],
     "Result": [
         "accuracy", "computed", "control", "covariance_of", "document", "files", "findings", "name", "notes", "pairs",
-        "parallaxes", "photos", "points", "rejected", "report", "residuals", "statement", "status", "strips", "summary",
-        "trace", "write",
+        "parallaxes", "photos", "pictures", "points", "rejected", "report", "residuals", "statement", "status",
+        "strips", "summary", "trace", "write",
     ],
     "Simulation": ["files", "files_read", "project", "summary", "truth", "write"],
     "Table": ["columns", "meanings", "name", "to_arrow", "to_pandas", "units", "where"],
