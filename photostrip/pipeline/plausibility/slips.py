@@ -34,6 +34,7 @@ CODE = "P406"
 LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)
 LEAST_OTHERS = 3  # given coordinates that tell how well the prediction is known
 BEYOND_MAP = 1e5  # metres, over which a difference on the ground is none of map coordinates; it needs no further test
+LEFT_SHARE = 0.5  # of a slip, that a result leaves at least; of what a strip bends it leaves little
 MOST_SIGMA0 = 2.0  # of a bundle, over what is stated: a principal distance of another lens leaves 4 and more
 
 
@@ -43,6 +44,7 @@ class Predicted:
 
     off: Floats  # (c, 3): given minus predicted, metres along the axes of each point's frame; NaN where not known
     sigma: Floats  # (c, 3): standard deviation of that difference
+    left: Floats  # (c, 3): given minus adjusted, metres, of coordinates that took part too
     sound: Flags  # (c, 3): control coordinates that took part: the run tested them and found them right
 
     def agree(self, use: Flags) -> Flags:
@@ -96,7 +98,8 @@ def predict(result: Result) -> Predicted:
         rows = locate(strip.control.ids, control.ids)
         rejected[rows] |= control.use[rows] & ~strip.control.use
     used = control.use & ~control.check[:, None] & ~rejected & (result.control_rows >= 0)[:, None]
-    off = np.where(used, np.nan, -result.control_differences)
+    left = -result.control_differences
+    off = np.where(used, np.nan, left)
     sigma = np.full(off.shape, np.nan)
     for number, frame in enumerate(result.frames):
         rows = np.flatnonzero((control.frame == number) & (result.control_rows >= 0))
@@ -106,15 +109,23 @@ def predict(result: Result) -> Predicted:
             with np.errstate(invalid="ignore"):  # a variance lost to rounding is not known
                 sigma[rows] = np.sqrt(np.einsum("nai,nij,naj->na", axes, precision.points[at], axes))
     sigma = np.hypot(sigma, np.where(control.sigma > 0, control.sigma, 0.0))
-    return Predicted(off=off, sigma=sigma, sound=used & _screened(result))
+    return Predicted(off=off, sigma=sigma, left=left, sound=used & _tested(result))
 
 
-def _screened(result: Result) -> bool:
-    """Whether the run looked for wrong control."""
-    settings = result.settings
+def _tested(result: Result) -> Flags:
+    """Given coordinates (c, 3) that the run could test for gross errors, and of which it doubts none."""
+    settings, control = result.settings, result.inputs.control
     if result.bundle is not None:
-        return settings.bundle.screening != "none"
-    return (settings.links if result.model_strips else settings.relative).screening != "none"
+        return np.full(control.use.shape, settings.bundle.screening != "none")
+    tested = np.zeros(control.use.shape, bool)
+    if (settings.links if result.model_strips else settings.relative).screening == "none":
+        return tested
+    for strip in result.strips:
+        rows = locate(strip.control.ids, control.ids)
+        tested[rows] |= np.isfinite(strip.screened_control.redundancy) | (strip.shared is not None)
+    doubtful = {name for note in result.notes if note.code == "control-doubtful" for name in note.points}
+    tested[[name in doubtful for name in control.ids]] = False
+    return tested
 
 
 def of_models(result: Result, models: MeasuredModels, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
@@ -133,7 +144,9 @@ def of_models(result: Result, models: MeasuredModels, predicted: Predicted, cont
 def _confirmed(finding: Finding, row: int, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
     """Test a slip by a prediction; it stands as it is where the adjustment has none."""
     axis = GROUND_AXES.index(str(finding.evidence["axis"]))
-    if predicted.sound[row, axis]:
+    if predicted.sound[row, axis] or abs(predicted.left[row, axis]) < LEFT_SHARE * abs(
+        float(finding.evidence["off_m"])
+    ):
         return
     off = float(predicted.off[row, axis])
     if not np.isfinite(off * predicted.sigma[row, axis]) or abs(off) > BEYOND_MAP:
@@ -150,5 +163,8 @@ def _slip(row: int, axis: int, strip: str, predicted: Predicted, control: GivenC
     given = given_points.level(control.points.take([row]), control.frames, as_written=control.as_written)
     if given is None:
         return None
-    spread = predicted.spread(row, axis)
-    return control_slips.slip_in(given, 0, axis, float(predicted.off[row, axis]), (spread, LIMIT * spread), strip)
+    spread, off = predicted.spread(row, axis), float(predicted.off[row, axis])
+    frame = control.frames[int(control.points.frame[row])]
+    if frame.kind == "projected" and axis != control_slips.HEIGHT:  # by map coordinates: a map has a scale of its own
+        off *= float(given.steps.unit[0, axis]) / frame.plan_factor
+    return control_slips.slip_in(given, 0, axis, off, (spread, LIMIT * spread), strip)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from benchmarks import plausibility
 from photostrip.camera import Distortion
 from photostrip.cli.main import main
 from photostrip.errors import InputError, PhotostripError
@@ -282,7 +283,7 @@ def test_a_control_point_far_from_all_others_is_named_with_the_right_coordinate(
     assert float(finding.evidence["would_fit"]) == pytest.approx(right, abs=1e-3)
 
 
-@pytest.mark.parametrize(("axis", "step"), [(0, 1000.0), (1, -20.0), (2, 30.0), (1, 5.0)])
+@pytest.mark.parametrize(("axis", "step"), [(0, 1000.0), (0, 7000.0), (1, -20.0), (2, 30.0), (1, 5.0)])
 @pytest.mark.parametrize("role", ["control", "check"])
 def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role: str) -> None:
     inputs = inputs_of(simulation("utm"))
@@ -301,6 +302,17 @@ def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role:
     assert (finding.code, finding.points, finding.severity) == ("P406", (name,), "warning")
     assert "typing error" in finding.message
     assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, axis], abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2100250, 2100416, 2100594])
+def test_a_slip_that_the_run_could_not_test_is_named(seed: int) -> None:
+    """Kilometres off, the point bent the strip or stood beside it, was called tested, and was not named."""
+    case = plausibility.sound(seed)
+    planted = plausibility.slip_of_a_digit(case, check=False)
+    assert planted is not None
+    inputs, names = planted
+    assert [set(each.points) for each in triangulate(inputs, case.settings).findings] == [set(names)]
 
 
 @pytest.mark.slow
