@@ -12,6 +12,8 @@ from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
 from photostrip.report.pictures.ground.sheet import bars, ids, metres, north_arrow, sheet_of
 
 if TYPE_CHECKING:
+    from collections.abc import Container
+
     from photostrip.report.page.parts import Document
     from photostrip.report.pictures.ground.plan_view import Plan, Spot
     from photostrip.report.pictures.ground.sheet import Sheet
@@ -23,7 +25,8 @@ MOST_HINTS = 1500  # of more points and photos new points are dots without hints
 CROWDED = 12.0  # photos nearer to each other on the plan are drawn smaller
 SHAPES = {"control": "triangle", "check": "square", "new": "dot", "photo": "diamond"}
 WORDS = {"control": "control point", "check": "check point", "new": "new point", "photo": "photo"}
-FIRST = "control", "check", "photo", "new"  # whose ids get room first
+FIRST = "control", "check", "photo", "new"  # whose ids get room first, after those of points named by findings
+RING = 9.0
 
 
 def plan_picture(document: Document, plan: Plan) -> Picture:
@@ -44,10 +47,17 @@ def plan_picture(document: Document, plan: Plan) -> Picture:
         new = [place_of(spot, sheet) for spot in everything if spot.role == "new"]
         drawn.append(svg.dots(new, 1.8 * share, "dots-new"))
     drawn += [_spot(spot, sheet, share) for spot in everything if not (many and spot.role == "new")]
-    drawn += legend(roles(everything), TOP - 40.0)
+    named = _named(document)
+    drawn += [
+        svg.circle(place_of(spot, sheet), RING, "ring", f"point {spot.id}: {', '.join(named[spot.id])}")
+        for spot in plan.spots
+        if spot.id in named
+    ]
+    ring = [Entry("named by a finding", "ring", "dot")] if any(spot.id in named for spot in plan.spots) else []
+    drawn += legend([*roles(everything), *ring], TOP - 40.0)
     drawn += bars(sheet, [(bar * factor, f"residuals {metres(bar)}", "bar vector")])
     drawn += north_arrow(plan.north)
-    drawn += spot_ids(everything, sheet)
+    drawn += _ids(everything, sheet, named)
     larger = factor / sheet.scale
     enlarged = f"{float(f'{larger:.2g}'):.0f}" if larger > 1 else short(larger, 2)
     caption = (
@@ -75,10 +85,25 @@ def roles(spots: list[Spot]) -> list[Entry]:
     return [Entry(WORDS[role], f"mark {role}", SHAPES[role]) for role in WORDS if role in found]
 
 
-def spot_ids(spots: list[Spot], sheet: Sheet) -> list[str]:
-    """Write the ids of spots where there is room, those of given points first."""
+def _named(document: Document) -> dict[str, list[str]]:
+    """Return the codes of the findings that name a point, by point."""
+    found: dict[str, list[str]] = {}
+    for finding in document.get("findings", []):
+        for name in finding.get("points") or ():
+            codes = found.setdefault(name, [])
+            codes += [] if finding["code"] in codes else [finding["code"]]
+    return found
+
+
+def _ids(spots: list[Spot], sheet: Sheet, named: Container[str]) -> list[str]:
+    """Write the ids of spots where there is room, those of points named by findings first, then of given points."""
     places = [place_of(spot, sheet) for spot in spots]
-    order = sorted(range(len(spots)), key=lambda number: FIRST.index(spots[number].role))
+
+    def rank(number: int) -> tuple[bool, int]:
+        spot = spots[number]
+        return spot.role == "photo" or spot.id not in named, FIRST.index(spot.role)
+
+    order = sorted(range(len(spots)), key=rank)
     return ids([(spots[n].id, places[n]) for n in order], places, (WIDTH, sheet.height - 30.0))
 
 
