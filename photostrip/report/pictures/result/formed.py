@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SHAPES = {"along": "dot", "across": "square", "up": "triangle"}
 KINDS = {"along": "1", "across": "2", "up": "3"}
 PPM = 1e6
-MOST_MARKS = 200  # on a strip; more are a line without them
+MOST_MARKS = 600  # on a picture; more are lines without them
 
 
 def _worst(strips: Sequence[str], badness: dict[str, float]) -> list[str]:
@@ -50,6 +50,7 @@ def junction_pictures(document: Document) -> list[Picture]:
         strip: max(max(row["discrepancy_um"].values()) for row in rows if row["strip"] == strip) for strip in strips
     }
     shown, high = _worst(strips, largest), span(largest.values())
+    marked = len(KINDS) * sum(row["strip"] in shown for row in rows) <= MOST_MARKS
     layout, drawn = _layout(len(shown)), []
     for place, strip in enumerate(shown):
         own = [row for row in rows if row["strip"] == strip]
@@ -60,20 +61,9 @@ def junction_pictures(document: Document) -> list[Picture]:
         for name, kind in KINDS.items():
             values = [(n, row["discrepancy_um"][name]) for n, row in enumerate(own, 1)]
             drawn.append(steps(panel, values, f"curve curve-{kind} thin"))
-            drawn += (
-                []
-                if len(own) > MOST_MARKS
-                else [
-                    svg.mark(
-                        panel.at(n, size),
-                        SHAPES[name],
-                        f"fill-{kind}",
-                        f"photo {own[n - 1]['photo']}, {name}: {size:.1f} µm",
-                        4.0,
-                    )
-                    for n, size in values
-                ]
-            )
+            for n, size in values if marked else ():
+                hint = f"photo {own[n - 1]['photo']}, {name}: {size:.1f} µm"
+                drawn.append(svg.mark(panel.at(n, size), SHAPES[name], f"fill-{kind}", hint, 4.0))
     drawn += legend(Entry(name, f"fill-{kind}", SHAPES[name]) for name, kind in KINDS.items())
     worst = max(rows, key=lambda row: max(row["discrepancy_um"].values()))
     scale = "model" if document.get("links") else "photo"
@@ -133,6 +123,7 @@ def _scale_picture(document: Document, plan: Plan, found: dict[str, list[Pair]])
         + [sign * size for band in bands.values() for _, size in band for sign in (1, -1)]
     )
     layout, drawn = _layout(len(shown)), []
+    marked = sum(len(found[strip]) for strip in shown) <= MOST_MARKS
     for place, strip in enumerate(shown):
         panel = layout.panel(place, span((at for at, _ in found[strip]), zero=False, room=0.02), high)
         band = bands[strip]
@@ -144,7 +135,7 @@ def _scale_picture(document: Document, plan: Plan, found: dict[str, list[Pair]])
             )
         drawn += framed(panel, ("km along the strip", "ppm"), f"strip {strip}" if len(strips) > 1 else "")
         drawn.append(steps(panel, found[strip], "curve curve-1 thin"))
-        if len(found[strip]) <= MOST_MARKS:
+        if marked:
             drawn += [svg.circle(panel.at(*each), 2.6, "fill-1", f"{each[1]:+.0f} ppm") for each in found[strip]]
         if curves[strip]:
             drawn.append(steps(panel, curves[strip], "curve curve-2"))

@@ -1,0 +1,27 @@
+"""The page of a large block can be mailed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from photostrip.formats.output.simulation import inputs_of
+from photostrip.report.html import to_html
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Flight
+from tests.loops import nonempty
+from tests.results import solved, spec
+
+MOST = 3_000_000  # bytes
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("photos", "strips"), [(1000, 1), (50, 20)])
+def test_a_thousand_photos_make_at_most_three_megabytes(photos: int, strips: int) -> None:
+    flight = Flight(photos=photos, strips=strips, heading_deg=70.0)
+    document = solved(inputs_of(simulate(replace(spec(strips=strips), flight=flight)))).document
+    assert len(document["photos"]) == 1000
+    page = to_html(document)
+    assert all(f"photo {photo}" in page for photo in nonempty(sorted({each["id"] for each in document["photos"]})))
+    assert len(page.encode("utf-8")) <= MOST
