@@ -158,7 +158,7 @@ def _classes(profile: Document, required: str) -> Section:
 
 
 def _sources(profile: Document) -> Iterator[Words]:
-    yield Words(f"Source: {profile['source']}")
+    yield Words(f"By {profile['source']}")
     yield from (Words(f"{each['name']}: {each['source']}", mark="-") for each in profile["classes"] if each["source"])
 
 
