@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
-from photostrip.report.pictures.ground.image_plane import footprints
 from photostrip.report.pictures.ground.sheet import bars, ids, north_arrow, sheet_of
+from photostrip.report.pictures.ground.terrain import footprints, straightened
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 MARGIN = 20.0
 CELLS = 240  # of the overlap along the picture
 MOST = 6  # photos that are told apart by colour
+STRAIGHT = 0.5  # on the picture
 
 
 def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
@@ -33,7 +34,10 @@ def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
     drawn_outlines = {photo: [sheet.place(corner) for corner in outline] for photo, outline in outlines.items()}
     counts = _overlap(list(drawn_outlines.values()), WIDTH / CELLS)
     drawn = [_area(runs, f"overlap-{count}", WIDTH / CELLS) for count, runs in sorted(counts.items())]
-    drawn += [svg.polygon(outline, "outline", f"photo {photo}") for photo, outline in drawn_outlines.items()]
+    drawn += [
+        svg.polygon(straightened(outline, STRAIGHT), "outline", f"photo {photo}")
+        for photo, outline in drawn_outlines.items()
+    ]
     drawn += _scale(counts)
     drawn += bars(sheet)
     drawn += north_arrow(plan.north)
@@ -41,8 +45,7 @@ def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
     drawn += ids(middles.items(), (), (WIDTH, sheet.height - 30.0))
     largest = max(outlines, key=lambda photo: _size(outlines[photo]))
     caption = (
-        "What each photo shows, on level ground at the mean height of its points; colours: how many photos show the "
-        "same. "
+        "What each photo shows of the ground as the adjusted points have it; colours: how many photos show the same. "
         f"The largest footprint is that of photo {largest}, {_size(outlines[largest]) / 1e6:.3g} km²."
     )
     words = f"{counted(len(outlines), 'footprint')}; at most {max(counts, default=0)} photos show the same ground."
@@ -69,12 +72,10 @@ def _overlap(outlines: Iterable[Sequence[svg.Point]], cell: float) -> dict[int, 
     for outline in outlines:
         top, bottom = min(y for _, y in outline), max(y for _, y in outline)
         for row in range(math.ceil(top / cell - 0.5), math.ceil(bottom / cell - 0.5)):
-            crossed = _crossings(outline, (row + 0.5) * cell)
-            if crossed:
-                line = changes.setdefault(row, {})
-                start, end = (math.ceil(x / cell - 0.5) for x in crossed)
-                line[start] = line.get(start, 0) + 1
-                line[end] = line.get(end, 0) - 1
+            line = changes.setdefault(row, {})
+            for number, x in enumerate(_crossings(outline, (row + 0.5) * cell)):
+                at = math.ceil(x / cell - 0.5)
+                line[at] = line.get(at, 0) + (-1 if number % 2 else 1)
     found: dict[int, Runs] = {}
     for row, line in sorted(changes.items()):
         count, start = 0, 0
@@ -85,14 +86,13 @@ def _overlap(outlines: Iterable[Sequence[svg.Point]], cell: float) -> dict[int, 
     return found
 
 
-def _crossings(outline: Sequence[svg.Point], y: float) -> tuple[float, float] | None:
-    """Return where a line across the picture enters and leaves a quadrangle without dents."""
-    found = [
+def _crossings(outline: Sequence[svg.Point], y: float) -> list[float]:
+    """Return where a line across the picture enters and leaves an outline, in turn."""
+    return sorted(
         a + (y - b) / (d - b) * (c - a)
         for (a, b), (c, d) in zip(outline, [*outline[1:], outline[0]], strict=True)
         if (b <= y) != (d <= y)
-    ]
-    return (min(found), max(found)) if found else None
+    )
 
 
 def _area(runs: Runs, kind: str, cell: float) -> str:

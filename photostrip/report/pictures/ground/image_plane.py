@@ -1,22 +1,17 @@
-"""Photos of a result as their cameras saw the ground: image points from adjusted points, the ground under the corners.
+"""Photos of a result as their cameras saw the ground: image points from adjusted points.
 
 For pictures, not for measuring: distortion is left aside.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.report.pictures.ground.plan_view import Grid
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.plan_view import Pair, Plan, Spot
-
-LOWEST_RAY = 0.1  # sine of the angle below the horizon from which a corner has a place on the ground
+    from photostrip.report.pictures.ground.plan_view import Pair
 
 
 class Residual(NamedTuple):
@@ -88,40 +83,3 @@ def _image_of(grid: Grid, photo: Document, point: Document | None, distance: flo
     m, (x, y, z) = photo["rotation"], grid.seen_from(photo, point)
     right, up, back = (m[n] * x + m[n + 3] * y + m[n + 6] * z for n in range(3))
     return (-distance * right / back, -distance * up / back) if back < 0 else None
-
-
-def footprints(document: Document, plan: Plan) -> dict[str, list[Pair]]:
-    """Return where the corners of each photo lie on the plan, on level ground at the mean height of its points."""
-    grid, cameras = Grid(document), cameras_of(document)
-    spots = {spot.id: spot for strip in plan.strips for spot in strip}
-    heights = _ground_heights(document, grid)
-    found = {}
-    for photo in document["photos"]:
-        camera, ground = cameras.get(photo["id"]), heights.get(photo["id"])
-        frame = frame_of(camera) if camera else None
-        if camera is None or frame is None or ground is None or not photo["rotation"]:
-            continue
-        rays = [_ray(grid, photo["rotation"], corner, camera["principal_distance_mm"]) for corner in frame.corners]
-        if all(up < -LOWEST_RAY * math.hypot(east, north, up) for east, north, up in rays):
-            found[photo["id"]] = [_reached(plan, spots[photo["id"]], ray, grid.up(photo) - ground) for ray in rays]
-    return found
-
-
-def _ground_heights(document: Document, grid: Grid) -> Mapping[str, float]:
-    """Return the mean height of the points of each photo."""
-    up = {point["id"]: grid.up(point) for point in document["points"]}
-    known = {row["photo"]: [up[name] for name in row["points"] if name in up] for row in document["residuals"]}
-    return {photo: math.fsum(values) / len(values) for photo, values in known.items() if values}
-
-
-def _ray(grid: Grid, m: list[float], corner: Pair, distance: float) -> tuple[float, float, float]:
-    """Return the direction of an image point to east, north and up."""
-    (x, y), z = corner, -distance
-    a, b, c = (m[n] * x + m[n + 1] * y + m[n + 2] * z for n in (0, 3, 6))
-    return grid.plan_direction((a, b, c))
-
-
-def _reached(plan: Plan, spot: Spot, ray: tuple[float, float, float], above: float) -> Pair:
-    east, north, up = ray
-    along, across = plan.turned(-east * above / up, -north * above / up)
-    return spot.along + along, spot.across + across

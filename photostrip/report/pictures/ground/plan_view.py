@@ -73,8 +73,8 @@ def plan_of(document: Document) -> Plan:
     flown = [[photo for photo in photos if photo["strip"] == name] for name in names] or [photos]
     first = flown[0]
     start, end = grid.place(first[0]), grid.place(first[-1])
-    length = math.hypot(end[0] - start[0], end[1] - start[1]) or 1.0
-    along = ((end[0] - start[0]) / length, (end[1] - start[1]) / length)
+    length = math.hypot(end[0] - start[0], end[1] - start[1])
+    along = ((end[0] - start[0]) / length, (end[1] - start[1]) / length) if length else (1.0, 0.0)
 
     def turned(east: float, north: float) -> Pair:
         return east * along[0] + north * along[1], north * along[0] - east * along[1]
