@@ -44,6 +44,7 @@ from photostrip.pipeline.inputs import CameraPositions  # noqa: E402
 from photostrip.points import locate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
+from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -220,6 +221,8 @@ class Run:
     placing: frozenset[str]  # measurements that place a point
     rejected: frozenset[str]  # control points and camera positions named as wrong
     control: frozenset[str]  # control points that count and have a place
+    image: frozenset[str]  # control points left out for a wrong image
+    either: frozenset[str]  # control points left out for a wrong image or a wrong coordinate, nothing telling which
 
     def sound(self, wrong: Iterable[str]) -> Floats:
         """Errors of the points without a wrong measurement of their own."""
@@ -249,7 +252,16 @@ def adjusted(project: Project, settings: Settings) -> Run:
         placing=frozenset(project.names[row] for row in np.flatnonzero(placing).tolist()),
         rejected=frozenset(name for note in notes for name in (*note.points, *note.photos)),
         control=frozenset(given.intersection(names)),
+        image=left_out_by_control(result, WRONG_IMAGE) - set(names),
+        either=left_out_by_control(result, EITHER) - set(names),
     )
+
+
+def left_out_by_control(result: Result, cause: str) -> frozenset[str]:
+    """Control points that were left out of strips of photos for one of their rays."""
+    o, strips = result.refined.observations, [strip for strip in result.strips if strip.model_stages is None]
+    rays = [each for strip in strips for each in strip.of_photos.wrong_rays if each.cause == cause]
+    return frozenset(o.point_ids[o.point[each.row]] for each in rays)
 
 
 def taking_part(result: Result, count: int) -> tuple[Flags, Flags]:
@@ -331,15 +343,19 @@ class Tally:
         if CLEAN in runs:
             self.counts.update(clean=1, touched=loses_anything(project, runs[CLEAN]))
         if AUTO in runs:
-            found, wrong = runs[AUTO], project.wrong_control & runs[AUTO].control
+            found, spoiled = runs[AUTO], spoiled_points(project.wrong)
+            wrong = project.wrong_control & (found.control | found.image | found.either)
             placing = found.placing & project.wrong
             self.counts.update(placing=len(placing), hidden=len(placing & project.along_base), control=len(wrong))
             false = found.rejected - project.wrong_control
             self.counts.update(named=len(wrong & found.rejected), false=len(false))
-            self.counts.update(misplaced=len(false & spoiled_points(project.wrong)))
+            self.counts.update(misplaced=len(false & spoiled))
+            self.counts.update(image=len(found.image), sound_image=len(found.image - spoiled))
+            self.counts.update(either=len(found.either), either_given=len(found.either & wrong))
+            self.counts.update(either_image=len(found.either & spoiled))
             if KNOWN in runs:
                 self.counts.update(lost=len(runs[KNOWN].used - found.used))
-                unplaced = set(runs[KNOWN].point) - set(found.point) - spoiled_points(project.wrong)
+                unplaced = set(runs[KNOWN].point) - set(found.point) - spoiled
                 self.counts.update(unplaced=len(unplaced))
             self.ratios += [rms[AUTO] / rms[CLEAN]] if CLEAN in runs else []
 
@@ -384,6 +400,12 @@ def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range, wanted: Sequence
     print("           points without a wrong measurement that lose their coordinates, and would not by knowledge")
     for kind, tally in tallies.items():
         print(f"{kind:11s}{tally.counts['hidden']:32d}{tally.counts['misplaced']:12d}{tally.counts['unplaced']:12d}")
+    print("\nproject    control points left out for an image, of which all images are right")
+    print("           left out for an image or a coordinate, with a wrong image, with a wrong coordinate")
+    for kind, tally in tallies.items():
+        c = tally.counts
+        row = f"{kind:11s}{c['image']:32d}{c['sound_image']:12d}{c['either']:12d}{c['either_image']:6d}"
+        print(f"{row}{c['either_given']:6d}")
     print("\nproject    ratio of a project's rms: median, 95 % below, largest")
     for kind, tally in tallies.items():
         middle, most, largest = np.quantile(tally.ratios, (0.5, 0.95, 1.0)) if tally.ratios else 3 * (float("nan"),)

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.gross_errors.control.control_rejections import WRONG_IMAGE
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -27,7 +25,7 @@ def not_determined(
         return {observations.point_ids[number]: why for number in np.flatnonzero(~done).tolist()}
     placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
     wrong = [each for strip in strips for each in strip.of_photos.wrong_rays]
-    contradicted = {int(observations.point[each.row]): each.cause == WRONG_IMAGE for each in wrong}
+    contradicted = {int(observations.point[each.row]): each.kind == "control" for each in wrong}
     on_photos: dict[int, list[tuple[int, int]]] = {}
     for row in np.flatnonzero(~done[observations.point]):
         photo = observations.photo_ids[observations.photo[row]]

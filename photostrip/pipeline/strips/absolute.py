@@ -18,7 +18,7 @@ from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Strip
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.gross_errors.control.control_rejections import WRONG_IMAGE
+from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
 from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay, StripAtControl
 from photostrip.triangulation.plausibility.control.shared_by_control import find_shared
 
@@ -188,7 +188,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
         frames=oriented.frames,
         intermediate=oriented.intermediate,
         xyz=stage.formed.xyz[oriented.control_rows],
-        placed=oriented.at_control,
+        similarity=oriented.absolute.similarity,
         weight=oriented.weights,
         rays=stage.control_rays(oriented),
         coordinates=found,
@@ -200,7 +200,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
     if shared is not None:  # single points prove nothing then
         return ScreenedStrip(oriented, control_screening.not_screened(control), shared)
     screened = control_screening.screen_control(place)
-    images = {control.ids[each.row]: each for each in screened.rejections if each.cause == WRONG_IMAGE}
+    images = {control.ids[each.row]: each for each in screened.rejections if each.cause in {WRONG_IMAGE, EITHER}}
     kept = screened.kept
     if images:
         stage, kept = stage.without_images(images), control

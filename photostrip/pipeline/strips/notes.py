@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
-from photostrip.triangulation.gross_errors.control.control_rejections import EXCHANGED, WRONG_IMAGE
+from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING, Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
@@ -84,11 +84,16 @@ def wrong_control_notes(strip: Strip | ModelStrip, screened: ScreenedControl) ->
 def wrong_image_notes(strip: Strip, observations: PhotoPoints, wrong: Sequence[Rejection]) -> Iterator[Note]:
     """Name control points that their own rays place wrongly."""
     for each in wrong:
-        if each.cause != WRONG_IMAGE:
+        if each.kind != "control":
             continue
         point, photo = observations.point_ids[observations.point[each.row]], strip.photos[each.other]
         text = f"control point {point} {_contradiction(each)}; not used"
-        text += f"; its image in photo {photo} is wrong, not its coordinates: they agree along its other ray"
+        if each.cause == EITHER:
+            text += (
+                f"; this or its image in photo {photo} is wrong, nothing tells which: they agree along its other ray"
+            )
+        else:
+            text += f"; its image in photo {photo} is wrong, not its coordinates: they agree along its other ray"
         yield Note("control-image", text, strip=strip.id, photos=(photo,), points=(point,))
 
 

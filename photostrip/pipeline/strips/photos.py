@@ -104,14 +104,14 @@ class FormedPhotos:
         return of
 
     def control_rays(self, oriented: Oriented) -> list[ControlRay]:
-        rays, centers = self._rays_in_use(), oriented.absolute.similarity(self.formed.centers)
+        rays = self._rays_in_use()
         point = np.searchsorted(self.formed.point, self.observations.point[rays.rows])
         found = []
         for row, place in enumerate(oriented.control_rows.tolist()):
             pair = rays.photo[point == place]
             if len(pair) == 2:
                 for along, other in (pair.tolist(), pair[::-1].tolist()):
-                    ray = oriented.at_control[row] - centers[along]
+                    ray = self.formed.xyz[place] - self.formed.centers[along]
                     found.append(ControlRay(row, other, ray / np.linalg.norm(ray)))
         return found
 

@@ -12,7 +12,7 @@ from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
 from photostrip.result.numbers import Document, natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
-from photostrip.triangulation.gross_errors.control.control_rejections import EXCHANGED, WRONG_IMAGE
+from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation.scale_transfer import depths
 from photostrip.units import MICROMETRES
@@ -170,7 +170,7 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
         photo = observations.photo_ids[observations.photo[each.row]]
         point = observations.point_ids[observations.point[each.row]]
         known = bool(np.isfinite(each.worst))
-        if each.cause == WRONG_IMAGE:
+        if each.kind == "control":
             rows.append((natural(point), photo_of[photo], _from_control(strip, each, point, photo)))
             continue
         entry = _entry(
@@ -204,7 +204,11 @@ def _from_control(strip: StripResult, wrong: Rejection, point: str, photo: str =
     reason = "; ".join(f"{GROUND_AXES[axis]} by about {wrong.size[axis]:+.2f} m" for axis in wrong.axes)
     if wrong.cause == EXCHANGED:
         reason += f"; fits when exchanged with {strip.control.ids[wrong.other]}"
-    if photo:
+    if wrong.cause == EITHER:
+        reason += (
+            f"; this or the ray of photo {photo} is wrong, nothing tells which: the error lies along the other ray"
+        )
+    elif photo:
         reason += f"; the wrong ray is that of photo {photo}: the error lies along the other ray"
     return _entry(
         strip=strip.strip.id,
@@ -215,7 +219,7 @@ def _from_control(strip: StripResult, wrong: Rejection, point: str, photo: str =
         limit=wrong.limit,
         size=wrong.worst,
         size_unit="m",
-        blamed=[photo] if photo else [],
+        blamed=[photo] if photo and wrong.cause != EITHER else [],
         reason=f"given coordinates contradict the strip and the other control: {reason}",
     )
 

@@ -216,11 +216,11 @@ def adjust(strip: StripAtControl, w: Floats, covariance: Floats, *, bends: bool 
     bends: whether the strip may be bent more than its covariance says, by polynomials.
     """
     found = strip.coordinates
-    count = len(w)
+    count, turn = len(w), strip.similarity.rotation
     position = strip.placed - strip.placed.mean(axis=0)
     columns = terms.columns(position / np.maximum(np.abs(position).max(axis=0), 1e-9), BENDS if bends else ())
     bent = (columns[found.point][:, :, None] * found.direction[:, None, :]).reshape(count, -1)
-    rays = [(found.point == ray.point) * (found.direction @ ray.direction) for ray in strip.rays]
+    rays = [(found.point == ray.point) * (found.direction @ turn @ ray.direction) for ray in strip.rays]
     errors = np.column_stack([np.eye(count), bent, *rays])
     weight = np.einsum("ij,ij->j", errors, np.linalg.solve(covariance, errors))
     if not (weight > 0.0).all():

@@ -11,6 +11,7 @@ import numpy as np
 from photostrip.rejection import Rejection
 from photostrip.statistics import f_quantile, normal_quantile
 from photostrip.triangulation.gross_errors.control.control_deletion import ALPHA, Deletion, adjust
+from photostrip.triangulation.gross_errors.rays.point_decisions import LIKELIER
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 
-EXCHANGED, WRONG_IMAGE = "exchanged", "image"
+EXCHANGED, WRONG_IMAGE, EITHER = "exchanged", "image", "image or coordinates"
 POWER = 0.8  # an error is called detectable when it is found in this share of cases
 
 
@@ -48,22 +49,20 @@ def kept_of(strip: StripAtControl, found: Found) -> Flags:
 
 
 def control_rejections(strip: StripAtControl, found: Found, rows: Numbers) -> list[Rejection]:
-    """List the points with rejected coordinates. With one plan coordinate the other one is not used either.
-
-    rows: rows of the section's control in that of the whole strip.
-    """
+    """List the points with rejected coordinates; rows: of the section's control in that of the whole strip."""
     place, partner, rejections = strip.coordinates, _exchanges(strip, found), []
     for point in found.whole.points:
         part = tuple(column for column in point if column in found.coordinates)
         if not part:
             continue
         row = int(place.point[point[0]])
-        photo = _wrong_image(strip, found, point, part)
         tested = found.whole.test(found.out, part)
         others = found.whole.without([column for column in found.out if column not in point])
+        cause, photo = _wrong_image(strip, others, point, part, found.whole.level)
         size = np.zeros(3)
         size[place.axis[list(point)]] = -others.estimate(point)
-        single = np.abs(others.estimate(part)) / _deviations(others, part) / np.sqrt(tested.spread)
+        deviation = np.sqrt(tested.spread * others.cofactor(part).diagonal()) / others.size[list(part)]
+        single = np.abs(others.estimate(part)) / deviation
         beyond = [column for column, value in zip(part, single, strict=True) if value > _limit(tested, found.whole, 1)]
         rejections.append(
             Rejection(
@@ -74,7 +73,7 @@ def control_rejections(strip: StripAtControl, found: Found, rows: Numbers) -> li
                 value=float(np.sqrt(tested.gain / tested.spread)),
                 limit=_limit(tested, found.whole, len(part)),
                 size=tuple(size.tolist()),
-                cause=EXCHANGED if row in partner else WRONG_IMAGE if photo >= 0 else "",
+                cause=EXCHANGED if row in partner else cause,
                 other=int(rows[partner[row]]) if row in partner else photo,
             )
         )
@@ -110,30 +109,26 @@ def _limit(tested: Deletion, whole: JointAdjustment, count: int) -> float:
     return float(np.sqrt(count * f_quantile(1 - whole.level, count, tested.freedom - count)))
 
 
-def _deviations(others: JointAdjustment, columns: Columns) -> Floats:
-    """Return standard deviations of errors estimated together, metres, for a variance factor of 1."""
-    return np.asarray(np.sqrt(others.cofactor(columns).diagonal()) / others.size[list(columns)], float)
+def _wrong_image(
+    strip: StripAtControl, others: JointAdjustment, point: Columns, part: Columns, level: float
+) -> tuple[str, int]:
+    """Find the photo whose image of the point is wrong, not its coordinates, or may be; -1 where there is none.
 
-
-def _wrong_image(strip: StripAtControl, found: Found, point: Columns, part: Columns) -> int:
-    """Find the photo whose image of the point is wrong, not its coordinates; -1 where there is none.
-
-    An error of the image moves the point along its other ray: that explains all its misclosures, and the rejected
-    coordinates do not.
+    An error of the image moves the point along its other ray. Where that explains all its misclosures, it is to blame
+    when the rejected coordinates do not, and one of both when they do, about as well: a height under a steep ray.
     """
-    others = found.whole.without([column for column in found.out if column not in point])
-    everything, photo, best = others.deletions([point])[0], -1, found.whole.level
-    if len(part) < len(point):
-        best, alone = ALPHA, others.deletions([part])[0]
-        if _beside(everything, alone).probability > ALPHA:
-            return -1
     row = strip.coordinates.point[point[0]]
-    for column, ray in enumerate(strip.rays, found.whole.first_ray):
-        if ray.point == row and len(point) > 1:
-            left = _beside(everything, others.deletions([(column,)])[0]).probability
-            if left > best:
-                photo, best = ray.photo, left
-    return photo
+    columns = [column for column, ray in enumerate(strip.rays, others.first_ray) if ray.point == row]
+    if not columns or len(point) == 1:
+        return "", -1
+    (everything,), (alone,) = others.deletions([point]), others.deletions([part])
+    moved = max(others.deletions([(column,) for column in columns]), key=lambda each: each.gain)
+    if _beside(everything, moved).probability <= (level if part == point else ALPHA):
+        return "", -1
+    photo, ahead = strip.rays[moved.columns[0] - others.first_ray].photo, (moved.gain - alone.gain) / everything.spread
+    if part == point or _beside(everything, alone).probability <= ALPHA or ahead > LIKELIER:
+        return WRONG_IMAGE, photo
+    return (EITHER, photo) if ahead > -LIKELIER else ("", -1)
 
 
 def _beside(everything: Deletion, some: Deletion) -> Deletion:
@@ -157,8 +152,9 @@ def _exchanges(strip: StripAtControl, found: Found) -> dict[int, int]:
             continue
         order = np.arange(len(control))
         order[[one, other]] = other, one
-        exchanged = strip.misclosures(kept, replace(control, enu=control.enu[order]))
-        tried = adjust(strip, exchanged, whole.covariance, bends=whole.first_ray > whole.coordinates)
+        laid = strip.laid_on(kept)
+        exchanged = laid.misclosures(replace(control, enu=control.enu[order]))
+        tried = adjust(laid, exchanged, whole.covariance, bends=whole.first_ray > whole.coordinates)
         both = tuple(np.flatnonzero(np.isin(place.point, (one, other))).tolist())
         before = tried.without([column for column in found.out if column not in both])
         gain = before.squares - before.without(both).squares

@@ -1,10 +1,9 @@
 """Wrong control: coordinates that the strip and all other control contradict.
 
-All misclosures at the control have one covariance, that of the strip and that of the given coordinates; it says what
-belongs to the bend of the strip. The most significant hypothesis (a point in plan, in height, in both) is deleted and
-the rest tested again, until nothing is significant (``control_deletion``). Where the covariance does not explain what
-is left, the smallest set is looked for without which it does: wrong coordinates, and bends of the strip beyond it
-(``control_components``). Where there is none, what the tests of single points found is all.
+The most significant hypothesis (a point in plan, in height, in both) is deleted and the rest tested again, until
+nothing is significant (``control_deletion``). Where the covariance does not explain what is left, the smallest set is
+looked for without which it does: wrong coordinates, and bends of the strip beyond it (``control_components``). Where
+there is none, what the tests of single points found is all.
 
 Source: derived; data snooping with correlated observations.
 """
@@ -111,7 +110,8 @@ def _laid(
     """Search, lay the strip on what is kept, and search from what was found, until the same is found."""
     kept, out = strip.control.use, None
     for _ in strip.coordinates.point:
-        whole = adjust(strip, strip.misclosures(kept), covariance, bends=bends)
+        laid = strip.laid_on(kept)
+        whole = adjust(laid, laid.misclosures(), covariance, bends=bends)
         out = whole.shrunk(whole.grown(whole.shrunk(start(whole) if out is None else out)))
         found = Found(whole, out)
         before, kept = kept, kept_of(strip, found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
+    from photostrip.geometry.similarity import Similarity
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
 
@@ -29,7 +31,7 @@ class ControlRay(NamedTuple):
 
     point: int
     photo: int  # place in the strip of the other photo, whose image would be wrong
-    direction: Floats  # (3,): of the ray, unit vector in the intermediate frame
+    direction: Floats  # (3,): of the ray, unit vector in strip coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +42,18 @@ class StripAtControl:
     frames: Sequence[GroundFrame]
     intermediate: IntermediateFrame
     xyz: Floats  # (n, 3): strip coordinates of the control points
-    placed: Floats  # (n, 3): the same after a similarity on all control, intermediate frame, metres
+    similarity: Similarity  # into the intermediate frame, metres
     weight: Floats  # (n, 3): weights of their coordinates in the similarity
     rays: Sequence[ControlRay]
     coordinates: Misclosures  # the w coordinates that count
     design: Floats  # (w, 7): their derivatives by a similarity
     covariance: Callable[[Numbers], Floats]  # of some of them, strip and control together, (w, w), metres^2
     share: float  # of a section in the coordinates of the whole strip
+
+    @cached_property
+    def placed(self) -> Floats:
+        """The control points in the intermediate frame (n, 3), metres."""
+        return self.similarity(self.xyz)
 
     def sections(self) -> list[tuple[Numbers, StripAtControl]]:
         """Cut the control along the strip into parts of equal size; rows of each, and the strip there."""
@@ -65,7 +72,6 @@ class StripAtControl:
             self,
             control=self.control.take(rows),
             xyz=self.xyz[rows],
-            placed=self.placed[rows],
             weight=self.weight[rows],
             rays=[ray._replace(point=int(place[ray.point])) for ray in self.rays if place[ray.point] >= 0],
             coordinates=replace(self.coordinates.take(inside), point=place[self.coordinates.point[inside]]),
@@ -74,13 +80,13 @@ class StripAtControl:
             share=len(inside) / len(self.design),
         )
 
-    def misclosures(self, kept: Flags, control: ControlPoints | None = None) -> Floats:
-        """Strip minus given (w,) after a similarity on what is kept, metres along the ground axes.
-
-        control: other coordinates of the points than the given ones.
-        """
+    def laid_on(self, kept: Flags) -> StripAtControl:
+        """Lay the strip on what is kept: a wrong point of 200 m turns it, and its rays, by a hundredth."""
         used = Targets(replace(self.control, use=kept), self.frames, self.intermediate)
-        similarity = absolute_orientation.orient(self.xyz, used, np.where(kept, self.weight, 0.0)).similarity
+        laid = absolute_orientation.orient(self.xyz, used, np.where(kept, self.weight, 0.0))
+        return replace(self, similarity=laid.similarity)
+
+    def misclosures(self, control: ControlPoints | None = None) -> Floats:
+        """Strip minus given (w,), metres along the ground axes; control: other coordinates than the given ones."""
         targets = Targets(control or self.control, self.frames, self.intermediate)
-        found: Floats = targets.misclosures(similarity(self.xyz))[self.coordinates.point, self.coordinates.axis]
-        return found
+        return np.asarray(targets.misclosures(self.placed)[self.coordinates.point, self.coordinates.axis], float)

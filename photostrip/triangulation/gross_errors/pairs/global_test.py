@@ -47,8 +47,7 @@ class GlobalTest:
     def squares(self, orientation: Orientation) -> Floats:
         """Value of the test of each pair: v^T W v / sigma^2."""
         pairs = orientation.pairs
-        total: Floats = pairs.sums(pairs.weight * orientation.parallax**2) / self.sigma**2
-        return total
+        return np.asarray(pairs.sums(pairs.weight * orientation.parallax**2) / self.sigma**2, float)
 
     def limits(self, count: Numbers) -> Floats:
         """Critical values: chi-square with count - 5 degrees of freedom; infinite without redundancy."""

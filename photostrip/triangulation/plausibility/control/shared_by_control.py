@@ -56,7 +56,8 @@ def find_shared(strip: StripAtControl) -> StretchedHeights | ShiftedList | None:
     if count <= strip.design.shape[1] + 1:
         return None
     try:
-        whole = adjust(strip, strip.misclosures(strip.control.use), strip.covariance(np.arange(count)), bends=False)
+        laid = strip.laid_on(strip.control.use)
+        whole = adjust(laid, laid.misclosures(), strip.covariance(np.arange(count)), bends=False)
     except PhotostripError:
         return None
     alone = max((each.gain for each in whole.deletions(whole.points) if np.isfinite(each.gain)), default=0.0)

@@ -16,6 +16,7 @@ from scipy.stats import norm
 
 from benchmarks.gross_errors import much_wrong_run
 from photostrip.frozen import dataclass
+from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import Settings, triangulate
 from photostrip.points import ControlPoints
 from photostrip.result.document import document_of
@@ -48,7 +49,10 @@ class Drawn(StripAtControl):
 
     w: Floats
 
-    def misclosures(self, kept: Flags, control: ControlPoints | None = None) -> Floats:  # noqa: ARG002
+    def laid_on(self, kept: Flags) -> Drawn:  # noqa: ARG002
+        return self
+
+    def misclosures(self, control: ControlPoints | None = None) -> Floats:  # noqa: ARG002
         return self.w
 
 
@@ -74,8 +78,8 @@ def drawn(seed: int, points: int = 8, worse: float = 1.0) -> Drawn:
         control=control,
         frames=(),
         intermediate=nothing,
-        xyz=np.zeros((points, 3)),
-        placed=rng.uniform(-1, 1, (points, 3)),
+        xyz=rng.uniform(-1, 1, (points, 3)),
+        similarity=Similarity(1.0, np.eye(3), np.zeros(3)),
         weight=np.ones((points, 3)),
         rays=(),
         coordinates=Misclosures(point, axis, np.eye(3)[axis], np.ones(w), rows),
@@ -272,6 +276,35 @@ def test_a_wrong_image_of_a_control_point_on_two_photos_is_named_instead_of_its_
     assert [(note.code, note.photos, note.points) for note in told] == [("control-image", (o.photo_ids[0],), ("p0_1",))]
     (line,) = [line for line in document_of(result)["rejected"] if line["stage"] == "control"]
     assert line["blamed"] == [o.photo_ids[0]]
+
+
+@pytest.mark.parametrize("wrong", ["image", "height"])
+def test_of_a_height_and_an_image_nothing_tells_which_is_wrong_under_a_steep_ray(wrong: str) -> None:
+    """The point lies below the first photo: an error of its image in the second changes its height alone."""
+    strip = flown()
+    o = strip.observations
+    (row,) = np.flatnonzero((o.photo == 1) & (o.point == o.point_ids.index("p0_0")))
+    xy = o.xy.copy()
+    xy[row, 0] += 0.2 * (wrong == "image")
+    spoiled = replace(strip, observations=replace(o, xy=xy))
+    result = adjusted(spoiled, strip.bands(0, 3, 6, 9, 12), {"p0_0": (0.0, 0.0, 4.0)} if wrong == "height" else {})
+    told = [note for note in result.notes if note.code in {"control-rejected", "control-image"}]
+    assert [(note.code, note.photos, note.points) for note in told] == [("control-image", (o.photo_ids[1],), ("p0_0",))]
+    assert "nothing tells which" in str(told[0])
+    (line,) = [line for line in document_of(result)["rejected"] if line["stage"] == "control"]
+    assert (line["point"], line["blamed"]) == ("p0_0", [])
+
+
+def test_a_wrong_image_is_told_from_coordinates_on_the_strip_laid_on_the_other_control() -> None:
+    """An error of hundreds of metres turns a strip on all its control, and its rays with it."""
+    strip = flown()
+    o = strip.observations
+    (row,) = np.flatnonzero((o.photo == 1) & (o.point == o.point_ids.index("p0_1")))
+    xy = o.xy.copy()
+    xy[row, 0] += 8.0
+    result = adjusted(replace(strip, observations=replace(o, xy=xy)), strip.bands(0, 3, 6, 9, 12), {})
+    told = [note for note in result.notes if note.code in {"control-rejected", "control-image"}]
+    assert [(note.code, note.photos, note.points) for note in told] == [("control-image", (o.photo_ids[1],), ("p0_1",))]
 
 
 @pytest.mark.parametrize(("height", "wrong"), [(2.2, {0, 1, 2}), (1.85, {0, 1})])
