@@ -89,9 +89,7 @@ def wrong_image_notes(strip: Strip, observations: PhotoPoints, wrong: Sequence[R
         point, photo = observations.point_ids[observations.point[each.row]], strip.photos[each.other]
         text = f"control point {point} {_contradiction(each)}; not used"
         if each.cause == EITHER:
-            text += (
-                f"; this or its image in photo {photo} is wrong, nothing tells which: they agree along its other ray"
-            )
+            text += f"; this or its image in photo {photo} is wrong, nothing tells which: both agree on its other ray"
         else:
             text += f"; its image in photo {photo} is wrong, not its coordinates: they agree along its other ray"
         yield Note("control-image", text, strip=strip.id, photos=(photo,), points=(point,))

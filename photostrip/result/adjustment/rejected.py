@@ -205,9 +205,7 @@ def _from_control(strip: StripResult, wrong: Rejection, point: str, photo: str =
     if wrong.cause == EXCHANGED:
         reason += f"; fits when exchanged with {strip.control.ids[wrong.other]}"
     if wrong.cause == EITHER:
-        reason += (
-            f"; this or the ray of photo {photo} is wrong, nothing tells which: the error lies along the other ray"
-        )
+        reason += f"; this or the ray of photo {photo} is wrong, nothing tells which: the error lies on the other ray"
     elif photo:
         reason += f"; the wrong ray is that of photo {photo}: the error lies along the other ray"
     return _entry(
