@@ -8,6 +8,7 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.result.adjustment.parallax_limits import parallax_limits
 from photostrip.result.quantities import grouped, records
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
     from photostrip.result.records import Records
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.relative_orientation.orientation import Orientation, RelativeSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +59,10 @@ def sigma0(squares: Floats, redundancy: Numbers) -> float:
 def models_of(result: Result) -> list[Document]:
     """Return the list ``models``: relative orientation and scale of every pair, in flight order."""
     ids = result.refined.observations.point_ids
-    return [model for strip in result.photo_strips for model in _models(strip, ids)]
+    return [model for strip in result.photo_strips for model in _models(strip, ids, result.settings.relative)]
 
 
-def _models(strip: StripResult, ids: Sequence[str]) -> Records:
+def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) -> Records:
     stages, photos, sums = strip.of_photos, strip.strip.photos, Parallaxes.of(strip)
     oriented, formed, used = stages.orientation, stages.formed, stages.orientation.points_used
     columns = {
@@ -80,6 +81,7 @@ def _models(strip: StripResult, ids: Sequence[str]) -> Records:
         "redundancy": sums.redundancy,
         "zones": stages.screened.counts,
         "detectable_um": 1000.0 * _detectable(strip),
+        "limit_um": 1000.0 * parallax_limits(stages, relative),
         "masked_errors_suspected": stages.screened.masked,
         "condition": oriented.condition,
         "iterations": oriented.iterations,

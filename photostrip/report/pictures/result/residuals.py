@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
-from photostrip.report.pictures.chart import LEFT, WIDTH, Entry, Layout, framed, legend, steps
+from photostrip.report.pictures.chart import LEFT, WIDTH
 from photostrip.report.pictures.ground.image_plane import Frame, cameras_of, frame_of, residuals_of
+from photostrip.report.pictures.result.histogram import histogram_picture
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -25,8 +25,6 @@ CELLS = 8  # of the grid along the longer side of the image plane
 PLANE = 400.0  # the image plane of a camera on the picture
 LEAST_IN_CELL = 3  # residuals from which a cell has a mean
 SEEN = 0.95  # share of the vectors that are not longer than LONGEST
-CLASSES = 33  # of the histogram, an odd number
-REACH = 4.5  # standard deviations that the histogram holds, at least
 CAMERAS = 4  # whose image planes are drawn
 
 
@@ -36,7 +34,7 @@ def residual_pictures(document: Document) -> list[Picture]:
     used = [each for each in found if each.used]
     if not used:
         return []
-    return [*_vectors(document, found), *_grids(document, used), _histogram(document, used)]
+    return [*_vectors(document, found), *_grids(document, used), histogram_picture(document, used)]
 
 
 def _frame(document: Document, found: Iterable[Residual], photos: set[str]) -> Frame:
@@ -188,57 +186,3 @@ def _cells(
         for _, rows in sorted(found.items())
         if len(rows) >= LEAST_IN_CELL
     ]
-
-
-def _histogram(document: Document, used: Sequence[Residual]) -> Picture:
-    """Draw the distribution of the residuals, standardised where a bundle adjustment tested them."""
-    tested = [value for each in used if each.test for value in each.test]
-    plain = [value for each in used for value in each.size]
-    values, unit, sigma = (
-        (tested, "standard deviations", 1.0) if tested else (plain, "µm", _rms(each.size for each in used))
-    )
-    limit = document["bundle"]["screening"]["limit"] if tested else None
-    reach = max(REACH * sigma, 1.1 * (limit or 0.0))
-    width = 2 * reach / CLASSES
-    counts = [0] * CLASSES
-    for value in values:
-        counts[min(max(int((value + reach) / width), 0), CLASSES - 1)] += 1
-    normal = NormalDist(0.0, sigma or 1.0)
-    curve = [(x, len(values) * width * normal.pdf(x)) for x in (reach * (n / 60.0 - 1.0) for n in range(121))]
-    layout = Layout(columns=1, height=240.0, number=1)
-    panel = layout.panel(0, (-reach, reach), (0.0, 1.08 * max(*counts, *(y for _, y in curve))))
-    drawn = []
-    for number, count in enumerate(counts):
-        (x, y), (right, zero) = panel.at(-reach + number * width, count), panel.at(-reach + (number + 1) * width, 0.0)
-        if count:
-            drawn.append(svg.rectangle((x, y), (right - x, zero - y), "column", counted(count, "residual")))
-    drawn += framed(panel, (f"residual, {unit}", "number"))
-    drawn.append(steps(panel, curve, "curve curve-2"))
-    entries = [
-        Entry("residuals of x and y", "column", "square"),
-        Entry(f"normal curve, σ = {sigma:.3g} {unit if unit == 'µm' else ''}".strip(), "curve curve-2"),
-    ]
-    if limit:
-        drawn += [
-            svg.line(panel.at(side * limit, panel.y.low), panel.at(side * limit, panel.y.high), "limit")
-            for side in (-1, 1)
-        ]
-        entries.append(Entry(f"rejected beyond ±{limit:.2f}", "limit"))
-    drawn += legend(entries)
-    beyond = sum(abs(value) > reach for value in values)
-    caption = (
-        "How the image residuals are distributed, each over its own standard deviation, with the limits of the search "
-        "for gross errors."
-        if limit
-        else "How the image residuals are distributed. They are smaller than the errors of the measurements, of which "
-        "the orientations took up a part; gross errors were sought in the y parallaxes, not here."
-    )
-    if beyond:
-        caption += (
-            f" {counted(beyond, 'residual')} beyond the axis {'is' if beyond == 1 else 'are'} counted at its ends."
-        )
-    three = sum(abs(value) > 3 * sigma for value in values)
-    chance = 2 * normal.cdf(-3 * sigma) * len(values)
-    words = f"{len(values)} residuals, {three} beyond three standard deviations; {chance:.1f} would be by chance."
-    texts = svg.Texts("Distribution of the image residuals", caption, words)
-    return svg.picture("histogram", (WIDTH, layout.whole), texts, drawn)
