@@ -71,23 +71,23 @@ LINKS = """
 @cache
 def document(kind: str) -> dict[str, Any]:
     """Give the result of a project of a kind."""
-    bundle = Settings(adjustment="bundle")
     if kind == "failed run":
         found = copy.deepcopy(saved())
         found["control"] = [row | {"id": f"{row['id']}.{n}"} for n in range(3) for row in found["control"]]
         return found
     if kind == "strip":
-        return as_lists(case().document)
-    if kind == "300 photos":
-        long = Spec(flight=Flight(photos=300), control=Control(every=15))
-        return as_lists(solved(inputs_of(simulate(long))).document)
-    if kind == "models":
-        return as_lists(solved(inputs_of(simulate(Spec(models=Models(), flight=spec().flight)))).document)
-    inputs = case("projected", 2).inputs
-    if kind == "single photos":
-        alone = tuple(Strip(photo, each.camera, (photo,)) for each in inputs.strips for photo in each.photos)
-        inputs = replace(inputs, strips=alone)
-    return as_lists(solved(inputs, bundle).document)
+        run = case()
+    elif kind == "300 photos":
+        run = solved(inputs_of(simulate(Spec(flight=Flight(photos=300), control=Control(every=15)))))
+    elif kind == "models":
+        run = solved(inputs_of(simulate(Spec(models=Models(), flight=spec().flight))))
+    else:
+        inputs = case("projected", 2).inputs
+        if kind == "single photos":
+            alone = tuple(Strip(photo, each.camera, (photo,)) for each in inputs.strips for photo in each.photos)
+            inputs = replace(inputs, strips=alone)
+        run = solved(inputs, Settings(adjustment="bundle"))
+    return dict(as_lists(run.document))
 
 
 @pytest.fixture(scope="module")
