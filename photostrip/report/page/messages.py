@@ -5,6 +5,7 @@ Whatever the form, the same findings come out with the same file, line, column, 
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,8 @@ ACCEPTED = "accepted: "
 EMPTY: Document = {
     "file": "", "line": 0, "column": 0, "key": "", "expected": "", "fix": "", "photos": [], "points": []
 }  # fmt: skip
-MOST_OF_A_KIND = 5  # findings, or notes, of one kind that are told to people
+MOST_OF_A_KIND = 5  # faults, findings, or notes, of one kind that are told to people
+NUMBER = re.compile(r"\d+")  # in the path of a key: which of a list it is
 
 
 def finding_of(source: Fault | Note | Finding) -> Document:
@@ -104,28 +106,28 @@ def line_of(finding: Document) -> str:
 
 
 def lines_of(findings: Sequence[Document]) -> list[str]:
-    """Return findings one a line; of many of one kind that are no faults, five and how many more there are."""
+    """Return findings one a line; of many of one kind five, and how many more there are."""
     count = Counter(_kind(each) for each in findings)
-    told: Counter[tuple[str, str]] = Counter()
+    told: Counter[tuple[str, ...]] = Counter()
     lines = []
     for each in findings:
         kind = _kind(each)
         told[kind] += 1
-        if told[kind] <= MOST_OF_A_KIND or _is_fault(each):
+        if told[kind] <= MOST_OF_A_KIND:
             lines.append(line_of(each))
         elif told[kind] == count[kind]:
             more = count[kind] - MOST_OF_A_KIND
-            lines.append(f"{kind[0]}: {kind[1]} {more} more like these; --format json names all")
+            place = f"{each['file']}: " if kind[2:] and each["file"] else ""
+            lines.append(visible(f"{kind[0]}: {place}{kind[1]} {more} more like these; --format json names all"))
     return lines
 
 
-def _kind(finding: Document) -> tuple[str, str]:
-    return finding["severity"], finding["code"]
-
-
-def _is_fault(finding: Document) -> bool:
-    """Whether it has to be put right, each at its place: neither a finding of the gate nor a note."""
-    return finding["severity"] == "error" and "evidence" not in finding
+def _kind(finding: Document) -> tuple[str, ...]:
+    """What findings share that are told together; faults share the column of a table, or the key of a list."""
+    kind = finding["severity"], finding["code"]
+    if finding["severity"] != "error" or "evidence" in finding:
+        return kind
+    return *kind, finding["file"], NUMBER.sub("", finding["key"])
 
 
 def annotated(findings: Iterable[Document]) -> str:
