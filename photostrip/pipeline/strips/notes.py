@@ -70,6 +70,14 @@ def screening_notes(strip: Strip, screened: ScreenedPairs, sigma: float) -> Iter
         yield Note("masked-errors", text, strip=strip.id, photos=names)
 
 
+def rays_not_tested(strip: Strip) -> Note:
+    text = (
+        f"strip {strip.id}: its rays could not be tested together, as those left do not hold its photos; points were "
+        "rejected pair by pair only, where errors along the base do not show"
+    )
+    return Note("rays-not-tested", text, severity="note", strip=strip.id)
+
+
 def wrong_control_notes(strip: Strip | ModelStrip, screened: ScreenedControl) -> Iterator[Note]:
     """Name control that was not used, and what seems to be wrong with it."""
     ids = screened.kept.ids

@@ -49,6 +49,7 @@ class FormedPhotos:
     screened: screening.ScreenedPairs  # the search for gross errors in its pairs
     formed: FormedStrip
     wrong_rays: tuple[Rejection, ...]  # rays that the others of their points contradict
+    rays_tested: bool = True  # whether those rays could be searched for
 
     @property
     def orientation(self) -> Orientation:
@@ -168,6 +169,7 @@ class FormedPhotos:
             notes=(
                 *overruling.notes(settings.relative, strip.id, strip.photos),
                 *notes.screening_notes(strip, self.screened, self.sigma),
+                *([] if self.rays_tested else [notes.rays_not_tested(strip)]),
                 *notes.wrong_control_notes(strip, screened.screened_control),
                 *notes.wrong_image_notes(strip, self.observations, self.wrong_rays),
                 *notes.pair_notes(strip, self.orientation),
@@ -261,6 +263,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     oriented, scatter = screened.orientation, screened.scatter.by_pair
     refuse_unusable(oriented, screened.converged, strip.photos)
     wrong: tuple[Rejection, ...] = ()
+    tested = True
     given = settings.formation.scale_weights
     point_weight = np.array([given.get(name, 1.0) for name in observations.point_ids]) if given else None
     if settings.relative.screening == "none":
@@ -277,7 +280,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
             kept=overruling.rows(settings.relative.keep, observations),
         )
         readmit = settings.relative.screening in screening.SEARCHES
-        oriented, formed, wrong = form_screened(
+        oriented, formed, wrong, tested = form_screened(
             oriented,
             rays,
             strip.photos,
@@ -295,4 +298,5 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
         screened=screened,
         formed=formed,
         wrong_rays=wrong,
+        rays_tested=tested,
     )

@@ -31,6 +31,7 @@ class ScreenedStrip(NamedTuple):
     orientation: Orientation
     formed: FormedStrip
     rejections: tuple[Rejection, ...]  # rays that must not be used, rows of the observations
+    tested: bool = True  # False where the rays that were left could not be adjusted together
 
 
 def form_screened(
@@ -57,7 +58,7 @@ def form_screened(
 
     found = wrong_rays(of_pairs, formed, rays)
     if found is None:
-        return ScreenedStrip(of_pairs, formed, ())
+        return ScreenedStrip(of_pairs, formed, (), tested=False)
     used, aside = _uses(of_pairs, found, readmit=readmit)
     changed = np.unique(of_pairs.pairs.pair[used != of_pairs.used])
     oriented = orient_again(of_pairs, np.where(used, rays.weight, 0.0), changed) if len(changed) else of_pairs

@@ -123,7 +123,7 @@ def lines_of(findings: Sequence[Document]) -> list[str]:
 
 
 def _kind(finding: Document) -> tuple[str, ...]:
-    """What findings share that are told together; faults share the column of a table, or the key of a list."""
+    """Return what findings share that are told together: faults the column of a table, or the key of a list."""
     kind = finding["severity"], finding["code"]
     if finding["severity"] != "error" or "evidence" in finding:
         return kind

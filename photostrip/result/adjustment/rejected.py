@@ -83,18 +83,17 @@ def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]
     def place(rejection: Rejection) -> tuple[int, object]:
         return int(oriented.pairs.pair[rejection.row]), natural(ids[oriented.point[rejection.row]])
 
-    return [_from_pair(strip, each, observations) for each in sorted(strip.of_photos.rejections, key=place)]
+    wrong = {each.row for each in strip.of_photos.wrong_rays if each.cause == WRONG_RAY}
+    return [_from_pair(strip, each, observations, wrong) for each in sorted(strip.of_photos.rejections, key=place)]
 
 
-def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoints) -> Document:
+def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoints, wrong: set[int]) -> Document:
     oriented = strip.of_photos.orientation
     pair = int(oriented.pairs.pair[rejection.row])
     size = rejection.worst * MICROMETRES
     factor = MICROMETRES if rejection.test == "parallax" else 1.0
     blamed = [
-        observations.photo_ids[observations.photo[each.row]]
-        for each in strip.of_photos.wrong_rays
-        if each.cause == WRONG_RAY and each.row in oriented.rows[rejection.row]
+        observations.photo_ids[observations.photo[row]] for row in oriented.rows[rejection.row].tolist() if row in wrong
     ]
     if rejection.readmitted:
         blamed = []

@@ -15,6 +15,8 @@ from photostrip.triangulation.bundle.normal_equations.reduced import Reduced, co
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
@@ -29,6 +31,7 @@ STRAIGHT = 1e-3  # breadth of control on one line, as part of its length
 NARROW = 0.2  # rms distance of what is given from one line over that of all points, told where nothing converges
 FAR_OFF = 10.0  # standard deviations of a control coordinate that is told then
 ITERATIONS = 3
+MOST_FAILED = 8  # adjustments of a search that may fail: each takes six times as long as one that converges
 SHARE = 0.5  # of the largest element of a null vector: what is named with it
 TINY = 1e-9
 MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll about x", "turn about y", "turn about z")
@@ -125,6 +128,19 @@ def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> Geomet
             "its coordinates or its id wrong?"
         )
     return GeometryError(message, code="bundle-diverged")
+
+
+def refuse_endless(problem: BundleProblem, rejected: Sequence[int], adjustments: int, failed: int) -> None:
+    """End a search for gross errors whose adjustments fail (``search-ended``); say where most rays were rejected."""
+    if failed < MOST_FAILED:
+        return
+    count = np.bincount(problem.images.photo[np.array(rejected, np.intp)], minlength=problem.photos)
+    worst = [problem.photo_name(int(photo)) for photo in np.argsort(-count, kind="stable")[:3] if count[photo]]
+    message = f"the search for gross errors ended after {counted(adjustments, 'adjustment')} and "
+    message += f"{counted(len(rejected), 'rejected ray')}: without what contradicts the rest, it does not converge"
+    if worst:
+        message += f"; most were rejected on {named(worst, 'photo')}: were its points named wrongly?"
+    raise GeometryError(message, photos=worst, code="search-ended")
 
 
 def _extent(places: Floats) -> tuple[float, float]:

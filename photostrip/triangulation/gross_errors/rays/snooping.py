@@ -21,6 +21,7 @@ from photostrip.frozen import dataclass
 from photostrip.rejection import Rejection
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up
+from photostrip.triangulation.bundle.normal_equations.defects import refuse_endless
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
@@ -72,22 +73,18 @@ class ScreenedBundle:
     ) -> ScreenedBundle:
         chosen = selected(problem, selection)
         solution = solve(chosen, rough=rough)
+        points_out = len(np.unique(problem.images.point[~selection.images]))
         return cls(
             problem=chosen,
             selection=selection,
             solution=solution,
             precision=cofactors_of(solution),
-            limit=reliability.limit_of(solution, settings, _established(problem, selection), BOTH_GO if rough else 1.0),
+            limit=reliability.limit_of(solution, settings, points_out, BOTH_GO if rough else 1.0),
         )
 
     @cached_property
     def joint(self) -> JointCofactors:
         return JointCofactors.of_solution(self.solution)
-
-
-def _established(problem: BundleProblem, selection: Selection) -> int:
-    """Count the points with a ray outside."""
-    return len(np.unique(problem.images.point[~selection.images]))
 
 
 def screen_bundle(
@@ -141,7 +138,7 @@ class _Search:
         self.back: set[int] = set()  # points that came back; what must go again stays out
         self.decided = Selection.everything(problem)  # what took part when rays outside were decided on
         self.beyond = np.full(problem.points, np.inf)  # test values of points with a ray outside, when decided on
-        self.rounds = 0
+        self.rounds = self.failed = 0
         self.common: list[CommonError] = []
         self.next_trial = 0  # given coordinates that are out when a common error, tried in vain, is tried again
 
@@ -204,7 +201,8 @@ class _Search:
             found = self.adjust(supported(self.problem, selection))
             reliability.require_regular(found.problem, found.solution, found.precision)
         except GeometryError:
-            self.problem = before
+            self.problem, self.failed = before, self.failed + 1
+            refuse_endless(before, [row for kind, row, _ in self.out if kind == IMAGE], self.rounds, self.failed)
             if worst[0].kind != IMAGE:
                 if len(worst) > 1:
                     return self._without(done, worst[:1])

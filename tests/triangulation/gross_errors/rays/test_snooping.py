@@ -12,7 +12,8 @@ from photostrip.errors import GeometryError
 from photostrip.rejection import Rejection
 from photostrip.simulation import Flight, Points, Spec
 from photostrip.statistics import normal_quantile
-from photostrip.triangulation.bundle.quality.reliability import CONTROL, require_regular
+from photostrip.triangulation.bundle.normal_equations.defects import MOST_FAILED
+from photostrip.triangulation.bundle.quality.reliability import CONTROL, IMAGE, require_regular
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.gross_errors.rays import snooping, strip_network
@@ -22,6 +23,7 @@ from tests.pipeline.blocks import adjusted, simulate
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution
 
 BLOCK = Spec(flight=Flight(photos=6), points=Points(extra_per_model=8))
 
@@ -98,6 +100,31 @@ def test_a_point_comes_back_once_the_limit_has_risen_above_it(
     search.beyond[point] = part * done.limit.value
     more = search.fitting(done)
     assert (more is not None and more.images.all()) == back
+
+
+def test_a_search_ends_where_eight_adjustments_fail(problem: BundleProblem, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A block of exchanged points was adjusted 132 times, 110 times in vain: a point was spared each time."""
+    rows = [int(rays_of(problem, point)[0]) for point in range(20)]
+    solved = 0
+
+    def solve(chosen: BundleProblem, *, rough: bool = False) -> BundleSolution:
+        nonlocal solved
+        solved += 1
+        if solved > 1:
+            raise GeometryError("does not converge")
+        return solved_once(chosen, rough=rough)
+
+    def worst(search: snooping._Search, _: snooping.ScreenedBundle) -> list[Rejection]:
+        left = [row for row in rows if not search.spared[problem.images.point[row]]]
+        return [Rejection(kind=IMAGE, row=row, test="tau", value=9.0, limit=4.0) for row in left]
+
+    solved_once = snooping.solve
+    monkeypatch.setattr(snooping, "solve", solve)
+    monkeypatch.setattr(snooping._Search, "_worst", worst)
+    with pytest.raises(GeometryError, match="ended after 1 adjustment") as refused:
+        snooping.screen_bundle(problem, Selection.everything(problem), BundleSettings())
+    assert refused.value.code == "search-ended"
+    assert solved == 1 + MOST_FAILED
 
 
 def test_redundancy_numbers_beyond_their_range_are_no_adjustment(problem: BundleProblem) -> None:
