@@ -139,7 +139,7 @@ def refuse_endless(problem: BundleProblem, rejected: Sequence[int], adjustments:
     message = f"the search for gross errors ended after {counted(adjustments, 'adjustment')} and "
     message += f"{counted(len(rejected), 'rejected ray')}: without what contradicts the rest, it does not converge"
     if worst:
-        message += f"; most were rejected on {named(worst, 'photo')}: were its points named wrongly?"
+        message += f"; most were rejected on {named('photo', worst)}: were points there named wrongly?"
     raise GeometryError(message, photos=worst, code="search-ended")
 
 

@@ -16,6 +16,7 @@ from photostrip.triangulation.bundle.normal_equations.defects import MOST_FAILED
 from photostrip.triangulation.bundle.quality.reliability import CONTROL, IMAGE, require_regular
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
+from photostrip.triangulation.bundle.solve import solve as solve_once
 from photostrip.triangulation.gross_errors.rays import snooping, strip_network
 from photostrip.triangulation.gross_errors.rays.point_decisions import WRONG_RAY
 from tests.pipeline.blocks import adjusted, simulate
@@ -112,13 +113,12 @@ def test_a_search_ends_where_eight_adjustments_fail(problem: BundleProblem, monk
         solved += 1
         if solved > 1:
             raise GeometryError("does not converge")
-        return solved_once(chosen, rough=rough)
+        return solve_once(chosen, rough=rough)
 
     def worst(search: snooping._Search, _: snooping.ScreenedBundle) -> list[Rejection]:
         left = [row for row in rows if not search.spared[problem.images.point[row]]]
         return [Rejection(kind=IMAGE, row=row, test="tau", value=9.0, limit=4.0) for row in left]
 
-    solved_once = snooping.solve
     monkeypatch.setattr(snooping, "solve", solve)
     monkeypatch.setattr(snooping._Search, "_worst", worst)
     with pytest.raises(GeometryError, match="ended after 1 adjustment") as refused:
