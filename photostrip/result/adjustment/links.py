@@ -57,6 +57,7 @@ def _models(strip: StripResult) -> Records:
         "centers": np.bincount(models.model[~point], minlength=models.count),
         "redundancy": None,
         "base": np.linalg.norm(np.diff(strip.centers, axis=0), axis=1),
+        "base_formed": np.linalg.norm(np.diff(formed.centers, axis=0), axis=1) * strip.absolute.similarity.scale,
         "scale_factor": formed.places.scale,
         "model_scale": strip.of_models.scales,
         "rotation": (strip.absolute.similarity.rotation @ formed.places.rotation).reshape(-1, 9),

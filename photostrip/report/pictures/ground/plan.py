@@ -37,7 +37,7 @@ def plan_picture(document: Document, plan: Plan) -> Picture:
     factor = LONGEST / max(longest, bar)
     crowded = sum(spot.ellipse is not None for spot in plan.spots) > MOST_ELLIPSES
     share = mark_share(plan, sheet)
-    drawn = [svg.path((place_of(spot, sheet) for spot in strip), "flight") for strip in plan.strips]
+    drawn = [svg.path((place_of(spot, sheet) for spot in strip), "flight") for strip in plan.strips if strip]
     drawn += [
         _ellipse(spot, sheet, factor) for spot in plan.spots if spot.ellipse and not (crowded and spot.role == "new")
     ]
@@ -62,7 +62,8 @@ def plan_picture(document: Document, plan: Plan) -> Picture:
     enlarged = f"{float(f'{larger:.2g}'):.0f}" if larger > 1 else short(larger, 2)
     caption = (
         f"Vectors: adjusted minus given in plan; ellipses: standard deviations{' of given points' if crowded else ''}. "
-        f"Both are {enlarged} times as large as the ground. The first strip runs to the right."
+        f"Both are {enlarged} times as large as the ground. "
+        f"{'The first strip runs' if plan.strips[0] else 'East is'} to the right."
     )
     counts = counted(len(plan.strips), "strip"), counted(len(plan.spots), "point")
     words = f"{', '.join(counts)}; the tables of control and check points have the numbers."
@@ -77,7 +78,7 @@ def place_of(spot: Spot, sheet: Sheet) -> svg.Point:
 def mark_share(plan: Plan, sheet: Sheet) -> float:
     """Return how large marks are drawn: smaller in a long strip."""
     length = max(spot.along - sheet.low[0] for spot in plan.everything) * sheet.scale
-    return min(1.0, length / max(map(len, plan.strips)) / CROWDED)
+    return min(1.0, length / max(1, *map(len, plan.strips)) / CROWDED)
 
 
 def roles(spots: list[Spot]) -> list[Entry]:

@@ -67,12 +67,13 @@ def course_of(strip: list[Spot]) -> Course:
 def plan_of(document: Document) -> Plan:
     """Return the plan of a result in metres, turned so that its first strip runs to the right."""
     grid = Grid(document)
-    photos = document["photos"]
+    # centres of independent models need not be known
+    photos = [photo for photo in document["photos"] if photo["x"] is not None]
     # single photos are strips of their own, which ``strips`` does not hold: they are drawn as one
     names = [strip["id"] for strip in document["strips"]]
     flown = [[photo for photo in photos if photo["strip"] == name] for name in names] or [photos]
-    first = flown[0]
-    start, end = grid.place(first[0]), grid.place(first[-1])
+    ends = [grid.place(photo) for photo in (flown[0][:1] + flown[0][-1:])] or [(0.0, 0.0)]
+    start, end = ends[0], ends[-1]
     length = math.hypot(end[0] - start[0], end[1] - start[1])
     along = ((end[0] - start[0]) / length, (end[1] - start[1]) / length) if length else (1.0, 0.0)
 

@@ -87,6 +87,8 @@ def _strips(document: Document, plan: Plan) -> list[Strip]:
     spots = {spot.id: spot for spot in plan.spots}
     found = []
     for name, flown in zip(names, plan.strips, strict=False):
+        if not flown:  # independent models without centres
+            continue
         course = course_of(flown)
         after = [
             (spot, course.along((spot.along, spot.across)), _parts(course, spot.shift, spot.up))

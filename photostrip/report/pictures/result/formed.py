@@ -77,15 +77,17 @@ def junction_pictures(document: Document) -> list[Picture]:
 
 
 def scale_pictures(document: Document, plan: Plan) -> list[Picture]:
-    """Draw what the adjustment did to the scale along each strip of photos.
+    """Draw what the adjustment did to the scale along each strip.
 
-    A strip is formed of models with bases of length 1, so that scale of model and strip give the base that was formed.
+    A strip is formed of pairs with bases of length 1, so that scale of model and strip give the base that was formed.
     """
     grid = Grid(document)
-    up = {photo["id"]: grid.up(photo) for photo in document["photos"]}
-    scale = {} if document.get("links") else {row["strip"]: row["scale"] for row in document["absolute"]}
+    up = {photo["id"]: grid.up(photo) for photo in document["photos"] if photo["x"] is not None}
+    scale = {row["strip"]: row["scale"] for row in document["absolute"]}
     formed = {
-        (row["left"], row["right"]): row["scale_factor"] * scale[row["strip"]]
+        (row["left"], row["right"]): row.get("base_formed")
+        if "id" in row
+        else row["scale_factor"] * scale[row["strip"]]
         for row in document["models"]
         if row["strip"] in scale
     }
@@ -99,8 +101,12 @@ def scale_pictures(document: Document, plan: Plan) -> list[Picture]:
     return [_scale_picture(document, plan, found)]
 
 
-def _base_ratios(flown: Sequence[Spot], formed: dict[tuple[str, str], float], up: dict[str, float]) -> list[Pair]:
+def _base_ratios(
+    flown: Sequence[Spot], formed: dict[tuple[str, str], float | None], up: dict[str, float]
+) -> list[Pair]:
     """Return the places of bases, km, and adjusted over formed length, ppm from the mean of the strip."""
+    if len(flown) < 2:
+        return []
     course, found = course_of(list(flown)), []
     for left, right in pairwise(flown):
         before = formed.get((left.id, right.id))
