@@ -97,6 +97,34 @@ def test_few_inside_is_enough() -> None:
     assert "in plan 2.0 times, 0 of 2 inside the 95 % ellipse" in found["look_at"][0]
 
 
+def test_a_cause_that_is_known_needs_less_evidence() -> None:
+    """Heights at 2.5 % by chance: nothing by themselves, enough where the curvature is known to be left out."""
+    document = moved(0, 0.0)
+    check = document["precision"]["check"]
+    low = {"count": 10, "inside_95": 5, "rms": 2.16, "p": 0.00827}
+    changed = {**check, "height": low, "tests": [{**check["tests"][0], "p": 0.042}]}
+    contradicted = {**document, "precision": {**document["precision"], "check": changed}}
+    assert verdict_of(contradicted)["status"] == GOOD
+    note = {"code": "curvature-left-out", "severity": "note", "message": "", "points": [], "strip": ""}
+    found = verdict_of({**contradicted, "notes": [*document["notes"], note]})
+    assert found["status"] == LOOK
+    assert "in height 2.2 times, 5 of 10 inside the 95 % interval" in found["look_at"][0]
+    assert found["look_at"][0].endswith("try `earth_curvature: model`")
+
+
+def test_of_contradicting_data_no_deformation_is_told() -> None:
+    document = moved(0, 0.0)
+    bent = {"bending": {"models": 7, "p": 0.0, "t": 9.0, "at_corner_m": 23723.735}}
+    finding = {
+        "code": "P105", "severity": "error", "message": "", "accepted": False, "points": [], "strips": []
+    }  # fmt: skip
+    alone = {**document, "common_deformation": bent}
+    assert any("23723" in text for text in verdict_of(alone)["look_at"])
+    found = verdict_of({**alone, "findings": [finding]})
+    assert found["status"] == FAILED
+    assert not any("23723" in text for text in found["look_at"])
+
+
 def test_a_check_point_that_stands_out_is_taken_out_of_the_headline() -> None:
     document = moved(1, 447.0)
     rows = {row["id"]: row for row in document["control"]}
