@@ -56,9 +56,10 @@ class Progress:
                 self._shown = True
                 self._write(WIPE + self.line(seconds, _columns(self.stream)))
 
-    def stop(self) -> None:
-        """Take the line away."""
+    def stop(self, worker: threading.Thread) -> None:
+        """Take the line away when the thread that shows it has drawn for the last time."""
         self._stop.set()
+        worker.join()
         if self._shown:
             self._write(WIPE)
 
@@ -94,8 +95,7 @@ def progress(stream: TextIO, total: int = 0, *, quiet: bool = False) -> Iterator
     try:
         yield line
     finally:
-        line.stop()
-        worker.join()
+        line.stop(worker)
 
 
 ROWS = 16  # processes shown in the table of a batch

@@ -107,13 +107,13 @@ def with_a_lens(seed: int, micrometres: float) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_what_all_models_have_in_common_is_in_the_verdict() -> None:
-    document = with_a_lens(1, 200.0)
+    document = with_a_lens(3, 70.0)  # more looks like another principal distance, and that is told alone
     bending = document["common_deformation"]["bending"]
     assert bending["models"] == 9
     assert bending["p"] < 0.001
     (text,) = (text for text in document["verdict"]["look_at"] if "deformed alike" in text)
     assert text.startswith(f"9 models are deformed alike (bending): {bending['at_corner_m']:+.3f} m at a corner")
-    assert document["status"] in {"look", "failed"}
+    assert document["status"] == "look"
 
 
 @pytest.mark.slow
