@@ -1,4 +1,7 @@
-"""Write the reference: names from docstrings, commands from their help (``python -m tests.reference FOLDER``)."""
+"""Write the reference (``python -m tests.reference FOLDER``).
+
+Names come from docstrings, commands from their help, keys of a result from their description.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import photostrip
 from photostrip.cli.command_table import COMMANDS
 from photostrip.cli.jobs.manual import EXIT_CODES, VARIABLES, every_command, records
+from photostrip.result.schema import result_page
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -171,6 +175,17 @@ def command_page() -> str:
     return "\n".join(lines)
 
 
+def keys_page() -> str:
+    """Write every key of result.json."""
+    head = [
+        "# Reference: keys of result.json",
+        "",
+        "What the blocks are for: see [the result](../files/result.md).",
+        "",
+    ]
+    return "\n".join(head) + "\n" + result_page()
+
+
 def _anchor(title: str) -> str:
     return title.replace(" ", "-")
 
@@ -182,6 +197,7 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "python.md").write_text(python_page(), encoding="utf-8")
     (folder / "commands.md").write_text(command_page(), encoding="utf-8")
+    (folder / "result.md").write_text(keys_page(), encoding="utf-8")
 
 
 if __name__ == "__main__":

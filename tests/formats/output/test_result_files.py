@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 import subprocess
 import sys
 from contextlib import redirect_stdout
@@ -19,13 +18,11 @@ from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.pipeline import triangulate
 from photostrip.result.document import document_of
-from photostrip.result.records import Records
 from tests.loops import nonempty
 from tests.results import FRAMES, case, solved
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from tests.results import Document
@@ -242,24 +239,3 @@ def test_the_result_does_not_change_when_it_is_written() -> None:
     first = to_json(document_of(result))
     result_files(document_of(result))
     assert to_json(document_of(result)) == first
-
-
-# ---------------------------------------------------------------------------------------------------- the page
-
-
-def keys(value: object) -> Iterator[str]:
-    if isinstance(value, dict):
-        for key, each in value.items():
-            yield key
-            yield from keys(each)
-    elif isinstance(value, list | Records):
-        for each in value[:50]:
-            yield from keys(each)
-
-
-def test_the_page_explains_every_key() -> None:
-    page = (ROOT / "docs/files/result.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"[\w^]+", " ".join(re.findall(r"`([^`\n]+)`", page))))
-    document = case("projected", 2).document
-    document = {key: value for key, value in document.items() if key not in {"conventions", "settings"}}
-    assert set(keys(document)) - named == set()
