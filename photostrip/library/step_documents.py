@@ -8,18 +8,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.geometry.rotation import angles
+from photostrip.library.step_arguments import sigma0_of
+from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
 
     from photostrip.arrays import Floats
-    from photostrip.library.steps import Absolute, Interior, Relative, Strip
+    from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip
     from photostrip.triangulation.resection.closed_form import OrientedPhoto
     from photostrip.triangulation.strip_formation.intersection import Intersection
 
     Document = dict[str, Any]
+    Column = tuple[str, str, int, ArrayLike]  # name, unit, decimals; negative: digits of numbers of any size
 
-MICROMETRES = 1000.0  # in a millimetre
 MILLION = 1e6
 DIGITS = 10  # of values: more than any measurement has
 SYSTEM = "omega-phi-kappa"
@@ -32,19 +36,14 @@ def interior_document(ids: Sequence[str], found: Interior) -> Document:
     names = ("x", "y", "x y", "1")
     rows = zip(("x", "y", "denominator"), found.transform.coefficients, strict=True)
     values = [_value(f"{axis}: {term}", c) for axis, row in rows for term, c in zip(names, row, strict=True) if c]
-    residuals = [
-        ("vx", "um", 2, found.residuals[:, 0] * MICROMETRES),
-        ("vy", "um", 2, found.residuals[:, 1] * MICROMETRES),
-    ]
-    return _document("interior", [*values, *_fit(found.sigma0 * MICROMETRES, "um", found.redundancy)], ids, residuals)
+    values += _fit(found.sigma0 * MICROMETRES, "um", found.redundancy)
+    return _document("interior", values, ids, _image_residuals(found.residuals))
 
 
 def refine_document(ids: Sequence[str], measured: Floats, refined: Floats) -> Document:
     """Return ideal image coordinates, and what was corrected; the principal point is part of it."""
     shift = (refined - measured) * MICROMETRES
-    columns = [("x", "mm", 4, refined[:, 0]), ("y", "mm", 4, refined[:, 1])]
-    columns += [("dx", "um", 1, shift[:, 0]), ("dy", "um", 1, shift[:, 1])]
-    return _document("refine", [], ids, columns)
+    return _document("refine", [], ids, [*columns("x y", "mm", 4, refined), *columns("dx dy", "um", 1, shift)])
 
 
 def relative_document(ids: Sequence[str], found: Relative, base: float, unit: str) -> Document:
@@ -55,13 +54,13 @@ def relative_document(ids: Sequence[str], found: Relative, base: float, unit: st
     values += [_value(name, base * each, unit) for name, each in zip(("bx", "by", "bz"), found.base, strict=True)]
     values += _angles(found.rotation)
     values += _fit(found.sigma0 * MICROMETRES, "um", len(ids) - len(elements))
-    columns = [("q", "um", 2, found.parallax * MICROMETRES), *_places(found.model, unit)]
-    return _document("relative", [*values, _value("iterations", found.iterations)], ids, columns)
+    listed = [("q", "um", 2, found.parallax * MICROMETRES), *columns("x y z", unit, 4, found.model)]
+    return _document("relative", [*values, _value("iterations", found.iterations)], ids, listed)
 
 
 def intersection_document(ids: Sequence[str], found: Intersection, unit: str) -> Document:
     """Return intersected points, and the gap between the rays."""
-    return _document("intersection", [], ids, [*_places(found.xyz, unit), ("gap", unit, 4, found.gap)])
+    return _document("intersection", [], ids, [*columns("x y z", unit, 4, found.xyz), ("gap", unit, 4, found.gap)])
 
 
 def strip_document(photos: Sequence[str], points: Sequence[str], found: Strip, unit: str) -> Document:
@@ -71,12 +70,23 @@ def strip_document(photos: Sequence[str], points: Sequence[str], found: Strip, u
         for (left, right), factor in zip(pairwise(photos), found.factors, strict=True)
     ]
     placed = np.flatnonzero(found.models)
-    columns = _places(found.points[placed], unit)
-    columns.append(("models", "", 0, found.models[placed].astype(float)))
-    document = _document("strip", values, [points[number] for number in placed.tolist()], columns)
-    turned = np.degrees(np.array([angles(each, SYSTEM) for each in found.rotations]))
-    of_photos = [*_places(found.centers, unit), *_turns(turned)]
-    return {**document, "photos": _document("strip", [], photos, of_photos)["points"]}
+    listed = [*columns("x y z", unit, 4, found.points[placed]), ("models", "", 0, found.models[placed])]
+    document = _document("strip", values, [points[number] for number in placed.tolist()], listed)
+    return {**document, "photos": _photos(photos, found, unit)}
+
+
+def bundle_document(
+    photos: Sequence[str], points: Sequence[str], found: Bundle, ground: Floats | None, unit: str
+) -> Document:
+    """Return adjusted photos, and points with their precision and what they differ from given coordinates."""
+    values = [*_fit(found.sigma0, "", found.redundancy), _value("iterations", found.iterations)]
+    placed = np.flatnonzero(np.isfinite(found.points[:, 0]))
+    listed = columns("x y z", unit, 4, found.points[placed])
+    listed += columns("sigma_x sigma_y sigma_z", unit, 4, found.sigmas[placed])
+    if ground is not None:
+        listed += columns("dx dy dz", unit, 4, (found.points - ground)[placed])
+    document = _document("bundle", values, [points[number] for number in placed.tolist()], listed)
+    return {**document, "photos": _photos(photos, found, unit)}
 
 
 def absolute_document(ids: Sequence[str], found: Absolute, unit: str) -> Document:
@@ -85,14 +95,13 @@ def absolute_document(ids: Sequence[str], found: Absolute, unit: str) -> Documen
     values = [_value("scale", similarity.scale)]
     values += [_value(f"shift {axis}", each, unit) for axis, each in zip(XYZ, similarity.shift, strict=True)]
     values += _angles(similarity.rotation)
-    columns = [(f"v{axis}", unit, 4, found.residuals[:, k]) for k, axis in enumerate(XYZ)]
-    return _document("absolute", [*values, *_fit(found.sigma0, unit, found.redundancy)], ids, columns)
+    values += _fit(found.sigma0, unit, found.redundancy)
+    return _document("absolute", values, ids, columns("vx vy vz", unit, 4, found.residuals))
 
 
 def chain_document(ids: Sequence[str], rotations: Floats) -> Document:
     """Return the angles of the photos in the strip."""
-    turned = np.degrees(np.array([angles(each, SYSTEM) for each in rotations]))
-    return _document("chain", [], ids, _turns(turned))
+    return _document("chain", [], ids, _turns(rotations))
 
 
 def scale_document(ids: Sequence[str], factor: float, departures: Floats) -> Document:
@@ -108,8 +117,8 @@ def polynomial_document(
     """Return the coefficients of a polynomial, and what it leaves."""
     values = [_value(term, coefficient) for term, coefficient in zip(terms, coefficients, strict=True)]
     redundancy = len(ids) - len(values)
-    sigma0 = float(np.sqrt((residuals**2).sum() / redundancy)) if redundancy > 0 else float("nan")
-    return _document("polynomial", [*values, *_fit(sigma0, unit, redundancy)], ids, [("v", unit, 4, residuals)])
+    values += _fit(sigma0_of(residuals, redundancy), unit, redundancy)
+    return _document("polynomial", values, ids, [("v", unit, 4, residuals)])
 
 
 def resection_document(ids: Sequence[str], found: OrientedPhoto, unit: str) -> Document:
@@ -134,16 +143,19 @@ def _angles(rotation: Floats) -> list[Document]:
     return [_value(name, value, "deg") for name, value in zip(SYSTEM.split("-"), turned, strict=True)]
 
 
-def _image_residuals(residuals: Floats) -> list[tuple[str, str, int, Floats]]:
-    return [(f"v{axis}", "um", 2, residuals[:, k] * MICROMETRES) for k, axis in enumerate("xy")]
+def _image_residuals(residuals: Floats) -> list[Column]:
+    return columns("vx vy", "um", 2, residuals * MICROMETRES)
 
 
-def _turns(degrees: Floats) -> list[tuple[str, str, int, Floats]]:
-    return [(name, "deg", 6, degrees[:, k]) for k, name in enumerate(SYSTEM.split("-"))]
+def _turns(rotations: Floats) -> list[Column]:
+    turned = np.degrees(np.array([angles(each, SYSTEM) for each in rotations]))
+    return columns(SYSTEM.replace("-", " "), "deg", 6, turned)
 
 
-def _places(xyz: Floats, unit: str) -> list[tuple[str, str, int, Floats]]:
-    return [(axis, unit, 4, xyz[:, k]) for k, axis in enumerate(XYZ)]
+def _photos(photos: Sequence[str], found: Strip | Bundle, unit: str) -> list[list[Any]]:
+    placed = [*columns("x y z", unit, 4, found.centers), *_turns(found.rotations)]
+    rows: list[list[Any]] = _document("", [], photos, placed)["points"]
+    return rows
 
 
 def _number(value: float) -> float | None:
@@ -152,20 +164,28 @@ def _number(value: float) -> float | None:
     return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
 
 
-def _document(
-    step: str, values: list[Document], ids: Sequence[str], columns: Iterable[tuple[str, str, int, Floats]]
-) -> Document:
-    """Put values and columns together; the rows are lists in the order of the columns, the id first."""
-    listed = list(columns)
-    numbers = [
-        [round(value, decimals) if np.isfinite(value) else None for value in column.tolist()]
-        for _, _, decimals, column in listed
-    ]
+def columns(names: str, unit: str, decimals: int, values: Floats) -> list[Column]:
+    """Return the columns of an array, named one after the other."""
+    return [(name, unit, decimals, values[:, k]) for k, name in enumerate(names.split())]
+
+
+def table(ids: Sequence[str], listed: Sequence[Column]) -> Document:
+    """Put columns together; the rows are lists in the order of the columns, the id first."""
+    numbers = [[each if np.isfinite(each) else None for each in np.asarray(one, float).tolist()] for *_, one in listed]
+    return {
+        "columns": [{"name": name, "unit": unit, "decimals": decimals} for name, unit, decimals, _ in listed],
+        "rows": [list(row) for row in zip(ids, *numbers, strict=True)],
+    }
+
+
+def _document(step: str, values: list[Document], ids: Sequence[str], listed: Sequence[Column]) -> Document:
+    """Put values and columns, rounded, together."""
+    points = table(ids, [(*head, decimals, np.round(column, decimals)) for *head, decimals, column in listed])
     return {
         "photostrip_step": 1,
         "step": step,
         "values": values,
         "of": OF.get(step, "point"),
-        "columns": [{"name": name, "unit": unit, "decimals": decimals} for name, unit, decimals, _ in listed],
-        "points": [list(row) for row in zip(ids, *numbers, strict=True)],
+        "columns": points["columns"],
+        "points": points["rows"],
     }

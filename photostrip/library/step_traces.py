@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.library.step_arguments import of_rays
+from photostrip.library.step_documents import columns, table
 from photostrip.library.steps import one_pair
 from photostrip.result.trace.replay import first_rounds
 from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
@@ -16,22 +18,21 @@ from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 from photostrip.triangulation.resection.closed_form import approximate
 from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 from photostrip.triangulation.resection.resection import resect
+from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import ArrayLike
-
     from photostrip.arrays import Floats
     from photostrip.camera import Camera
-    from photostrip.library.steps import Absolute, Interior, Relative, Strip
+    from photostrip.library.step_arguments import Rays
+    from photostrip.library.step_documents import Column, Document
+    from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip
     from photostrip.triangulation.resection.closed_form import OrientedPhoto
 
-    Document = dict[str, Any]
-    Column = tuple[str, str, int, ArrayLike]  # name, unit, decimals; negative: digits of numbers of any size
     Trace = list[Document]
 
-MICROMETRES = 1000.0  # in a millimetre
+_COLLINEAR = "(u, v, w) = R' (X - X0); x' = -f u/w, y' = -f v/w; v = x - x'"
 _TURNED = "(u, v, w) = R (x, y, -f); xh = -f u/w, yh = -f v/w; eq. 137"
 
 
@@ -41,9 +42,9 @@ def interior_trace(ids: Sequence[str], measured: Floats, calibrated: Floats, fou
     equations = [f"x' = {_linear(x)}", f"y' = {_linear(y)}"]
     if below != [0.0, 0.0, 0.0, 1.0]:
         equations = [f"{each.replace('= ', '= (')}) / ({_linear(below)})" for each in equations]
-    rows = [*_plane("x y", "", 4, measured), *_plane("x' y'", "mm", 4, photo)]
+    rows = [*columns("x y", "", 4, measured), *columns("x' y'", "mm", 4, photo)]
     return [
-        _table("Marks", ids, [*rows, *_plane("given_x given_y", "mm", 4, calibrated)], "v = x' - given", *equations)
+        _table("Marks", ids, [*rows, *columns("given_x given_y", "mm", 4, calibrated)], "v = x' - given", *equations)
     ]
 
 
@@ -52,9 +53,9 @@ def refine_trace(ids: Sequence[str], measured: Floats, refined: Floats, camera: 
     central = measured - np.asarray(camera.principal_point)
     lens = undistort(measured, camera, Bending()) - central
     bent = refined - central - lens
-    rows = _plane("x-x0 y-y0", "mm", 4, central)
-    rows += [("r", "mm", 3, np.hypot(*central.T)), *_plane("lens_x lens_y", "um", 2, lens * MICROMETRES)]
-    rows += [*_plane("refr_x refr_y", "um", 2, bent * MICROMETRES), *_plane("x' y'", "mm", 4, refined)]
+    rows = columns("x-x0 y-y0", "mm", 4, central)
+    rows += [("r", "mm", 3, np.hypot(*central.T)), *columns("lens_x lens_y", "um", 2, lens * MICROMETRES)]
+    rows += [*columns("refr_x refr_y", "um", 2, bent * MICROMETRES), *columns("x' y'", "mm", 4, refined)]
     return [_table("Corrections, one after the other", ids, rows, "x' = x - x0 + lens + refraction")]
 
 
@@ -65,7 +66,7 @@ def relative_trace(
     (rounds,) = first_rounds(one_pair(left, right, focal), found.elements[None])
     elements, added = (np.degrees([getattr(each, name) for each in rounds.steps]) for name in ("elements", "step"))
     squares: list[Column] = [("[qq]", "mm^2", -5, [each.squares for each in rounds.steps])]
-    before, changes = _plane(" ".join(ELEMENTS), "deg", 6, elements), _plane(" ".join(ELEMENTS), "deg", -3, added)
+    before, changes = columns(" ".join(ELEMENTS), "deg", 6, elements), columns(" ".join(ELEMENTS), "deg", -3, added)
     alpha1, kappa1, alpha2, omega2, kappa2 = found.elements
     rotations = from_alpha_omega_kappa(alpha1, 0.0, kappa1), from_alpha_omega_kappa(alpha2, omega2, kappa2)
     points = _table(
@@ -101,12 +102,12 @@ def absolute_trace(ids: Sequence[str], model: Floats, ground: Floats, found: Abs
     similarity, centre, place = found.similarity, model.mean(axis=0), ground.mean(axis=0)
     reduced, wanted = model - centre, ground - place
     turned = similarity.scale * reduced @ similarity.rotation.T
-    rows = [*_plane("x-xm y-ym z-zm", "", 4, reduced), *_plane("X-Xm Y-Ym Z-Zm", unit, 4, wanted)]
-    rows += _plane("X' Y' Z'", unit, 4, turned)
+    rows = [*columns("x-xm y-ym z-zm", "", 4, reduced), *columns("X-Xm Y-Ym Z-Zm", unit, 4, wanted)]
+    rows += columns("X' Y' Z'", unit, 4, turned)
     words = f"X' = s R (x - xm) with s = {similarity.scale:.9g}; v = X' - (X - Xm); the shift is Xm - s R xm"
     means = np.stack([centre, place])
     return [
-        _table("Centroids", ["model xm", "ground Xm"], _plane("x y z", "", 4, means)),
+        _table("Centroids", ["model xm", "ground Xm"], columns("x y z", "", 4, means)),
         _matrices("Rotation R, by rows", ("R",), similarity.rotation),
         _table("Points", ids, rows, words),
     ]
@@ -125,18 +126,15 @@ def resection_trace(
 
     center, rotation = approximate(xy, ground, focal)
     resect(xy, ground, photo, KnownPhotos(center[None], rotation[None], np.array([focal])), watch)
-    steps: list[Column] = [("[vv]", "mm^2", -5, squares), *_plane("X0 Y0 Z0", unit, 4, np.array(seen))]
-    changes = _plane("dX0 dY0 dZ0", unit, -3, np.array(added)[:, :3])
-    changes += _plane("turn_X turn_Y turn_Z", "deg", -3, np.degrees(added)[:, 3:])
-    u, v, w = ((ground - found.center) @ found.rotation).T
-    rays = [("u", unit, 4, u), ("v", unit, 4, v), ("w", unit, 4, w)]
-    rays += [("x'", "mm", 4, -focal * u / w), ("y'", "mm", 4, -focal * v / w), *_plane("x y", "mm", 4, xy)]
-    collinear = "(u, v, w) = R' (X - X0); x' = -f u/w, y' = -f v/w; v = x - x'"
+    steps: list[Column] = [("[vv]", "mm^2", -5, squares), *columns("X0 Y0 Z0", unit, 4, np.array(seen))]
+    changes = columns("dX0 dY0 dZ0", unit, -3, np.array(added)[:, :3])
+    changes += columns("turn_X turn_Y turn_Z", "deg", -3, np.degrees(added)[:, 3:])
+    rays = _images(xy, ground - found.center, found.rotation, focal, unit)
     return [
         _table("Centre before each step", _numbers(steps), steps, "Step 1 starts from three points in closed form."),
         _table("What the step adds", _numbers(steps), changes, "(J'J)^-1 J'v, J the derivatives of x' and y'"),
         _matrices("Rotation R, photo to ground, by rows", ("R",), found.rotation),
-        _table("Points", ids, rays, collinear),
+        _table("Points", ids, rays, _COLLINEAR),
     ]
 
 
@@ -155,8 +153,27 @@ def strip_trace(photos: Sequence[str], found: Strip) -> Trace:
     rows: list[Column] = [("k", "", 7, found.factors), ("sigma0", "um", 2, found.sigma0 * MICROMETRES)]
     words = "B = k A (bx, by, bz) with A of the left photo; X = S + k (x, y, z); eq. 134-141"
     return [
-        _table("Models", pairs, [*rows, *_plane("BX BY BZ", "", 4, bases)], words),
+        _table("Models", pairs, [*rows, *columns("BX BY BZ", "", 4, bases)], words),
         _matrices("Rotations A, photo to strip, by rows", photos, found.rotations),
+    ]
+
+
+def bundle_trace(
+    photos: Sequence[str], points: Sequence[str], rays: Rays, focal: float, found: Bundle, unit: str
+) -> Trace:
+    """Show the iteration, and each ray."""
+    steps: list[Column] = [("[pvv]", "", -5, [each.chi_square for each in found.steps])]
+    steps += [("length", "sigma", -3, [each.length for each in found.steps])]
+    steps += [("shift", unit, -3, [each.shift for each in found.steps])]
+    steps += [("turn", "deg", -3, np.degrees([each.turn for each in found.steps]))]
+    photo, point, xy = (each[np.isfinite(found.residuals[:, 0])] for each in of_rays(rays))
+    ids = [f"{photos[one]} {points[other]}" for one, other in zip(photo, point, strict=True)]
+    arms = found.points[point] - found.centers[photo]
+    words = "[pvv] before the step; its length in standard deviations; the largest shift and turn"
+    return [
+        _table("Steps of all photos and points", _numbers(steps), steps, words, "A'PA dx = A'Pv"),
+        _matrices("Rotations R, photo to ground, by rows", photos, found.rotations),
+        _table("Rays", ids, _images(xy, arms, found.rotations[photo], focal, unit), _COLLINEAR),
     ]
 
 
@@ -189,11 +206,16 @@ def _rays(left: Floats, right: Floats, focal: float, base: Floats, rotations: tu
     with np.errstate(divide="ignore", invalid="ignore"):
         factor = (base[0] + x2 * base[2] / focal) / (x1 - x2)
     other = factor + base[2] / focal  # the same where the base is level
-    rows: list[Column] = [
-        (name, "mm", 4, each) for name, each in zip(("x1h", "y1h", "x2h", "y2h"), turned, strict=True)
-    ]
+    rows = columns("x1h y1h x2h y2h", "mm", 4, np.column_stack(turned))
     rows += [("N", "", 6, factor), *([("N2", "", 6, other)] if base[2] else [])]
     return [*rows, ("Y1", "", 4, factor * y1), ("Y2", "", 4, base[1] + other * y2)]
+
+
+def _images(xy: Floats, arms: Floats, rotations: Floats, focal: float, unit: str) -> list[Column]:
+    """Return points from the centre, turned into the photo, their images, and the measured ones."""
+    seen = np.einsum("...ji,...j->...i", rotations, arms)
+    computed = -focal * seen[:, :2] / seen[:, 2:]
+    return [*columns("u v w", unit, 4, seen), *columns("x' y'", "mm", 4, computed), *columns("x y", "mm", 4, xy)]
 
 
 def _linear(coefficients: Iterable[float]) -> str:
@@ -202,27 +224,16 @@ def _linear(coefficients: Iterable[float]) -> str:
     return " + ".join(f"{value:.10g}{name}" for value, name in terms if value).replace("+ -", "- ") or "0"
 
 
-def _plane(names: str, unit: str, decimals: int, values: Floats) -> list[Column]:
-    return [(name, unit, decimals, values[:, k]) for k, name in enumerate(names.split())]
-
-
 def _matrices(title: str, ids: Sequence[str], rotations: Floats, *words: str) -> Document:
     """Return rotation matrices, each as three rows."""
     names = [f"{name} {row}" for name in ids for row in "abc"]
-    return _table(title, names, _plane("1 2 3", "", 8, rotations.reshape(-1, 3)), *words)
+    return _table(title, names, columns("1 2 3", "", 8, rotations.reshape(-1, 3)), *words)
 
 
 def _numbers(steps: Sequence[Column]) -> list[str]:
     return [str(number) for number in range(1, len(np.asarray(steps[0][3])) + 1)]
 
 
-def _table(title: str, ids: Sequence[str], columns: Iterable[Column], *words: str) -> Document:
-    """Put columns together under a title, equations below it; the rows are lists, the id first."""
-    listed = list(columns)
-    numbers = [[each if np.isfinite(each) else None for each in np.asarray(one, float).tolist()] for *_, one in listed]
-    return {
-        "title": title,
-        "equations": list(words),
-        "columns": [{"name": name, "unit": unit, "decimals": decimals} for name, unit, decimals, _ in listed],
-        "rows": [list(row) for row in zip(ids, *numbers, strict=True)],
-    }
+def _table(title: str, ids: Sequence[str], listed: Sequence[Column], *words: str) -> Document:
+    """Put columns together under a title, equations below it."""
+    return {"title": title, "equations": list(words), **table(ids, listed)}

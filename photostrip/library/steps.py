@@ -17,12 +17,10 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass
 from photostrip.geometry import plane
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.geometry.similarity import Similarity, collinearity
-from photostrip.library.step_arguments import rows, same
-from photostrip.library.steps_of_all_photos import Bundle, Strip, bundle, strip
+from photostrip.library.step_arguments import rows, same, sigma0_of
+from photostrip.library.steps_of_strips import Absolute, Bundle, Strip, absolute, bundle, polynomial, strip
 from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
 from photostrip.triangulation.image_coordinates.refraction import refraction_constant
-from photostrip.triangulation.polynomial.terms import POWERS, columns
 from photostrip.triangulation.relative_orientation.orientation import orient_pairs
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.triangulation.resection.closed_form import OrientedPhoto, space_resection
@@ -30,8 +28,6 @@ from photostrip.triangulation.strip_formation.intersection import Intersection, 
 from photostrip.triangulation.strip_formation.strip import hand_on_rotations
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import ArrayLike
 
     from photostrip.arrays import Floats
@@ -59,7 +55,6 @@ __all__ = [
     "scale_transfer",
     "strip",
 ]
-ON_A_LINE = 1e-6  # ratio of the spreads of points that lie on one line
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +83,7 @@ def interior(
     fitted = plane.KINDS[kind].fit(source, target, np.ones(len(source)))
     residuals = fitted.residuals(source, target)
     redundancy = 2 * len(source) - plane.KINDS[kind].unknowns
-    return Interior(fitted, residuals, sigma0=_sigma0(residuals, redundancy), redundancy=redundancy)
+    return Interior(fitted, residuals, sigma0=sigma0_of(residuals, redundancy), redundancy=redundancy)
 
 
 def refine(xy: ArrayLike, camera: Camera, *, flying_height: float | None = None, ground_height: float = 0.0) -> Floats:
@@ -218,60 +213,6 @@ def scale_transfer(first: ArrayLike, second: ArrayLike) -> tuple[float, Floats]:
     return factor, ratios / factor - 1
 
 
-@dataclass(frozen=True, eq=False)
-class Absolute:
-    """The similarity from a model to the ground, and how well it fits."""
-
-    similarity: Similarity  # to be called with model coordinates (n, 3)
-    residuals: Floats  # (n, 3): transformed minus given, metres
-    sigma0: float  # standard deviation of a coordinate, metres; NaN without redundancy
-    redundancy: int
-
-
-def absolute(model: ArrayLike, ground: ArrayLike, weights: ArrayLike | None = None) -> Absolute:
-    """Absolute orientation of a model (n, 3) on points known in all three coordinates (n, 3), by seven parameters.
-
-    weights: (n,), of the points.
-    Raises GeometryError with fewer than three points, or with all on one line.
-
-    Source: [001] eq. 145-149.
-    """
-    source, target = rows(model, 3), rows(ground, 3)
-    same(source, target)
-    weight = np.ones(len(source)) if weights is None else np.asarray(weights, float)
-    if collinearity(source[weight > 0]) < ON_A_LINE**2:
-        message = "fewer than three points, or all on one line: the rotation about it is not determined"
-        raise GeometryError(message, code="control-deficient")
-    found = Similarity.from_points(source, target, weight)
-    residuals = found.residuals(source, target)
-    redundancy = 3 * int(np.count_nonzero(weight)) - 7
-    squares = residuals * np.sqrt(weight)[:, None]
-    return Absolute(found, residuals, sigma0=_sigma0(squares, redundancy), redundancy=redundancy)
-
-
-def polynomial(xyz: ArrayLike, misclosures: ArrayLike, terms: Sequence[str]) -> tuple[Floats, Floats]:
-    """Fit the deformation of a strip along one axis by a polynomial.
-
-    xyz: (n, 3), control points in the intermediate frame.
-    misclosures: (n,), strip minus given along the axis.
-    terms: as the report names them: ``"1"``, ``"X"``, ``"Y"``, ``"XY"``, ``"X^2"``.
-    Returns coefficients, one for each term, and residuals (n,). Subtract the polynomial from the strip.
-    Raises GeometryError where there are fewer points than terms, or they do not determine them.
-
-    Source: [001] eq. 151.
-    """
-    if unknown := [each for each in terms if each not in POWERS] or ([] if terms else [""]):
-        raise InputError(f"there is no term {unknown[0]!r}: {', '.join(POWERS)}")
-    design = columns(rows(xyz, 3), list(terms))
-    size = np.linalg.norm(design, axis=0)
-    values = rows(np.reshape(misclosures, (-1, 1)), 1)[:, 0]
-    same(design, values)
-    if len(design) < design.shape[1] or np.linalg.matrix_rank(design / np.where(size > 0, size, 1)) < design.shape[1]:
-        raise GeometryError(f"{len(design)} points do not determine {len(terms)} terms", code="control-deficient")
-    found = np.linalg.lstsq(design / size, values, rcond=None)[0] / size
-    return found, values - design @ found
-
-
 def resection(xy: ArrayLike, ground: ArrayLike, principal_distance: float, *, sigma: float = 0.005) -> OrientedPhoto:
     """Orient one photo on known points, at any attitude and without approximate values.
 
@@ -283,7 +224,3 @@ def resection(xy: ArrayLike, ground: ArrayLike, principal_distance: float, *, si
     image, points = rows(xy, 2), rows(ground, 3)
     same(image, points)
     return space_resection(image, np.full(image.shape, sigma), points, principal_distance)
-
-
-def _sigma0(residuals: Floats, redundancy: int) -> float:
-    return float(np.sqrt((residuals**2).sum() / redundancy)) if redundancy > 0 else float("nan")

@@ -181,6 +181,113 @@ def test_all_photos_are_adjusted_at_once(truth: Truth) -> None:
         steps.bundle((photo + 1, point, xy), F, start)
 
 
+class Flown:
+    """The images of all three photos with noise, and every third point given."""
+
+    def __init__(self, truth: Truth) -> None:
+        self.seen = [(photo, name) for photo in range(3) for name in truth.common(photo)]
+        self.ids = list(dict.fromkeys(name for _, name in self.seen))
+        self.point = np.array([self.ids.index(name) for _, name in self.seen])
+        noise = np.random.default_rng(7).normal(0, 0.005, (len(self.seen), 2))
+        self.xy = np.array([truth.image(photo, [name])[0] for photo, name in self.seen]) + noise
+        self.rays = np.array([photo for photo, _ in self.seen]), self.point, self.xy
+        self.given = np.where(np.arange(len(self.ids))[:, None] % 3 == 0, truth.xyz(self.ids), np.nan)
+        self.placed = np.bincount(self.point) > 1
+
+    def lines(self) -> list[str]:
+        pairs = zip(self.seen, self.xy.tolist(), strict=True)
+        return ["photo,point,x,y", *(f"{photo},{name},{x!r},{y!r}" for (photo, name), (x, y) in pairs)]
+
+    def command(self, folder: Path) -> list[str]:
+        """Write images and control; give the command that adjusts them."""
+        (folder / "images.csv").write_text("\n".join(self.lines()), encoding="utf-8")
+        known = np.isfinite(self.given[:, 0])
+        names = [name for name, here in zip(self.ids, known, strict=True) if here]
+        ground = np.vstack([self.given[known], [9.0, 9.0, 9.0]])
+        control = table(folder / "control.csv", "point x_ground y_ground z_ground", [*names, "not seen"], ground)
+        return ["bundle", str(folder / "images.csv"), "-f", "153", "--control", control]
+
+
+@pytest.fixture(scope="module")
+def flown(truth: Truth) -> Flown:
+    return Flown(truth)
+
+
+def test_the_bundle_starts_from_the_strip(truth: Truth, flown: Flown) -> None:
+    found = steps.bundle(flown.rays, F, ground=flown.given)
+    np.testing.assert_array_equal(np.isfinite(found.points[:, 0]), flown.placed)
+    np.testing.assert_array_equal(np.isfinite(found.residuals[:, 0]), flown.placed[flown.point])
+    start = truth.centers, truth.rotations, np.where(flown.placed[:, None], truth.xyz(flown.ids), np.nan)
+    again = steps.bundle(flown.rays, F, start, ground=flown.given)
+    np.testing.assert_allclose(found.points, again.points, atol=1e-5)
+    np.testing.assert_allclose(found.sigmas, again.sigmas, rtol=1e-5)
+    np.testing.assert_allclose(found.centers, truth.centers, atol=1.0)
+    two = np.where(np.arange(len(flown.ids))[:, None] < 2, truth.xyz(flown.ids), np.nan)
+    with pytest.raises(photostrip.GeometryError, match="fewer than three points, or all on one line"):
+        steps.bundle(flown.rays, F, ground=two)
+    with pytest.raises(photostrip.InputError, match="2 rows: each point needs a row in both"):
+        steps.bundle(flown.rays, F, ground=flown.given[:2])
+
+
+def test_the_bundle_as_a_command(flown: Flown, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command, found = flown.command(tmp_path), steps.bundle(flown.rays, F, ground=flown.given)
+    assert main(["step", *command, "--format", "json"]) == 0
+    out = capsys.readouterr().out
+    rows = {row[0]: np.array(row[1:], float) for row in json.loads(out)["points"]}
+    assert list(rows) == [name for name, here in zip(flown.ids, flown.placed, strict=True) if here]
+    expected = np.hstack([found.points, found.sigmas, found.points - flown.given])[flown.placed]
+    np.testing.assert_allclose(np.array(list(rows.values())), expected, atol=6e-5)
+    assert values(out) == {
+        "sigma0": pytest.approx(found.sigma0),
+        "redundancy": found.redundancy,
+        "iterations": found.iterations,
+    }
+    assert [row[0] for row in json.loads(out)["photos"]] == ["0", "1", "2"]
+    tables, taken = traced(capsys, *command), flown.placed[flown.point]
+    left = np.column_stack([tables["Rays"][axis] - tables["Rays"][f"{axis}'"] for axis in "xy"])
+    np.testing.assert_allclose(left, found.residuals[taken], atol=1e-9)
+    squares = tables["Steps of all photos and points"]["[pvv]"]
+    assert squares[-1] == pytest.approx(found.sigma0**2 * found.redundancy)
+    half = ["--sigma-um", "2.5", "--control-sigma", "0.025", "--format", "json"]
+    assert main(["step", *command, *half]) == 0
+    assert values(capsys.readouterr().out)["sigma0"] == pytest.approx(2 * found.sigma0)
+    free = steps.bundle(flown.rays, F, base=92.0)
+    assert main(["step", *command[:4], "--base", "92", "--format", "json"]) == 0
+    out = capsys.readouterr().out
+    assert values(out)["redundancy"] == free.redundancy
+    np.testing.assert_allclose([row[1:4] for row in json.loads(out)["photos"]], free.centers, atol=6e-5)
+
+
+@pytest.mark.parametrize(
+    ("file", "lines", "code", "message"),
+    [
+        ("control.csv", ["point,x,y,z", "1,2,3,4"], 2, "control.csv:1: x_ground: there is no column"),
+        ("control.csv", ["point,x_ground,y_ground,z_ground", "1,2,3,4"], 3, "fewer than three points"),
+        ("images.csv", ["photo,point,x", "1,2,3"], 2, "images.csv:1: y: there is no column"),
+        (
+            "images.csv",
+            ["photo,point,x,y", "a,2,3,4", "b,2,3,4"],
+            3,
+            "relative orientation of photos a and b: 1 common point",
+        ),
+        ("images.csv", ["photo,point,x,y", "a,2,3,4"], 3, "a strip needs two photos"),
+    ],
+)
+def test_a_bundle_that_cannot_be_is_refused(
+    flown: Flown,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    file: str,
+    lines: list[str],
+    code: int,
+    message: str,
+) -> None:
+    command = flown.command(tmp_path)
+    (tmp_path / file).write_text("\n".join(lines), encoding="utf-8")
+    assert main(["step", *command]) == code
+    assert message in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("kind", "redundancy"), [("affine", 2), ("conformal", 4)])
 def test_marks_give_photo_coordinates(kind: Literal["affine", "conformal"], redundancy: int) -> None:
     measured = np.array([[10.0, 10.0], [210.0, 12.0], [208.0, 212.0], [8.0, 210.0]])

@@ -22,6 +22,7 @@ step = command_group("Single steps of the method, from a table of points: for te
 
 Table = Annotated[Path, typer.Argument(metavar="FILE", help="Table of points (CSV).", show_default=False)]
 Focal = Annotated[float, typer.Option("--principal-distance", "-f", metavar="MM", min=1e-6, help="Principal distance.")]
+Base = Annotated[float, typer.Option("--base", metavar="B", min=1e-9, help="Length of the first base.")]
 Unit = Annotated[str, typer.Option("--unit", metavar="NAME", help="What ground or model coordinates are in.")]
 Sigma = Annotated[
     float, typer.Option("--sigma-um", metavar="UM", min=1e-6, help="Standard deviation of an image coordinate.")
@@ -70,6 +71,14 @@ class Delivery:
 def _command(name: str, columns: str, example: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     text = f"\b\nColumns of FILE: {columns}\n\b\nExample:\n  photostrip step {name} {example}"
     return subcommand(step, name, text)
+
+
+@dataclass(frozen=True)
+class Model:
+    """What photos make a model with."""
+
+    focal: Focal
+    base: Base = 100.0
 
 
 @_command("interior", "mark, x, y, x_photo, y_photo", "marks.csv --transform conformal")
@@ -132,8 +141,7 @@ def refine(
 def relative(
     *,
     file: Table,
-    focal: Focal,
-    base: Annotated[float, typer.Option("--base", metavar="B", min=1e-9, help="Length of the base.")] = 100.0,
+    model: Model,
     unit: Unit = "mm",
     delivery: Delivery,
 ) -> None:
@@ -147,9 +155,9 @@ def relative(
         from photostrip.library.step_traces import relative_trace
 
         ids, (left, right) = _read(file, "relative", delivery)
-        found = steps.relative(left, right, focal, base=base)
-        document = relative_document(ids, found, base, unit)
-        delivery.deliver(document, lambda: relative_trace(ids, left, right, focal, found, base))
+        found = steps.relative(left, right, model.focal, base=model.base)
+        document = relative_document(ids, found, model.base, unit)
+        delivery.deliver(document, lambda: relative_trace(ids, left, right, model.focal, found, model.base))
 
 
 @_command(
@@ -227,8 +235,7 @@ def scale(*, file: Table, delivery: Delivery) -> None:
 def strip(
     *,
     file: Table,
-    focal: Focal,
-    base: Annotated[float, typer.Option("--base", metavar="B", min=1e-9, help="Length of the first base.")] = 100.0,
+    model: Model,
     unit: Unit = "mm",
     scale_transfer: Annotated[
         Literal["least_squares", "distances"], typer.Option("--scale-transfer", help="Weights of the pass points.")
@@ -240,17 +247,15 @@ def strip(
     Image coordinates in mm. The steps in between are `relative`, `chain`, `intersection` and `scale`.
     """
     with failures_as(delivery.form):
-        from photostrip.formats.measured.steps import read_rays
         from photostrip.library import steps
         from photostrip.library.step_documents import strip_document
         from photostrip.library.step_traces import strip_trace
 
-        delivery.checked()
-        read = read_rays(str(file))
-        rays = read.photo, read.target, read.xy
-        found = steps.strip(rays, focal, base=base, scale_transfer=scale_transfer)
-        document = strip_document(read.photo_ids, read.target_ids, found, unit)
-        delivery.deliver(document, lambda: strip_trace(read.photo_ids, found))
+        photos, points, rays = _read_rays(file, delivery)
+        names = photos, points
+        found = steps.strip(rays, model.focal, base=model.base, scale_transfer=scale_transfer, names=names)
+        document = strip_document(photos, points, found, unit)
+        delivery.deliver(document, lambda: strip_trace(photos, found))
 
 
 @_command("absolute", "point, x, y, z, x_ground, y_ground, z_ground", "control.csv")
@@ -301,12 +306,63 @@ def resection(*, file: Table, focal: Focal, sigma_um: Sigma = 5.0, unit: Unit = 
         delivery.deliver(document, lambda: resection_trace(ids, xy, ground, focal, found, unit))
 
 
+@_command("bundle", "photo, point, x, y", "images.csv -f 153 --control control.csv --sigma-um 5")
+def bundle(
+    *,
+    file: Table,
+    model: Model,
+    control: Annotated[
+        Path | None,
+        typer.Option("--control", metavar="FILE", help="Given points: point, x_ground, y_ground, z_ground."),
+    ] = None,
+    control_sigma: Annotated[
+        float, typer.Option("--control-sigma", metavar="S", min=1e-9, help="Standard deviation of a given coordinate.")
+    ] = 0.05,
+    sigma_um: Sigma = 5.0,
+    unit: Unit = "m",
+    delivery: Delivery,
+) -> None:
+    """Adjust all photos and points at once, from the strip that they form, in the order of the table.
+
+    Image coordinates in mm. Without control: a free network in model coordinates, as long as its first base says.
+    """
+    with failures_as(delivery.form):
+        from photostrip.library import steps
+        from photostrip.library.step_documents import bundle_document
+        from photostrip.library.step_traces import bundle_trace
+
+        photos, points, rays = _read_rays(file, delivery)
+        ground = None if control is None else _given(control, points, delivery)
+        sigmas = {"sigma": sigma_um / 1000.0, "ground_sigma": control_sigma}
+        found = steps.bundle(rays, model.focal, ground=ground, base=model.base, names=(photos, points), **sigmas)
+        document = bundle_document(photos, points, found, ground, unit)
+        delivery.deliver(document, lambda: bundle_trace(photos, points, rays, model.focal, found, unit))
+
+
 def _read(file: Path, name: str, delivery: Delivery) -> tuple[list[str], Any]:
     """Read the table of a step; a file that cannot be written is refused before."""
     from photostrip.formats.measured.steps import read_step
 
     delivery.checked()
     return read_step(str(file), name)
+
+
+def _read_rays(file: Path, delivery: Delivery) -> tuple[tuple[str, ...], tuple[str, ...], Any]:
+    """Read image coordinates of all photos: ids of photos and points, and the rays."""
+    from photostrip.formats.measured.steps import read_rays
+
+    delivery.checked()
+    read = read_rays(str(file))
+    return read.photo_ids, read.target_ids, (read.photo, read.target, read.xy)
+
+
+def _given(control: Path, points: tuple[str, ...], delivery: Delivery) -> Any:  # noqa: ANN401 (an array)
+    """Read given coordinates of points in their order; NaN for a point without."""
+    import numpy as np
+
+    ids, (ground,) = _read(control, "bundle", delivery)
+    at = dict(zip(ids, ground, strict=True))
+    return np.array([at.get(point, np.full(3, np.nan)) for point in points])
 
 
 def _numbers(text: str, count: int, option: str) -> list[float]:

@@ -27,6 +27,7 @@ COLUMNS: dict[str, tuple[tuple[str, ...], ...]] = {
     "absolute": (XYZ, GROUND),
     "polynomial": (XYZ, ("misclosure",)),
     "resection": (IMAGE, GROUND),
+    "bundle": (GROUND,),  # of its control
 }
 MARK = Column("point", aliases=("mark", "photo", *POINT.aliases))
 

@@ -19,6 +19,7 @@ TITLES = {
     "absolute": "Absolute orientation",
     "polynomial": "Polynomial",
     "resection": "Space resection",
+    "bundle": "Bundle adjustment",
 }
 
 
