@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.slow
 
 
-def build(kind: str, folder: Path) -> Path:
+def build(kind: str, folder: Path, source: Path = ROOT) -> Path:
     """Build one archive of the project without the network and give its path."""
     subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)],
-        cwd=ROOT,
+        cwd=source,
         check=True,
         capture_output=True,
     )
@@ -75,33 +75,61 @@ def test_the_source_archive_holds_what_builds_the_wheel(source_archive: Path) ->
     }
 
 
-def test_what_is_installed_from_the_source_archive_runs_alone(tmp_path: Path, source_archive: Path) -> None:
-    """The wheel of the source archive, beside the libraries of this environment and away from the clone."""
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory, source_archive: Path) -> Path:
+    """Build the wheel from the source archive, away from the clone."""
+    folder = tmp_path_factory.mktemp("wheel")
     with tarfile.open(source_archive) as archive:
-        archive.extractall(tmp_path, filter="data")
-    (source,) = tmp_path.glob("photostrip-*")
-    subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path / "wheel")],
-        cwd=source,
-        check=True,
-        capture_output=True,
-    )
-    (wheel,) = (tmp_path / "wheel").iterdir()
-    shutil.unpack_archive(wheel, tmp_path / "installed", "zip")
-    shutil.rmtree(source)
-    environment = os.environ | {"PYTHONPATH": str(tmp_path / "installed")}
+        archive.extractall(folder, filter="data")
+    (source,) = folder.glob("photostrip-*")
+    return build("wheel", folder / "built", source)
+
+
+def assert_runs(python: str, folder: Path, installed: Path, environment: dict[str, str], *form: str) -> None:
+    """Import the installed package, adjust a sample by its command, and print a table of its own."""
 
     def run(*command: str) -> str:
         done = subprocess.run(
-            [sys.executable, *command], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+            [python, *command], cwd=folder, env=environment, capture_output=True, text=True, check=True
         )
         return done.stdout
 
-    assert run("-c", "import photostrip; print(photostrip.__file__)").startswith(str(tmp_path / "installed"))
+    where = run("-c", "import photostrip; print(len(photostrip.__all__), photostrip.__file__)")
+    assert where.strip() == f"{len(photostrip.__all__)} {installed / 'photostrip/__init__.py'}"
     sample = str(ROOT / "sample_data/simulated-20")
-    run("-m", "photostrip", "run", f"{sample}/project.yaml", "-o", "result", "--html", "-q")
+    run("-m", "photostrip", "run", f"{sample}/project.yaml", "-o", "result", "-q", *form)
     assert "SAME" in run("-m", "photostrip", "compare", "result", f"{sample}/baseline.json")
-    assert "[001]" in run("-m", "photostrip", "sources")  # reads its tables
+    assert "[001]" in run("-m", "photostrip", "sources")
+
+
+def test_the_wheel_runs_beside_the_libraries_that_are_here(tmp_path: Path, wheel: Path) -> None:
+    installed = tmp_path / "installed"
+    shutil.unpack_archive(wheel, installed, "zip")
+    assert_runs(sys.executable, tmp_path, installed, os.environ | {"PYTHONPATH": str(installed)}, "--html")
+
+
+def test_the_wheel_brings_what_it_needs_into_an_empty_environment(tmp_path: Path, wheel: Path) -> None:
+    empty = tmp_path / "empty"
+    subprocess.run([sys.executable, "-m", "venv", str(empty)], check=True, capture_output=True)
+    python = str(empty / "bin/python")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "COVERAGE"))}
+
+    def pip(*command: str) -> subprocess.CompletedProcess[str]:
+        options = ["--quiet", "--disable-pip-version-check", "--no-compile", "--retries", "1", "--timeout", "20"]
+        return subprocess.run(
+            [python, "-m", "pip", "install", *options, *command],
+            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+
+    asked = pip("--dry-run", "--no-deps", "typer")
+    if asked.returncode:
+        pytest.skip(f"no package index is reachable: {asked.stderr.strip().splitlines()[-1]}")
+    installed = pip(str(wheel))
+    assert installed.returncode == 0, installed.stderr
+    (packages,) = empty.glob("lib/python3.*/site-packages")
+    assert_runs(python, tmp_path, packages, environment)
+    version = subprocess.run([empty / "bin/photostrip", "--version"], capture_output=True, text=True, check=True)
+    assert photostrip.__version__ in version.stdout
 
 
 def needs() -> dict[str, str]:
