@@ -180,7 +180,9 @@ def table(ids: Sequence[str], listed: Sequence[Column]) -> Document:
 
 def _document(step: str, values: list[Document], ids: Sequence[str], listed: Sequence[Column]) -> Document:
     """Put values and columns, rounded, together."""
-    points = table(ids, [(*head, decimals, np.round(column, decimals)) for *head, decimals, column in listed])
+    points = table(
+        ids, [(name, unit, digits, np.round(np.asarray(each), digits)) for name, unit, digits, each in listed]
+    )
     return {
         "photostrip_step": 1,
         "step": step,

@@ -166,14 +166,16 @@ def bundle_trace(
     steps += [("length", "sigma", -3, [each.length for each in found.steps])]
     steps += [("shift", unit, -3, [each.shift for each in found.steps])]
     steps += [("turn", "deg", -3, np.degrees([each.turn for each in found.steps]))]
-    photo, point, xy = (each[np.isfinite(found.residuals[:, 0])] for each in of_rays(rays))
+    taken = np.isfinite(found.residuals[:, 0])
+    photo, point, xy = of_rays(rays)
+    photo, point = photo[taken], point[taken]
     ids = [f"{photos[one]} {points[other]}" for one, other in zip(photo, point, strict=True)]
     arms = found.points[point] - found.centers[photo]
     words = "[pvv] before the step; its length in standard deviations; the largest shift and turn"
     return [
         _table("Steps of all photos and points", _numbers(steps), steps, words, "A'PA dx = A'Pv"),
         _matrices("Rotations R, photo to ground, by rows", photos, found.rotations),
-        _table("Rays", ids, _images(xy, arms, found.rotations[photo], focal, unit), _COLLINEAR),
+        _table("Rays", ids, _images(xy[taken], arms, found.rotations[photo], focal, unit), _COLLINEAR),
     ]
 
 

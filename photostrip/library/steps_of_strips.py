@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.library.step_arguments import Rays
     from photostrip.triangulation.bundle.solution import IterationStep
 
@@ -196,7 +196,7 @@ def bundle(
     same(points, given)
     if not (np.isin(photo, np.arange(len(centers))).all() and np.isin(point, np.arange(len(points))).all()):
         raise InputError("a ray has a photo or a point that the start does not have")
-    placed, known = np.isfinite(points).all(axis=1), np.isfinite(given)
+    placed, known = np.isfinite(points.sum(axis=1)), np.isfinite(given)
     listed, number, seen = np.flatnonzero(known.any(axis=1) & placed), np.cumsum(placed) - 1, placed[point]
     origin = points[placed].mean(axis=0)
     photo_ids, point_ids = names or ((), ())
@@ -247,7 +247,7 @@ def _counted(*numbers: Numbers) -> Iterator[range]:
     return (range(int(each.max(initial=-1)) + 1) for each in numbers)
 
 
-def _spread(values: Floats, taken: Floats) -> Floats:
+def _spread(values: Floats, taken: Flags) -> Floats:
     """Put values to the rows that took part; NaN to the others."""
     found = np.full((len(taken), values.shape[1]), np.nan)
     found[taken] = values

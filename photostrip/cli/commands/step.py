@@ -333,8 +333,15 @@ def bundle(
 
         photos, points, rays = _read_rays(file, delivery)
         ground = None if control is None else _given(control, points, delivery)
-        sigmas = {"sigma": sigma_um / 1000.0, "ground_sigma": control_sigma}
-        found = steps.bundle(rays, model.focal, ground=ground, base=model.base, names=(photos, points), **sigmas)
+        found = steps.bundle(
+            rays,
+            model.focal,
+            ground=ground,
+            base=model.base,
+            sigma=sigma_um / 1000.0,
+            ground_sigma=control_sigma,
+            names=(photos, points),
+        )
         document = bundle_document(photos, points, found, ground, unit)
         delivery.deliver(document, lambda: bundle_trace(photos, points, rays, model.focal, found, unit))
 
