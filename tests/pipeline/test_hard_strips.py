@@ -15,8 +15,8 @@ from tests.pipeline import blocks
 
 @pytest.mark.slow
 def test_control_across_a_very_long_strip_is_no_line() -> None:
-    """450 km long and 2 km wide: the control spans the width, which is all that the roll needs."""
-    done = simulate(Spec(flight=Flight(photos=500), control=Control(bands=25)))
+    """900 km long and 2 km wide: the control spans the width, which is all that the roll needs."""
+    done = simulate(Spec(flight=Flight(photos=1000), control=Control(bands=50)))
     found = triangulate(inputs_of(done), settings_of(done)).strips[0].absolute
     assert found.condition < 10
 

@@ -89,7 +89,7 @@ def test_two_points_in_one_place_do_not_determine_a_turn() -> None:
 
 @pytest.mark.slow
 def test_precision_and_test_value_are_those_of_repeated_measurements() -> None:
-    turn, runs = (40 * ARCSECOND, -25 * ARCSECOND, 60 * ARCSECOND), 300
+    turn, runs = (40 * ARCSECOND, -25 * ARCSECOND, 60 * ARCSECOND), 600
     found = [fit(pair(turn, seed), ALL) for seed in range(runs)]
     errors = np.array([(each.values - turn) / each.sigma for each in found if each is not None])
     assert len(errors) == runs
@@ -141,8 +141,8 @@ def test_a_stable_point_that_moved_is_found(point: int, turn: tuple[float, float
 
 @pytest.mark.slow
 def test_clean_stable_points_are_kept() -> None:
-    lost = [bool(find_motion(pair((0, 0, 0), seed), pair((0, 0, 0), 1000 + seed)).rejected) for seed in range(200)]
-    assert 0 < sum(lost) < 8  # 1 % of 200 is 2
+    lost = [bool(find_motion(pair((0, 0, 0), seed), pair((0, 0, 0), 1000 + seed)).rejected) for seed in range(300)]
+    assert 0 < sum(lost) < 10  # 1 % of 300 is 3
 
 
 def test_one_camera_may_have_no_turn() -> None:

@@ -78,16 +78,16 @@ KINDS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_errors_are_as_large_as_stated(kind: str) -> None:
-    """Unbiased; 95 % ellipses and ellipsoids cover 93 to 97 %; 3 to 7 % of the points at rest are called moved."""
-    runs = 20 if "turned" in kind else 40  # of many points each; benchmarks/terrestrial.py takes more
+    """Unbiased; 95 % ellipses and ellipsoids cover 93 to 97 %; 4 to 6 % of the points at rest are called moved."""
+    runs = 40  # of many points each; benchmarks/terrestrial.py takes more
     count = repeated(KINDS[kind], runs)
     errors = np.concatenate(count.errors)
     assert np.abs(errors.mean(axis=0)).max() < 4 / np.sqrt(runs)  # points of one run share the turn of the camera
     np.testing.assert_allclose(errors.std(axis=0), 1.0, atol=0.05)
     assert 0.93 < np.mean(np.concatenate(count.plan) < 5.9915) < 0.97
     assert 0.93 < np.mean(np.concatenate(count.space) < 7.8147) < 0.97
-    assert 0.03 < np.mean(np.concatenate(count.false)) < 0.07
-    assert 0.02 < np.mean(np.concatenate(count.stable_false)) < 0.09
+    assert 0.04 < np.mean(np.concatenate(count.false)) < 0.06
+    assert 0.03 < np.mean(np.concatenate(count.stable_false)) < 0.07
     found = np.mean(count.cameras)
     if "turned" in kind:
         assert found == 1.0
@@ -180,7 +180,7 @@ def test_steps_add_up_and_their_covariances_too() -> None:
 def test_rates_and_steps_are_as_precise_as_stated(shared: float) -> None:
     truth = turned(replace(world(), epochs=4, shared=shared), *TURN)
     rates, steps, misfits = [], [], []
-    for seed in range(1, 37):
+    for seed in range(1, 61):
         result = run(truth, seed)
         assert result.rates is not None
         ordinary = ~result.series.stable
@@ -188,9 +188,9 @@ def test_rates_and_steps_are_as_precise_as_stated(shared: float) -> None:
         last = result.since_previous[-1]
         steps.append(weighted(last.values - truth.velocity, last.covariance)[ordinary])
         misfits.append(result.rates.misfit[ordinary])
-    assert 0.925 < np.mean(np.concatenate(rates) < 7.8147) < 0.97
-    assert 0.925 < np.mean(np.concatenate(steps) < 7.8147) < 0.975
-    assert np.mean(np.concatenate(misfits)) == pytest.approx(6.0, abs=0.35)  # chi-square: three epochs less one rate
+    assert 0.93 < np.mean(np.concatenate(rates) < 7.8147) < 0.97
+    assert 0.93 < np.mean(np.concatenate(steps) < 7.8147) < 0.97
+    assert np.mean(np.concatenate(misfits)) == pytest.approx(6.0, abs=0.25)  # chi-square: three epochs less one rate
 
 
 def test_a_motion_that_is_not_uniform_has_a_large_misfit() -> None:
@@ -292,7 +292,7 @@ def test_a_wrong_orientation_shows_and_cancels() -> None:
 def test_vertical_parallaxes_are_as_large_as_stated() -> None:
     truth = turned(world(), *TURN)
     ratios, changes = [], []
-    for seed in range(30):
+    for seed in range(60):
         result = run(truth, seed)
         ratios.append(result.parallax / result.parallax_sigma)
         changes.append(result.parallax_change[1, 6:] / result.parallax_change_sigma[1, 6:])

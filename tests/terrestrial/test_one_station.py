@@ -100,7 +100,7 @@ def drawn(count: int, *, complete: bool) -> tuple[Floats, Floats, Floats]:
 @pytest.mark.slow
 @pytest.mark.parametrize("complete", [True, False])
 def test_standard_deviations_are_the_scatter_and_the_test_keeps_its_level(*, complete: bool) -> None:
-    values, moved, sigma = drawn(180, complete=complete)
+    values, moved, sigma = drawn(360, complete=complete)
     assert values.std(axis=0) / sigma == pytest.approx(np.ones((6, 3)), abs=0.05)
     assert moved.mean() == pytest.approx(0.05, abs=0.012)
 

@@ -58,10 +58,10 @@ def documents(result: Result) -> list[dict[str, Any]]:
 @pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 def test_models_without_deformation_rarely_seem_deformed() -> None:
-    t = np.array([model.surface.t_values for seed in range(20) for model in _deformations(run(seed))])
-    assert len(t) > 50
+    t = np.array([model.surface.t_values for seed in range(30) for model in _deformations(run(seed))])
+    assert len(t) > 80
     # student t with twenty and more redundant points: mean square hardly more than 1
-    assert 0.7 < (t**2).mean() < 1.7
+    assert 0.7 < (t**2).mean() < 1.6
     assert np.mean(np.abs(t) > 2.0) < 0.12
 
 

@@ -199,8 +199,8 @@ def test_a_photo_with_a_fifth_of_its_rays_wrong_is_oriented(photo: int) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("_no_findings")
 def test_strips_without_errors_lose_nothing() -> None:
-    lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.wrong_rays) for seed in range(10)]
-    assert sum(each > 0 for each in lost) <= 1
+    lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.wrong_rays) for seed in range(20)]
+    assert sum(each > 0 for each in lost) <= 2
 
 
 @pytest.mark.slow
