@@ -43,8 +43,9 @@ def verdict_of(document: Document) -> Document:
     look_at = [
         *failed,
         *_findings(document, "warning"),
-        # of data that contradict themselves as a whole they say the same, and metres mean nothing
-        *(() if errors else (*_numbers(document), *_deformed(document))),
+        *(() if errors else _numbers(document)),  # of data that contradict themselves as a whole they say the same
+        *_common_deformation(document, in_metres=not errors),
+        *(() if errors else _deformed(document)),
         *_rejected(document),
         *_notes(document),
     ]
@@ -318,16 +319,19 @@ def _pairs(document: Document) -> Iterator[str]:
     yield from _more(len(odd), "pairs")
 
 
-def _deformed(document: Document) -> Iterator[str]:
-    """Name what all models have in common, then the models that are bent or twisted beyond chance."""
+def _common_deformation(document: Document, *, in_metres: bool) -> Iterator[str]:
+    """Name what all models have in common; in data that contradict themselves metres mean nothing."""
     for name, common in document.get("common_deformation", {}).items():
-        if (
-            common["p"] is not None and common["p"] < TEST_LEVEL / 4
-        ):  # twist and bending, of all models and of single ones
+        if common["p"] is not None and common["p"] < TEST_LEVEL / 4:  # twist, bending; of all models, of single ones
+            size = f" {common['at_corner_m']:+.3f} m at a corner against the middle in the mean," if in_metres else ""
             yield (
-                f"{common['models']} models are deformed alike ({name}): {common['at_corner_m']:+.3f} m at a corner "
-                f"against the middle in the mean, t = {common['t']:.1f}; a lens, the film or the principal distance"
+                f"{common['models']} models are deformed alike ({name}):{size} t = {common['t']:.1f}; a lens, the film "
+                "or the principal distance"
             )
+
+
+def _deformed(document: Document) -> Iterator[str]:
+    """Name models that are bent or twisted beyond chance."""
     odd = [row for row in document.get("deformations", []) if row.get("p", 1.0) < TEST_LEVEL / 2]
     odd.sort(key=lambda row: -max(abs(row[name]["at_corner_m"]) for name in TERMS))
     for row in odd[:NAMED]:

@@ -112,7 +112,7 @@ def test_a_cause_that_is_known_needs_less_evidence() -> None:
     assert found["look_at"][0].endswith("try `earth_curvature: model`")
 
 
-def test_of_contradicting_data_no_deformation_is_told() -> None:
+def test_of_contradicting_data_a_deformation_is_told_without_metres() -> None:
     document = moved(0, 0.0)
     bent = {"bending": {"models": 7, "p": 0.0, "t": 9.0, "at_corner_m": 23723.735}}
     finding = {
@@ -123,6 +123,7 @@ def test_of_contradicting_data_no_deformation_is_told() -> None:
     found = verdict_of({**alone, "findings": [finding]})
     assert found["status"] == FAILED
     assert not any("23723" in text for text in found["look_at"])
+    assert any(text.startswith("7 models are deformed alike (bending): t = 9.0") for text in found["look_at"])
 
 
 def test_a_check_point_that_stands_out_is_taken_out_of_the_headline() -> None:

@@ -182,5 +182,9 @@ def test_a_typing_error_in_a_long_strip_is_told_as_the_adjustment_sees_it(role: 
     (finding,) = result.findings
     assert (finding.code, finding.points) == ("P406", (inputs.control.ids[row],))
     assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, 1], abs=0.01)
-    # metres on the ground beside metres of the map
-    assert finding.evidence["off_m"] == pytest.approx(-result.control_differences[row, 1], rel=6e-4)
+    # the same on the ground, where the metres of the map are longer or shorter
+    fitting = enu[row] - [0.0, result.control_differences[row, 1], 0.0]
+    wrong, right = result.frames[0].cartesian_from_ground(np.array([enu[row], fitting]))
+    off = float(finding.evidence["off_m"])
+    assert abs(off) == pytest.approx(np.linalg.norm(wrong - right), abs=1e-4)
+    assert off * result.control_differences[row, 1] < 0
