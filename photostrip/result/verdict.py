@@ -226,32 +226,28 @@ def _checks(document: Document) -> Iterator[str]:
         if ratio is not None and ratio > POOR_CONTROL:
             yield f"the check points are {ratio:.1f} times farther off than expected from the precision of one model"
         return
-    parts = [(name, check[name]) for name in PARTS if check[name]["count"]]
-    chances = [part["p"] for _, part in parts] + [test["p"] for test in check["tests"]]
+    chances = [check[name]["p"] for name in PARTS if check[name]["count"]] + [test["p"] for test in check["tests"]]
     if chances and min(chances) < _unseen_level(document) / len(chances):
-        said = [
-            f"in {name} {part['rms']:.1f} times, {part['inside_95']} of {part['count']} inside the 95 % {AREAS[name]}"
-            for name, part in parts
-        ]
-        yield (
-            "the check points are farther off than expected from the standard deviations of the points: "
-            f"{'; '.join(said)}; probability {_percent(min(chances) * len(chances))} by chance{_known_cause(document)}"
-        )
+        yield _contradiction("the check points", document, check, "rms", min(chances) * len(chances))
 
 
 def _cross_validation(document: Document) -> Iterator[str]:
     """Say when control that was left out contradicts the standard deviations of the points."""
     found = document.get("cross_validation")
     if found and found["p"] is not None and found["p"] < _unseen_level(document):
-        said = [
-            f"in {name} {part['ratio']:.1f} times, {part['inside_95']} of {part['count']} inside the 95 % {AREAS[name]}"
-            for name in PARTS
-            if (part := found[name])["count"]
-        ]
-        yield (
-            "control points left out in turn are farther off than expected from the standard deviations of the points: "
-            f"{'; '.join(said)}; probability {_percent(found['p'])} by chance{_known_cause(document)}"
-        )
+        yield _contradiction("control points left out in turn", document, found, "ratio", found["p"])
+
+
+def _contradiction(who: str, document: Document, found: Document, ratio: str, chance: float) -> str:
+    said = [
+        f"in {name} {part[ratio]:.1f} times, {part['inside_95']} of {part['count']} inside the 95 % {AREAS[name]}"
+        for name in PARTS
+        if (part := found[name])["count"]
+    ]
+    return (
+        f"{who} are farther off than expected from the standard deviations of the points: {'; '.join(said)}; "
+        f"probability {_percent(chance)} by chance{_known_cause(document)}"
+    )
 
 
 def _unseen_level(document: Document) -> float:
