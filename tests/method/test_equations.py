@@ -1,11 +1,10 @@
-"""The table of docs/sources.md from equations to commands: every function named runs in the command beside it."""
+"""The table from equations to commands: every function named runs in the command beside it."""
 
 from __future__ import annotations
 
 import contextlib
 import inspect
 import io
-import re
 import shlex
 import shutil
 import sys
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
+from photostrip.cli.jobs.sources.tables import rows_of
 from photostrip.cli.main import main
 from tests.loops import nonempty
 from tests.source_tree import ROOT
@@ -34,10 +34,7 @@ class Row(NamedTuple):
 
 
 def rows() -> list[Row]:
-    text = (ROOT / "docs/sources.md").read_text(encoding="utf-8")
-    part = text.partition("## From an equation to a command")[2].partition("\n## ")[0]
-    found = re.findall(r"^\| (\[0.*?) \| .*? \| `(photostrip .*?)` \| `([\w.]+)` \|$", part, re.MULTILINE)
-    return [Row(*each) for each in nonempty(found)]
+    return [Row(row["equation"], row["command"], row["function"]) for row in nonempty(rows_of("equations"))]
 
 
 def code_of(name: str) -> CodeType:
@@ -75,7 +72,6 @@ def test_every_source_is_in_the_table() -> None:
     assert {row.equation.partition("]")[0] for row in found} == {
         "[000", "[001", "[002", "[003", "[004a", "[004b", "[004c",
     }  # fmt: skip
-    assert len(found) == (ROOT / "docs/sources.md").read_text(encoding="utf-8").count("| `photostrip ")
     for row in nonempty(found):
         assert code_of(row.function).co_name == row.function.rpartition(".")[2]
 

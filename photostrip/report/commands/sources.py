@@ -30,7 +30,7 @@ def sources_report(document: Document) -> tuple[str, tuple[Section, ...]]:
             words("function", "function"),
             words("command", "command", rank=2),
         ),
-        note="with the commands in docs/sources.md, and in every form but text on a narrow page",
+        note="with the commands in every form but text on a narrow page",
     )
     return "What the sources print", (
         Section("Worked numbers, computed again", (worked,)),

@@ -81,5 +81,5 @@ def test_another_page_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "does not exist" in capsys.readouterr().err
     other.write_text("# notes\n", encoding="utf-8")
     assert main(["sources", "--write", str(other)]) == 2
-    assert "has no table below the heading ## From an equation to a command" in capsys.readouterr().err
+    assert "has no table below the heading ## Errata of [001]" in capsys.readouterr().err
     assert other.read_text(encoding="utf-8") == "# notes\n"

@@ -1,4 +1,4 @@
-"""The document of ``photostrip sources`` and the tables of docs/sources.md, from the two CSV files beside it."""
+"""The document of ``photostrip sources`` from the two CSV files beside it, and the errata of docs/sources.md."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from photostrip.result.numbers import Document
 
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
-EQUATIONS = "## From an equation to a command"
 DIGITS = 3  # decimals
 
 
@@ -45,15 +44,10 @@ def sources_document() -> Document:
 
 
 def with_tables(page: str, name: str) -> str:
-    """Return a page with the tables below its headings made anew: of equations, and of the errata of each source."""
+    """Return a page with the tables of the errata of each source made anew."""
     misprints = rows_of("misprints")
     explained = {row["source"] for row in misprints if row["shows"]}  # these tables say how a misprint shows
-    tables: dict[str, list[tuple[str, ...]]] = {
-        EQUATIONS: [
-            (row["equation"], row["what"], f"`{row['command']}`", f"`{row['function']}`")
-            for row in rows_of("equations")
-        ]
-    }
+    tables: dict[str, list[tuple[str, ...]]] = {}
     for row in misprints:
         shows = (row["shows"],) if row["source"] in explained else ()
         cells = (row["place"], row["printed"], row["correct"], *shows)
