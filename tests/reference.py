@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import inspect
 import re
 import textwrap
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import photostrip
 from photostrip.cli.command_table import COMMANDS
 from photostrip.cli.jobs.manual import EXIT_CODES, VARIABLES, every_command, records
+from photostrip.cli.main import main as command_line
 from photostrip.result.schema import result_page
 
 if TYPE_CHECKING:
@@ -198,6 +200,8 @@ def main() -> None:
     (folder / "python.md").write_text(python_page(), encoding="utf-8")
     (folder / "commands.md").write_text(command_page(), encoding="utf-8")
     (folder / "result.md").write_text(keys_page(), encoding="utf-8")
+    with (folder / "sources.md").open("w", encoding="utf-8") as file, contextlib.redirect_stdout(file):
+        command_line(["sources", "--format", "md"])
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 A height has the standard deviation m_h = H m_p / b with the flying height H = f m, the photo base b, and the standard
 deviation m_p of an x parallax in the photo. At equal m_h the camera with the smaller K flies higher and covers more.
 
-Source: [004b] eq. 1-8, with the corrections listed in docs/sources.md.
+Source: [004b] eq. 1-8, with the corrections that ``photostrip sources`` lists.
 """
 
 from __future__ import annotations

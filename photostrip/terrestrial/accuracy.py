@@ -58,7 +58,7 @@ class Printed:
 def as_printed(xz: ArrayLike, principal_distance: float, sigma: float) -> Printed:
     """Accuracy of directions by the formulas of the source, for a standard error `sigma` of the image coordinates, mm.
 
-    Source: [002] eq. 5 and 6 as printed, see docs/sources.md.
+    Source: [002] eq. 5 and 6 as printed, see ``photostrip sources``.
     """
     x, z = np.moveaxis(np.asarray(xz, float), -1, 0)
     f = principal_distance

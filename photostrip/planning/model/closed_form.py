@@ -2,8 +2,8 @@
 
 It checks the operators of ``single_model``, and is checked by them; the source prints this form.
 
-Source: [000] eq. 9-11 with nine corrections, each listed in docs/sources.md and shown to be necessary by a test. With
-``printed`` the functions compute what stands in print.
+Source: [000] eq. 9-11 with nine corrections, each listed by ``photostrip sources`` and shown to be necessary by a test.
+With ``printed`` the functions compute what stands in print.
 """
 
 from __future__ import annotations

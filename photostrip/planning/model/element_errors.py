@@ -2,7 +2,7 @@
 
 Points, elements and their signs are those of ``single_model``.
 
-Source: [000] eq. 2 and last paragraphs, rederived; the corrections are listed in docs/sources.md.
+Source: [000] eq. 2 and last paragraphs, rederived; ``photostrip sources`` lists the corrections.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ An error of a point has three parts, dx1 of measurement, dx2 of relative and dx3
 orientation is the similarity in space to the first order, fitted to control with equal weights; on level ground it
 falls into a plane similarity in plan and a tilted plane in height, as in the source.
 
-Source: [000] eq. 1-8, with the corrections listed in docs/sources.md.
+Source: [000] eq. 1-8, with the corrections that ``photostrip sources`` lists.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``photostrip sources``: worked numbers against formulas written out, and the page that is made from its tables."""
+"""``photostrip sources``: worked numbers against formulas written out, and every table in every form."""
 
 from __future__ import annotations
 
@@ -6,19 +6,11 @@ import csv
 import io
 import json
 import math
-from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli.jobs.sources.tables import with_tables
 from photostrip.cli.main import main
 from tests.loops import nonempty
-from tests.source_tree import ROOT
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-PAGE = ROOT / "docs/sources.md"
 
 
 def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -52,16 +44,6 @@ def test_worked_numbers_are_those_of_the_formulas(capsys: pytest.CaptureFixture[
     assert len(found) == len(document["worked"]) == 26
 
 
-def test_the_page_is_made_from_the_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    assert with_tables(page, "page") == page
-    copy = tmp_path / "sources.md"
-    # a table that someone has changed by hand comes back
-    copy.write_text(page.replace("| (b² + Z²)[x] |", "| (b + Z²)[x] |"), encoding="utf-8")
-    assert answer(capsys, "--write", str(copy)) == ""
-    assert copy.read_text(encoding="utf-8") == page
-
-
 def test_every_form_has_every_table(capsys: pytest.CaptureFixture[str]) -> None:
     document = json.loads(answer(capsys, "--format", "json"))
     markdown = answer(capsys, "--format", "md").replace("\\", "")
@@ -73,13 +55,3 @@ def test_every_form_has_every_table(capsys: pytest.CaptureFixture[str]) -> None:
         assert " ".join(f"{row['place']}: {row['printed']}".split()) in text
     rows = list(csv.DictReader(io.StringIO(answer(capsys, "--format", "csv"))))
     assert [row["what"] for row in rows] == [row["what"] for row in document["worked"]]
-
-
-def test_another_page_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    other = tmp_path / "notes.md"
-    assert main(["sources", "--write", str(other)]) == 2
-    assert "does not exist" in capsys.readouterr().err
-    other.write_text("# notes\n", encoding="utf-8")
-    assert main(["sources", "--write", str(other)]) == 2
-    assert "has no table below the heading ## Errata of [001]" in capsys.readouterr().err
-    assert other.read_text(encoding="utf-8") == "# notes\n"

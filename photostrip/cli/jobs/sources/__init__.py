@@ -1,1 +1,1 @@
-"""What the sources print: ``worked`` numbers, and ``tables``, of which docs/sources.md is made."""
+"""What the sources print: ``worked`` numbers, and ``tables`` of misprints and equations."""
