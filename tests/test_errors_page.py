@@ -13,7 +13,7 @@ from tests.loops import nonempty
 from tests.source_tree import ROOT
 
 ENTRY = re.compile(r"(?ms)^- (`[a-z0-9`, -]+)( \([^)]*\))?: (.*?)(?=^- |^#|\Z)")
-SAYS_ALL = re.compile(r"(?ms)^The message says all: (.*?)\.$")
+SAYS_ALL = re.compile(r"(?s)^The message says all: (.*?)\.[ \n]", re.MULTILINE)
 
 
 @cache
@@ -49,7 +49,7 @@ def test_every_code_is_on_the_page_and_no_other() -> None:
 def test_every_code_stands_once() -> None:
     every = Counter([code for names, _, _ in ENTRY.findall(page()) for code in _names(names)] + said_by_messages())
     assert {code: times for code, times in every.items() if times > 1} == {}
-    assert len(entries()) > 100
+    assert len(entries()) > 50
     assert len(entries()) == page().count("\n- `") + sum(len(_names(each[0])) - 1 for each in ENTRY.findall(page()))
 
 
