@@ -32,8 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _seldom_collect_garbage()
     rest = list(sys.argv[1:] if arguments is None else arguments)
     debug = _take_flag(rest, "--debug") or os.environ.get("PHOTOSTRIP_DEBUG", "") not in {"", "0"}
-    for stream in (sys.stdout, sys.stderr):
-        _never_fail_on_characters(stream)
+    sys.stdout, sys.stderr = map(_prepared, (sys.stdout, sys.stderr))
     try:
         code = _dispatch(rest)
         sys.stdout.flush()  # a closed pipe shows here, not at the end of the interpreter
@@ -62,11 +61,14 @@ def _take_flag(arguments: list[str], flag: str) -> bool:
     return len(kept) < end
 
 
-def _never_fail_on_characters(stream: TextIO) -> None:
-    """Let a terminal that lacks a character (sigma, a frame line) show a question mark instead."""
+def _prepared(stream: TextIO | None) -> TextIO:
+    """Let a stream that the caller closed take everything, and one that lacks a character show a question mark."""
+    if stream is None:
+        return os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
     reconfigure = getattr(stream, "reconfigure", None)
     if reconfigure is not None:
         reconfigure(errors="replace")
+    return stream
 
 
 def _dispatch(arguments: list[str]) -> int:

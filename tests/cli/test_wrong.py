@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +17,7 @@ from tests.loops import nonempty
 from tests.project.samples import FILES, MARKED_FILES, PROJECT, sample
 from tests.project.test_faults import MARKS, ONE_FAULT
 from tests.results import spec, write_project
+from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -257,3 +260,16 @@ def test_a_full_disk_takes_the_same_form(
         assert json.loads(out)["findings"][0]["code"] == "system"
     assert out.startswith({"text": "", "json": "{", "github": "::error file="}[form])
     assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("closed", [1, 2])
+@pytest.mark.parametrize(("name", "expected"), [("project.yaml", 0), ("nothing.yaml", 2)])
+def test_an_output_that_the_caller_closed_takes_everything(
+    tmp_path: Path, closed: int, name: str, expected: int
+) -> None:
+    """As ``photostrip check project.yaml >&-`` in a job that wants no output."""
+    path = write_project(tmp_path / "p", spec()).with_name(name)
+    command = f'exec "{sys.executable}" -m photostrip check "{path}" {closed}>&-'
+    done = subprocess.run(["sh", "-c", command], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == expected
+    assert "internal" not in done.stdout + done.stderr
