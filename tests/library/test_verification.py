@@ -110,9 +110,9 @@ def test_an_edited_result_is_told(copied: Path) -> None:
     assert (answer["status"], answer["edited"]) == ("different", False)
     assert answer["result_sha256"]["now"] != answer["result_sha256"]["certificate"]
     found = document(copied)
-    found["statement"]["reasons"] = []  # neither hashed nor compared
+    found["statement"]["remarks"] = ["all is well"]  # neither hashed nor compared
     answer = verify(edited(copied, found), project)
-    assert (answer["status"], answer["words"]) == ("different", ["statement"])
+    assert (answer["status"], answer["edited"], answer["words"]) == ("different", False, ["statement"])
 
 
 @pytest.mark.slow

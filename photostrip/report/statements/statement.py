@@ -88,7 +88,7 @@ def _facts(document: Document) -> Facts:
             *((("Classes asked for", asked),) if asked else ()),
             ("Standard", document["standard"]),
             ("Made by", f"photostrip {document['version']}"),
-            *((("SHA-256", document["result_sha256"]),) if document["result_sha256"] else ()),
+            ("SHA-256", document["result_sha256"]),
         )
     )
 

@@ -1,8 +1,9 @@
 """The certificate of a result: the content of everything that went in, what computed it, and a hash of what came out.
 
 The hash of the result is that of its numbers as reports print them, so that another machine finds the same: adjustment,
-frame, points, photos, differences at given points, rejected measurements. Versions, paths, words, statistics and
-residuals are left out. Metres have 3 decimals, degrees of longitude and latitude 8, angles of photos 4 (radians 6).
+frame, points, photos, differences at given points, rejected measurements, verdict, figures of the accuracy statement.
+Versions, paths, words, other statistics and residuals are left out. Metres have 3 decimals, degrees of longitude and
+latitude 8, angles of photos 4 (radians 6).
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 LIBRARIES = ("numpy", "scipy", "pyproj")  # whose version can change a number
 WITHOUT_PROJ = {"local", "geocentric"}
 METRES, DEGREES, ANGLES = 3, 8, {"deg": 4, "gon": 4, "rad": 6}
+WORDS = {"message", "fix", "sentences", "remarks"}  # of the statement: they follow from its figures
 
 
 def certificate_of(
@@ -69,6 +71,21 @@ def _lines(document: Document) -> Iterator[str]:
         yield f"angles {' '.join(_number(value, ANGLES[angles['unit']]) for value in angles['values'] or ())}"
     yield from _rows("given", document["control"], ("id", "role", "use"), dict.fromkeys(("dx", "dy", "dz"), METRES))
     yield from _rows("rejected", document["rejected"], ("photo", "point", "stage"), {})
+    yield f"verdict {document['status']}"
+    yield from _figures(document.get("statement"))
+
+
+def _figures(value: object) -> Iterator[str]:
+    """Write a line for each figure of the statement, and for each reason that forbids it."""
+    if isinstance(value, dict):
+        for key in sorted(value.keys() - WORDS):
+            yield key
+            yield from _figures(value[key])
+    elif isinstance(value, list):
+        for each in value:
+            yield from _figures(each)
+    else:
+        yield value if isinstance(value, str) else _number(value, METRES)
 
 
 def _rows(what: str, rows: Records | list[Document], texts: Sequence[str], numbers: Mapping[str, int]) -> Iterator[str]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, Fault, InputError
 from photostrip.notes import listed
+from photostrip.result.statement.certificate import result_hash
 from photostrip.result.statement.classes import classified
 from photostrip.result.statement.stating import NOT_MET, REFUSED, STANDARD, TESTED, stated
 
@@ -45,9 +46,14 @@ def statement_document(
     profile, required: classes of another norm, and the one of them that must be kept.
     Raises InputError with every reason why nothing can be stated.
     """
+    fix = "run the project again with this version of photostrip"
     if "statement" not in document:
-        fix = "run the project again with this version of photostrip"
         raise InputError(Fault("holds nothing on its check points", "result-incomplete", file, fix=fix))
+    if not document.get("certificate"):
+        raise InputError(Fault("has no certificate", "no-certificate", file, fix=fix))
+    if result_hash(document) != document["certificate"]["result_sha256"]:
+        message = "its numbers are not those of its certificate: it was edited, no accuracy can be stated"
+        raise InputError(Fault(message, "result-edited", file, fix=fix))
     block = stated({**document["statement"], "reasons": _own(document["statement"]["reasons"])}, wanted)
     if block["status"] == REFUSED:
         raise InputError(_fault(each, file) for each in block["reasons"])
@@ -63,7 +69,7 @@ def statement_document(
         "photostrip_statement": SCHEMA,
         "version": document["version"],
         "result": file,
-        "result_sha256": (document.get("certificate") or {}).get("result_sha256"),
+        "result_sha256": document["certificate"]["result_sha256"],
         "name": document["name"],
         "verdict": document["status"],
         "adjustment": document["adjustment"],

@@ -10,7 +10,7 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.formats.output.result_json import to_json
 from tests.loops import nonempty
-from tests.result.statement.test_evidence import GOOD, block
+from tests.result.statement.test_evidence import GOOD, block, certified
 from tests.results import case
 from tests.source_tree import ROOT
 
@@ -32,7 +32,7 @@ def result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 def written(document: dict[str, Any]) -> None:
     with open("result.json", "w", encoding="utf-8") as file:  # noqa: PTH123 (the working folder)
-        file.write(to_json(document))
+        file.write(to_json(certified(document)))
 
 
 @pytest.mark.usefixtures("result")
@@ -99,6 +99,10 @@ def test_what_is_refused_says_why(result: dict[str, Any], capsys: pytest.Capture
     written(result | {"statement": {}})
     assert main(["statement", "result.json"]) == 2
     assert "key 'statement." in capsys.readouterr().err
+    with open("result.json", "w", encoding="utf-8") as file:  # noqa: PTH123 (the working folder)
+        file.write(to_json(certified(result) | {"statement": result["statement"] | {"not_measured": 7}}))
+    assert main(["statement", "result.json"]) == 2
+    assert "it was edited" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\x00", b"{", b"[]", b'{"photostrip_result": 1}', b"NaN"])

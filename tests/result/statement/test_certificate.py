@@ -41,14 +41,15 @@ def changed(path: str, step: float | str) -> dict[str, Any]:
     [
         ("adjustment", "bundle"), ("frame.crs", "EPSG:32634"), ("points.3.x", 0.001), ("points.3.role", "check"),
         ("points.3.id", "other"), ("photos.1.z", 0.001), ("photos.1.angles.values.2", 0.0001), ("control.2.dz", 0.001),
-        ("control.2.use", "xy"),
+        ("control.2.use", "xy"), ("status", "failed"), ("statement.plan.count", 30), ("statement.plan.rmse", -0.001),
+        ("statement.axes.up.mean", 0.001), ("statement.status", "tested"),
     ],
 )  # fmt: skip
 def test_what_a_report_shows_of_places_is_covered(path: str, step: float | str) -> None:
     assert result_hash(changed(path, step)) != result_hash(plain())
 
 
-@pytest.mark.parametrize("path", ["version", "verdict.accuracy", "name"])
+@pytest.mark.parametrize("path", ["version", "verdict.accuracy", "name", "statement.sentences"])
 def test_words_and_versions_are_left_out(path: str) -> None:
     assert result_hash(changed(path, "other")) == result_hash(plain())
 

@@ -11,6 +11,7 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.result.points.given import differences
+from photostrip.result.statement.certificate import result_hash
 from photostrip.result.statement.document import exit_code, statement_document
 from photostrip.result.statement.evidence import statement_of
 from photostrip.result.statement.stating import stated
@@ -146,8 +147,27 @@ def test_the_same_points_give_the_same_figures_in_every_frame(frame: str) -> Non
     assert found["plan"]["survey"] ** 2 + found["height"]["survey"] ** 2 == pytest.approx(total, rel=2e-2)
 
 
+def certified(document: dict[str, Any]) -> dict[str, Any]:
+    """Give a document as it is read again, with the hash of its numbers."""
+    found: dict[str, Any] = json.loads(json.dumps(document, default=list))
+    return found | {"certificate": {"result_sha256": result_hash(found)}}
+
+
+@pytest.mark.parametrize(("part", "key", "value"), [("plan", "accuracy", 0.01), ("height", "count", 31)])
+def test_an_edited_result_is_refused(part: str, key: str, value: float) -> None:
+    document = certified(case().document | {"statement": block()})
+    assert statement_document(document, "result.json")["result_sha256"] == document["certificate"]["result_sha256"]
+    document["statement"][part][key] = value
+    with pytest.raises(InputError) as refused:
+        statement_document(document, "result.json")
+    assert [fault.code for fault in refused.value.faults] == ["result-edited"]
+    del document["certificate"]
+    with pytest.raises(InputError, match="no certificate"):
+        statement_document(document, "result.json")
+
+
 def test_the_document_names_every_reason() -> None:
-    document = json.loads(json.dumps(case("local").document, default=list))
+    document = certified(case("local").document)
     with pytest.raises(InputError) as refused:
         statement_document(document, "result.json")
     codes = {fault.code for fault in refused.value.faults}
