@@ -119,7 +119,7 @@ def _other(one: Any, two: Any) -> bool:  # noqa: ANN401 (any part of a document)
     """Whether two parts differ by more than another processor makes them differ."""
     if isinstance(one, dict) and isinstance(two, dict):
         return one.keys() != two.keys() or any(_other(one[key], two[key]) for key in one)
-    if isinstance(one, list) and isinstance(two, list):
+    if isinstance(one, list) and isinstance(two, list | tuple):  # a tuple is read again as a list
         return len(one) != len(two) or any(map(_other, one, two))
     if isinstance(one, float) and isinstance(two, float | int) and not isinstance(two, bool):
         return not isclose(one, two, rel_tol=RELATIVE, abs_tol=ABSOLUTE)

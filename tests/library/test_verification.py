@@ -86,6 +86,14 @@ def test_what_has_not_changed_comes_out_again(copied: Path) -> None:
     assert found["result_sha256"]["now"] == found["result_sha256"]["certificate"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
+def test_what_was_overridden_is_overridden_again(copied: Path, adjustment: str) -> None:
+    photostrip.run(copied / "project.yaml", processing={"adjustment": adjustment}).write(copied / "result")
+    found = verify(copied / "result")
+    assert (found["status"], found["words"]) == ("same", [])
+
+
 def test_a_file_that_has_changed_is_named(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with (copied / "control.csv").open("a", encoding="utf-8") as file:
         file.write("\n")  # changes the content and no number
@@ -155,3 +163,4 @@ def test_small_differences_of_another_machine_are_none() -> None:
     assert other({"a": 1.0}, {"b": 1.0})
     assert other([1.0], [1.0, 2.0])
     assert other(None, 1.0)
+    assert not other([1.0], (1.0,))  # of settings
