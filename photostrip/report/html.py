@@ -67,14 +67,19 @@ def sections_html(title: str, version: str, sections: Iterable[Section]) -> str:
 
 def _page(title: str, version: str, sections: list[Document]) -> str:
     from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
+    from markupsafe import Markup, escape
 
     folder = resources.files("photostrip.report") / "templates"
 
     def template(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
+    def code(text: str) -> Markup:
+        """Mark up what stands between backticks: keys of a project, options."""
+        return Markup(re.sub(r"`([^`\n]+)`", r"<code>\1</code>", str(escape(text))))  # noqa: S704 (escaped before)
+
     environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
+    environment.filters["code"] = code
     script = template("report.js").strip()
     digest = sha256(f"\n{script}\n".encode()).digest()
     page: str = environment.from_string(template("report.html")).render(

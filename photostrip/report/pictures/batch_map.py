@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
-from photostrip.report.pictures.ground.sheet import bars, sheet_of
+from photostrip.report.pictures.ground.sheet import bars, ids, sheet_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from photostrip.report.page.parts import Document
 
 MARGIN = 60.0
-NAMED = 40  # projects whose names are written
+NAMED = 40  # projects whose names stand in the description
 SHAPES = {"good": "dot", "unverified": "square", "look": "diamond", "failed": "triangle"}
 
 
@@ -41,17 +41,15 @@ def _map(number: int, projects: Sequence[Document]) -> svg.Picture:
 
     sheet = sheet_of([ground(end) for end in ends], MARGIN)
     found = [*legend(_entries(projects)), *bars(sheet)]
-    for each in projects:
+    spots = [sheet.place(ground(each["track"][0][0])) for each in projects]
+    for each, spot in zip(projects, spots, strict=True):
         found += [
             svg.line(sheet.place(ground(one)), sheet.place(ground(other)), f"track {each['status']}")
             for one, other in each["track"]
         ]
-        spot = sheet.place(ground(each["track"][0][0]))
         hint = f"{each['project']}: {each['status']}"
         found.append(svg.mark(spot, SHAPES[each["status"]], f"verdict-mark {each['status']}", hint))
-        if len(projects) <= NAMED:
-            side, anchor = (-8.0, "end") if spot[0] > WIDTH / 2 else (8.0, "start")
-            found.append(svg.text((spot[0] + side, spot[1] - 6.0), _name(each), "id", anchor))
+    found += ids(zip(map(_name, projects), spots, strict=True), spots, (WIDTH, sheet.height - 30.0))
     places = ", ".join(f"{_name(each)} ({each['status']})" for each in projects[:NAMED])
     texts = svg.Texts(
         f"{counted(len(projects), 'project')} on a body of {projects[0]['body'] / 1000:.0f} km radius",

@@ -93,7 +93,7 @@ def framed(panel: Panel, labels: tuple[str, str], title: str = "") -> list[str]:
     return found
 
 
-def framed_by_photos(panel: Panel, photos: Sequence[str], unit: str, title: str = "") -> list[str]:
+def framed_by_photos(panel: Panel, photos: Sequence[str], labels: tuple[str, str], title: str = "") -> list[str]:
     """Draw axes of which the lower one has the ids of photos, from 1, as many as there is room for."""
     room = (panel.x.end - panel.x.start) / (7.5 * max(map(len, photos)) + 8.0)
     every = max(1, math.ceil(len(photos) / room))
@@ -102,7 +102,7 @@ def framed_by_photos(panel: Panel, photos: Sequence[str], unit: str, title: str 
         for n, photo in enumerate(photos, 1)
         if (n - 1) % every == 0
     ]
-    return [*found, *framed(unnumbered(panel), ("photo", unit), title)]
+    return [*found, *framed(unnumbered(panel), labels, title)]
 
 
 def unnumbered(panel: Panel) -> Panel:

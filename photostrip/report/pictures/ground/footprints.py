@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
-from photostrip.report.pictures.ground.sheet import bars, ids, north_arrow, sheet_of
+from photostrip.report.pictures.ground.sheet import LETTER, LINE, bars, ids, north_arrow, sheet_of
 from photostrip.report.pictures.ground.terrain import footprints, straightened
 
 if TYPE_CHECKING:
@@ -33,16 +33,17 @@ def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
     sheet = sheet_of(corners, MARGIN)
     drawn_outlines = {photo: [sheet.place(corner) for corner in outline] for photo, outline in outlines.items()}
     counts = _overlap(list(drawn_outlines.values()), WIDTH / CELLS)
+    middles = [(photo, _middle(outline)) for photo, outline in drawn_outlines.items() if _holds(outline, photo)]
+    kind = "outline" if middles else "outline narrow"
     drawn = [_area(runs, f"overlap-{count}", WIDTH / CELLS) for count, runs in sorted(counts.items())]
     drawn += [
-        svg.polygon(straightened(outline, STRAIGHT), "outline", f"photo {photo}")
+        svg.polygon(straightened(outline, STRAIGHT), kind, f"photo {photo}")
         for photo, outline in drawn_outlines.items()
     ]
     drawn += _scale(counts)
     drawn += bars(sheet)
     drawn += north_arrow(plan.north)
-    middles = {photo: _middle(outline) for photo, outline in drawn_outlines.items()}
-    drawn += ids(middles.items(), (), (WIDTH, sheet.height - 30.0))
+    drawn += ids(middles, (), (WIDTH, sheet.height - 30.0), beside=False)
     largest = max(outlines, key=lambda photo: _size(outlines[photo]))
     caption = (
         "What each photo shows of the ground as the adjusted points have it; colours: how many photos show the same. "
@@ -56,6 +57,12 @@ def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
 
 def _middle(outline: Sequence[svg.Point]) -> svg.Point:
     return sum(x for x, _ in outline) / len(outline), sum(y for _, y in outline) / len(outline)
+
+
+def _holds(outline: Sequence[svg.Point], name: str) -> bool:
+    """Whether there is room for an id within an outline."""
+    wide, high = (max(place) - min(place) for place in zip(*outline, strict=True))
+    return bool(wide > LETTER * len(name) and high > LINE)
 
 
 def _size(outline: Sequence[Pair]) -> float:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 LOWEST, HIGHEST = 220.0, 560.0  # of a picture
 FOOT = 30.0  # room for the scale bars
 LETTER, LINE = 6.4, 12.0  # size of a letter of an id on the picture
+APART = 4.0  # ids side by side
 TRIED = 600  # ids for which room is looked for
 
 
@@ -78,8 +79,10 @@ def north_arrow(direction: Pair) -> list[str]:
     ]
 
 
-def ids(named: Iterable[tuple[str, svg.Point]], taken: Iterable[svg.Point], size: Pair) -> list[str]:
-    """Write ids beside their places where they cover no other id and no mark, the first ones first.
+def ids(
+    named: Iterable[tuple[str, svg.Point]], taken: Iterable[svg.Point], size: Pair, *, beside: bool = True
+) -> list[str]:
+    """Write ids beside or at their places where they cover no other id and no mark, the first ones first.
 
     size: of the picture.
     """
@@ -90,13 +93,9 @@ def ids(named: Iterable[tuple[str, svg.Point]], taken: Iterable[svg.Point], size
         if number >= TRIED:
             break
         wide = LETTER * len(name)
-        for left, low in (
-            (x + 7.0, y + 4.0),
-            (x - 7.0 - wide, y + 4.0),
-            (x - wide / 2, y - 8.0),
-            (x - wide / 2, y + 16.0),
-        ):
-            box = left, low - LINE + 2.0, left + wide, low + 1.0
+        around = (x + 7.0, y + 4.0), (x - 7.0 - wide, y + 4.0), (x - wide / 2, y - 8.0), (x - wide / 2, y + 16.0)
+        for left, low in around if beside else ((x - wide / 2, y + 4.0),):
+            box = left, low - LINE + 2.0, left + wide + APART, low + 1.0
             if box[0] < 0 or box[1] < 0 or box[2] > size[0] or box[3] > size[1] or not boxes.free(box):
                 continue
             boxes.add(box)

@@ -90,9 +90,8 @@ def _picture(plan: Plan, nodes: dict[str, Pair], ties: list[Tie], what: str) -> 
     ]
     drawn += [svg.circle(place, radius, "node", f"{what} {name}") for name, place in at.items()]
     drawn += ids(at.items(), at.values(), (WIDTH, sheet.height - 30.0))
-    entries = [] if what == "strip" else [Entry("in a strip", "tie-inside")]
-    if any(tie.across for tie in ties):
-        entries.append(Entry("between strips", "tie-across"))
+    both = {tie.across for tie in ties} == {True, False}
+    entries = [Entry("in a strip", "tie-inside"), Entry("between strips", "tie-across")] if both else []
     weak = [tie for tie in ties if tie.across and tie.points < FEW] if what == "strip" else []
     drawn += [*legend(entries, TOP - 40.0), *bars(sheet), *north_arrow(plan.north)]
     groups = _groups(nodes, ties)

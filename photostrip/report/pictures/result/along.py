@@ -76,7 +76,8 @@ def deformation_pictures(document: Document, plan: Plan) -> list[Picture]:
     if sizes:
         largest, name, axis = max(sizes)
         words += f"; the largest difference is {largest:.3f} m at {name}, {axis}"
-    texts = svg.Texts("Differences along the strip, before and after", f"{caption}.", f"{words}.")
+    title = "Differences along the strip" + (", before and after" if any(strip.before for strip in shown) else "")
+    texts = svg.Texts(title, f"{caption}.", f"{words}.")
     return [svg.picture("deformation", (WIDTH, layout.whole), texts, drawn)]
 
 

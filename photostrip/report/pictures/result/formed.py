@@ -55,16 +55,18 @@ def junction_pictures(document: Document) -> list[Picture]:
     for place, strip in enumerate(shown):
         own = [row for row in rows if row["strip"] == strip]
         panel = layout.panel(place, (0.0, len(own) + 1.0), high)
-        drawn += framed_by_photos(
-            panel, [row["photo"] for row in own], "µm", f"strip {strip}" if len(strips) > 1 else ""
-        )
+        title = f"strip {strip}" if len(strips) > 1 else ""
+        drawn += framed_by_photos(panel, [row["photo"] for row in own], ("photo", "µm"), title)
         for name, kind in KINDS.items():
             values = [(n, row["discrepancy_um"][name]) for n, row in enumerate(own, 1)]
             drawn.append(steps(panel, values, f"curve curve-{kind} thin"))
             for n, size in values if marked else ():
                 hint = f"photo {own[n - 1]['photo']}, {name}: {size:.1f} µm"
                 drawn.append(svg.mark(panel.at(n, size), SHAPES[name], f"fill-{kind}", hint, 4.0))
-    drawn += legend(Entry(name, f"fill-{kind}", SHAPES[name]) for name, kind in KINDS.items())
+    drawn += legend(
+        Entry(name, f"fill-{kind}", SHAPES[name]) if marked else Entry(name, f"curve curve-{kind} thin")
+        for name, kind in KINDS.items()
+    )
     worst = max(rows, key=lambda row: max(row["discrepancy_um"].values()))
     scale = "model" if document.get("links") else "photo"
     caption = (

@@ -112,7 +112,7 @@ def _panel(panel: Panel, sample: Sample, counts: Sequence[int], title: str) -> l
         )
         if count:
             drawn.append(svg.rectangle((x, y), (right - x, zero - y), "column", counted(count, "residual")))
-    drawn += framed(panel, (f"residual, {sample.unit}", "" if title else "number"), title)
+    drawn += framed(panel, (f"residual, {sample.unit}", "number"), title)
     for side in (-1, 1) if sample.limits else ():
         at = side * sample.limit
         drawn.append(svg.line(panel.at(at, panel.y.low), panel.at(at, panel.y.high), "limit"))

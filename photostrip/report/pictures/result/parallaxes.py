@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
-from photostrip.report.pictures.chart import WIDTH, Entry, Layout, Panel, framed, legend, steps
+from photostrip.report.pictures.chart import WIDTH, Entry, Layout, Panel, framed_by_photos, legend
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,14 +41,17 @@ def parallax_pictures(document: Document) -> list[Picture]:
     everything = [each for zone in zones.values() for each in zone]
     if not everything:
         return []
-    pairs = len(document["parallaxes"])
+    rows = document["parallaxes"]
+    pairs, lefts = len(rows), [row["left"] for row in rows]
     limit = _limit([each for each in everything if each.used] or everything)
     layout = Layout(columns=2, height=130.0, number=len(ZONES))
-    borders = _borders(document["parallaxes"])
+    borders = _borders(rows)
     drawn: list[str] = []
     for place, (zone, where) in enumerate(ZONES.items()):
-        drawn += _panel(layout.panel(place, (0.0, pairs + 1.0), (-limit, limit)), zones[zone], f"zone {zone}, {where}",
-                        borders, single=len(everything) <= MOST_POINTS)  # fmt: skip
+        panel = layout.panel(place, (0.0, pairs + 1.0), (-limit, limit))
+        drawn += framed_by_photos(panel, lefts, ("left photo of the pair", "µm"), f"zone {zone}, {where}")
+        drawn += [svg.line((panel.x(at), panel.y.start), (panel.x(at), panel.y.end), "border") for at in borders]
+        drawn += _parallaxes(panel, zones[zone], single=len(everything) <= MOST_POINTS)
     entries = [Entry("point", "fill-4", "dot")] if len(everything) <= MOST_POINTS else []
     if any(not each.used for each in everything):
         entries.append(Entry("left out", "left-out", "diamond"))
@@ -93,9 +96,8 @@ def _borders(rows: Sequence[Document]) -> list[float]:
     return [n + 0.5 for n in range(1, len(strips)) if strips[n] != strips[n - 1]]
 
 
-def _panel(panel: Panel, found: Sequence[Parallax], title: str, borders: Sequence[float], *, single: bool) -> list[str]:
-    drawn = framed(panel, ("pair", "µm"), title)
-    drawn += [svg.line((panel.x(at), panel.y.start), (panel.x(at), panel.y.end), "border") for at in borders]
+def _parallaxes(panel: Panel, found: Sequence[Parallax], *, single: bool) -> list[str]:
+    drawn: list[str] = []
     used: dict[int, list[float]] = {}
     for each in found:
         place = panel.x(each.pair), panel.clipped(each.size)
@@ -108,11 +110,7 @@ def _panel(panel: Panel, found: Sequence[Parallax], title: str, borders: Sequenc
                 drawn.append(svg.circle(place, 2.0, "fill-4", hint))
     means = [(float(pair), math.fsum(sizes) / len(sizes)) for pair, sizes in sorted(used.items())]
     if means:
-        drawn.append(
-            steps(
-                panel, [(pair, min(max(mean, panel.y.low), panel.y.high)) for pair, mean in means], "curve curve-1 thin"
-            )
-        )
+        drawn.append(svg.path([(panel.x(pair), panel.clipped(mean)) for pair, mean in means], "curve curve-1 thin"))
         drawn += _stacked(panel, [size for sizes in used.values() for size in sizes])
     return drawn
 

@@ -109,7 +109,7 @@ def position_pictures(document: Document) -> list[Picture]:
     single = len(rows) <= WIDTH / 3
     for place, (key, name) in enumerate(POSITIONS):
         panel = layout.panel(place, (0.0, len(rows) + 1.0), (-reach, reach))
-        drawn += framed_by_photos(panel, [row["photo"] for row in rows], "m", name)
+        drawn += framed_by_photos(panel, [row["photo"] for row in rows], ("photo", "m"), name)
         for n, row in enumerate(rows, 1):
             size, sigma = row[key], row["sigma"][place]
             if size is None:
