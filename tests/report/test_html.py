@@ -337,6 +337,24 @@ def test_findings_lead_to_rows_and_pictures_and_back() -> None:
     assert 'href="#picture-deformation"' in text
 
 
+def test_what_to_look_at_leads_to_the_rows_of_its_points() -> None:
+    document = copy.deepcopy(saved())
+    noted, odd = (row["id"] for row in document["control"][:2])
+    document["control"][1]["stands_out"] = ["plan"]
+    where = {"strip": "", "photos": [], "file": "", "line": 0, "column": 0, "key": ""}
+    note = where | {"code": "control-doubtful", "severity": "warning", "points": [noted]}
+    document["notes"].append(note | {"message": f"control point {noted} is wrong"})
+    look = [f"control point {noted} is wrong", f"control point {odd} (9 m in plan) stands out", "something else"]
+    document["verdict"]["look_at"] = look
+    text = to_html(document)
+    found = re.findall(r'<li id="finding-(\d)">(.*?)</li>', text, re.DOTALL)
+    assert [number for number, _ in found] == ["1", "2"]
+    for (number, item), name in zip(found, (noted, odd), strict=True):
+        assert f">{name} in Control points<" in item
+        assert re.search(rf'<tr id="[^"]+"><th[^>]*>{name} <a class="back" href="#finding-{number}"', text)
+    assert f"point {noted}: control-doubtful" in text
+
+
 def test_html_needs_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", str(write_project(tmp_path, spec())), "--html"]) == 2
     assert "--output" in capsys.readouterr().err

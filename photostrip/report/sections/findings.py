@@ -50,6 +50,11 @@ def cures_section(document: Document, most: int) -> Section:
     return Section("Plausibility of the data", tuple(parts))
 
 
+def names_of(said: Document) -> tuple[tuple[str, str], ...]:
+    """Return the points and photos that a finding or a note names."""
+    return tuple((kind, name) for kind in ("point", "photo") for name in said.get(f"{kind}s") or ())
+
+
 def _word(finding: Document) -> str:
     return "accepted" if finding["accepted"] else str(finding["severity"])
 
@@ -67,8 +72,7 @@ def _cure(finding: Document) -> str:
 def _paragraphs(finding: Document) -> Iterator[Part]:
     place = before(finding["file"], finding["line"], finding["column"])
     text = f"{finding['code']} {finding['title']} ({_word(finding)}): {place}{finding['message']}."
-    names = [(kind, name) for kind in ("point", "photo") for name in finding.get(f"{kind}s") or ()]
-    yield Words(text, _colour(finding), mark="-", names=tuple(names))
+    yield Words(text, _colour(finding), mark="-", names=names_of(finding))
     if finding["evidence"]:
         numbers = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in finding["evidence"].items())
         yield Words(f"Evidence: {numbers}.", "", " ")

@@ -8,6 +8,7 @@ from photostrip.notes import counted
 from photostrip.report.page.numbers import fixed, short, unit
 from photostrip.report.page.parts import Document, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.sections.findings import names_of
 from photostrip.report.sections.strip import elsewhere
 
 HEADLINES = {
@@ -17,6 +18,7 @@ HEADLINES = {
     "failed": "FAILED: {failed}.",
 }
 LOOK_SHOWN = 10
+MOST_NAMED = 8  # by one thing to look at: a page leads to their rows
 
 
 def headline(document: Document) -> str:
@@ -46,12 +48,19 @@ def verdict_section(document: Document, *, everything: bool = False, most: int =
     look_at = document["verdict"]["look_at"]
     shown = look_at if everything else look_at[:most]
     parts: list[Part] = [Words(headline(document), document["status"]), accuracy(document)]
-    parts += [Words(text, "", f"{number}.") for number, text in enumerate(shown, 1)]
+    parts += [Words(text, mark=f"{number}.", names=_named(document, text)) for number, text in enumerate(shown, 1)]
     if len(look_at) > len(shown):
         parts.append(Words(elsewhere(len(look_at) - len(shown), "things", "verdict", "verdict")))
     if document["tolerances"]:
         parts.append(tabulated(document["tolerances"], TOLERANCES))
     return Section("Verdict", tuple(parts))
+
+
+def _named(document: Document, text: str) -> tuple[tuple[str, str], ...]:
+    """Return what a note names, and the given points that stand out; findings have links of their own."""
+    found = [name for each in document["notes"] if each["message"] in text for name in names_of(each)]
+    found += [("point", row["id"]) for row in document["control"] if row["stands_out"] and f" {row['id']} (" in text]
+    return tuple(found[:MOST_NAMED])
 
 
 TOLERANCES = (

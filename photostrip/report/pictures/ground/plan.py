@@ -53,7 +53,9 @@ def plan_picture(document: Document, plan: Plan) -> Picture:
         for spot in plan.spots
         if spot.id in named
     ]
-    ring = [Entry("named by a finding", "ring", "dot")] if any(spot.id in named for spot in plan.spots) else []
+    ring = (
+        [Entry("named by a finding or warning", "ring", "dot")] if any(spot.id in named for spot in plan.spots) else []
+    )
     drawn += legend([*roles(everything), *ring], TOP - 40.0)
     drawn += bars(sheet, [(bar * factor, f"residuals {metres(bar)}", "bar vector")])
     drawn += north_arrow(plan.north)
@@ -87,12 +89,13 @@ def roles(spots: list[Spot]) -> list[Entry]:
 
 
 def _named(document: Document) -> dict[str, list[str]]:
-    """Return the codes of the findings that name a point, by point."""
+    """Return the codes of the findings and warnings that name a point, by point."""
     found: dict[str, list[str]] = {}
-    for finding in document.get("findings", []):
-        for name in finding.get("points") or ():
+    warnings = [note for note in document["notes"] if note["severity"] == "warning"]
+    for each in (*document.get("findings", ()), *warnings):
+        for name in each.get("points") or ():
             codes = found.setdefault(name, [])
-            codes += [] if finding["code"] in codes else [finding["code"]]
+            codes += [] if each["code"] in codes else [each["code"]]
     return found
 
 
