@@ -349,7 +349,7 @@ def test_what_to_look_at_leads_to_the_rows_of_its_points() -> None:
     text = to_html(document)
     found = re.findall(r'<li id="finding-(\d)">(.*?)</li>', text, re.DOTALL)
     assert [number for number, _ in found] == ["1", "2"]
-    for (number, item), name in zip(found, (noted, odd), strict=True):
+    for (number, item), name in nonempty(list(zip(found, (noted, odd), strict=True))):
         assert f">{name} in Control points<" in item
         assert re.search(rf'<tr id="[^"]+"><th[^>]*>{name} <a class="back" href="#finding-{number}"', text)
     assert f"point {noted}: control-doubtful" in text
