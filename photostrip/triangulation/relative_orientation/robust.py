@@ -1,7 +1,8 @@
 """Relative orientation that a fifth of wrong points does not pull away: the program's robust weights on y parallaxes.
 
-Source: the weights of ``triangulation.robust``; where more points disagree than a search can explain, a start by the
-least median over sets of five points [Rousseeuw 1984].
+Source: the weights of ``triangulation.robust``; where more points disagree than a search can explain, a start from the
+best of many sets of five points [Rousseeuw 1984]. Best is the least sum of log(1 + e) over the residuals e: the median
+of the source knows half of them, and a single far point that turns a pair makes half of the others fit by chance.
 """
 
 from __future__ import annotations
@@ -63,14 +64,14 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats) -> RobustElements:
 def orient_robustly(pairs: Pairs, sigma: Floats, few: int) -> RobustElements:
     """Orient pairs of which some points are wrong, from the median parallax.
 
-    Where more than ``few`` points disagree with the outcome, weights fall again from the set of five points with the
-    least median, and the elements are kept that most points agree with.
+    Where more than ``few`` points disagree with the outcome, weights fall again from the best set of five points, and
+    the elements are kept that most points agree with.
     """
     elements, scale = solve(start_values(pairs), pairs, sigma)
     todo = np.flatnonzero(pairs.sums((pairs.weight > 0).astype(float)) - _agreeing(elements, pairs, sigma) > few)
     if len(todo):
         part = pairs.take(todo)
-        other = solve(_least_median(elements[todo], part), part, sigma[todo])
+        other = solve(_best_sets(elements[todo], part, sigma[todo]), part, sigma[todo])
         common = np.minimum(scale[todo], other.scale)
         better = _agreeing(other.elements, part, common) > _agreeing(elements[todo], part, common)
         elements[todo[better]], scale[todo[better]] = other.elements[better], other.scale[better]
@@ -85,8 +86,8 @@ def _agreeing(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
     return pairs.sums(good.astype(float))
 
 
-def _least_median(elements: Floats, pairs: Pairs) -> Floats:
-    """Elements by the set of five points, solved to the first order, that leaves the least median parallax."""
+def _best_sets(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
+    """Elements by the set of five points, solved to the first order, that leaves the smallest parallaxes."""
     with np.errstate(all="ignore"):
         q, jacobian = solution.linearised_parallaxes(elements, pairs)
     result = elements.copy()
@@ -95,16 +96,16 @@ def _least_median(elements: Floats, pairs: Pairs) -> Floats:
         # an order of the points that does not depend on that of the table
         rows = rows[np.lexsort((pairs.left[rows, 1], pairs.left[rows, 0]))]
         if len(rows) > MINIMUM_POINTS:
-            root = np.sqrt(pairs.weight[rows])
+            root = np.sqrt(pairs.weight[rows]) / sigma[number]
             result[number] += _best_step(jacobian[:, rows].T * root[:, None], q[rows] * root)
     return result
 
 
 def _best_step(design: Floats, residual: Floats) -> Floats:
-    """Change of the elements by which the median residual becomes smallest; zero when no set gives one."""
+    """Change of the elements by which most residuals become small; zero when no set gives one."""
     n = len(residual)
     draws = np.argsort(np.random.default_rng(n).random((SETS, n)), axis=1)[:, :MINIMUM_POINTS]
     steps = -(np.linalg.pinv(design[draws]) @ residual[draws][:, :, None])[:, :, 0]
     steps = np.where(np.abs(steps).max(axis=1, keepdims=True) < solution.LARGEST_STEP, steps, 0.0)
-    left = np.sort(np.abs(residual + steps @ design.T), axis=1)
-    return np.asarray(steps[left[:, n // 2].argmin()], float)
+    left = np.log1p(np.abs(residual + steps @ design.T)).sum(axis=1)
+    return np.asarray(steps[left.argmin()], float)

@@ -245,6 +245,18 @@ def test_robust_elements_are_those_of_the_good_points(share: int, found_in: int)
     assert (found.scale[right] < 1.01 * np.sqrt(2) * SIGMA).all()
 
 
+@pytest.mark.parametrize(("each", "share", "found_in"), [(2, 3, 52), (2, 4, 43), (3, 6, 50)])
+def test_a_wrong_point_that_half_of_a_pair_agrees_with_does_not_win(each: int, share: int, found_in: int) -> None:
+    # with the median in place of the sum: 46, 40 and 48 of 60
+    points = 6 * each
+    flown, rng = level(17, 60, (each,) * 6), np.random.default_rng(18)
+    wrong = rng.permuted(np.tile(np.arange(points) < share, (60, 1)), axis=1)
+    pairs = spoiled(flown, np.where(wrong, np.exp(rng.uniform(np.log(0.05), np.log(20.0), wrong.shape)), 0.0))
+    found = robust.orient_robustly(pairs, np.full(60, np.sqrt(2) * SIGMA), 3)
+    small = np.abs(solution.y_parallaxes(found.elements, pairs)).reshape(60, points) < 5 * np.sqrt(2) * SIGMA
+    assert (small | wrong).all(axis=1).sum() >= found_in
+
+
 def test_three_hundred_sets_and_ten_steps_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     sets, steps = list[int](), list[int]()
     pinv = np.linalg.pinv
