@@ -51,20 +51,18 @@ class GlobalTest:
 
     def limits(self, count: Numbers) -> Floats:
         """Critical values: chi-square with count - 5 degrees of freedom; infinite without redundancy."""
-        return _by_number(
+        return by_number(
             count, lambda n: chi2_quantile(1 - self.level, n - MINIMUM_POINTS) if n > MINIMUM_POINTS else np.inf
         )
 
     def standardised(self, orientation: Orientation) -> Floats:
         """Parallaxes of the points used in units of their standard deviation, (m,); 0 without redundancy."""
-        pairs, share = orientation.pairs, orientation.redundancy
-        with np.errstate(divide="ignore", invalid="ignore"):
-            value = np.abs(orientation.parallax) * np.sqrt(pairs.weight / share) / self.sigma[pairs.pair]
-        return np.where(orientation.used & np.isfinite(value) & (share > UNCONTROLLED), value, 0.0)
+        value = np.abs(orientation.parallax) / residual_sigma(orientation, self.sigma)
+        return np.where(np.isfinite(value), value, 0.0)
 
     def largest_limits(self, count: Numbers) -> Floats:
         """Critical values of the largest standardised residual (Bonferroni)."""
-        return _by_number(count, lambda n: normal_quantile(1 - self.level / (2 * max(n, 1))))
+        return by_number(count, lambda n: normal_quantile(1 - self.level / (2 * max(n, 1))))
 
     def failing(self, orientation: Orientation) -> Flags:
         """Pairs whose sum of squares or largest residual exceeds its limit."""
@@ -100,7 +98,18 @@ class ParallaxScatter:
         return cls(found, np.full(pairs.size, max(stated, np.nan_to_num(found))))
 
 
-def _by_number(count: Numbers, limit: Callable[[int], float]) -> Floats:
+def residual_sigma(orientation: Orientation, sigma: Floats) -> Floats:
+    """Return standard deviations of residuals, (m,), mm; infinite without redundancy and where a point is not used.
+
+    sigma: (p,), of a y parallax of weight one.
+    """
+    pairs, share = orientation.pairs, orientation.redundancy
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = sigma[pairs.pair] * np.sqrt(share / pairs.weight)
+    return np.where(orientation.used & (share > UNCONTROLLED), size, np.inf)
+
+
+def by_number(count: Numbers, limit: Callable[[int], float]) -> Floats:
     """Look up a limit for every number of points; each number is asked for once."""
     table = np.zeros(int(count.max(initial=0)) + 1)
     for number in np.flatnonzero(np.bincount(np.maximum(count.ravel(), 0))).tolist():

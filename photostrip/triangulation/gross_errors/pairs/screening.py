@@ -13,7 +13,7 @@ Source: [004a]; the two-sided form and the order of work are chosen here, see do
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,7 @@ import numpy as np
 from photostrip.errors import InputError
 from photostrip.frozen import dataclass
 from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
+from photostrip.triangulation.gross_errors.pairs.global_test import by_number, residual_sigma
 from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, rejection, search
 from photostrip.triangulation.relative_orientation.orientation import (
     LEAST_IN_FRONT,
@@ -131,16 +131,18 @@ def _sequential(
 ) -> tuple[Orientation, list[Rejection]]:
     """Test single residuals, one stage after the other."""
     result, log = _drop_behind(orientation, behind)
-    limit = settings.parallax_limit if settings.parallax_limit is not None else LIMIT_FACTOR * sigma * np.sqrt(2.0)
-    stages = {
-        "none": [],
-        "tau": [("tau", settings.grubbs_alpha)],
-        "parallax+grubbs": [("parallax", limit), ("grubbs", settings.grubbs_alpha)],
-    }
-    for test, bound in stages[settings.screening]:
-        result, found = _stage(result, test, float(bound))
+    for test, bound in stages(settings, sigma):
+        result, found = _stage(result, test, bound)
         log += found
     return result, log
+
+
+def stages(settings: RelativeSettings, sigma: float) -> list[tuple[str, float]]:
+    """Return the tests of single residuals in their order, each with its limit, mm, or its level."""
+    limit, level = settings.parallax_limit, settings.grubbs_alpha
+    first = LIMIT_FACTOR * sigma * np.sqrt(2.0) if limit is None else limit
+    known = {"tau": [("tau", level)], "parallax+grubbs": [("parallax", first), ("grubbs", level)]}
+    return known.get(settings.screening, [])
 
 
 def _completed(log: list[Rejection], result: Orientation) -> tuple[Rejection, ...]:
@@ -173,7 +175,7 @@ def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientati
     result = orientation
     log: list[Rejection] = []
     while True:
-        value, limit = _values(result, test, bound)
+        value, limit, _ = tested(result, test, bound)
         value[~result.used] = -np.inf
         peak = np.maximum.reduceat(value, result.pairs.starts)
         spare = Support.of(result).spare(result.pairs.pair)
@@ -187,35 +189,25 @@ def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientati
         result = _without(result, rows)
 
 
-def _values(orientation: Orientation, test: str, bound: float) -> tuple[Floats, Floats]:
-    """Test value and limit of every row."""
+def tested(orientation: Orientation, test: str, bound: float) -> tuple[Floats, Floats, Floats]:
+    """Return value and limit of every row, and the millimetres of one unit of both, infinite where nothing can be told.
+
+    bound: the limit of the test ``parallax``, mm; the level of ``grubbs``, deviation from the mean of the pair, and of
+        ``tau``, studentised residual.
+    """
+    pairs, count, size = orientation.pairs, orientation.points_used, orientation.parallax
     if test == "parallax":
-        return np.abs(orientation.parallax), np.full(len(orientation.parallax), bound)
-    return _grubbs(orientation, bound) if test == "grubbs" else _tau(orientation, bound)
-
-
-def _grubbs(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
-    """Deviation from the pair's mean residual in units of its standard deviation."""
-    pairs, used, count = orientation.pairs, orientation.used, orientation.points_used
-    mean = pairs.sums(np.where(used, orientation.parallax, 0.0)) / count
-    deviation = np.where(used, orientation.parallax - mean[pairs.pair], 0.0)
-    spread = np.sqrt(pairs.sums(deviation**2) / (count - 1))
-    tested = (count > MINIMUM_LEFT) & (spread > NEGLIGIBLE)
-    limits = np.array([grubbs_limit(int(n), alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)])
+        return np.abs(size), np.full(len(size), bound), np.ones(len(size))
+    if test == "grubbs":
+        mean = pairs.sums(np.where(orientation.used, size, 0.0)) / count
+        size = np.where(orientation.used, size - mean[pairs.pair], 0.0)
+        spread = np.sqrt(pairs.sums(size**2) / (count - 1))
+        unit, least, limit = spread[pairs.pair], MINIMUM_LEFT + 1, partial(grubbs_limit, alpha=bound)
+    else:
+        spread = np.sqrt(2.0) * orientation.sigma0
+        unit, least = residual_sigma(orientation, spread), MINIMUM_POINTS + 3
+        limit = partial(tau_limit, unknowns=MINIMUM_POINTS, alpha=bound)
+    limits = by_number(count, lambda n: limit(n) if n >= least else np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
-        value = np.abs(deviation) / spread[pairs.pair]
-    return np.where(np.isfinite(value), value, 0.0), limits[pairs.pair]
-
-
-def _tau(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
-    """Studentised residual: each in units of its own standard deviation."""
-    pairs, count = orientation.pairs, orientation.points_used
-    tested = (count - MINIMUM_POINTS >= 3) & (orientation.sigma0 > NEGLIGIBLE)
-    limits = np.array(
-        [tau_limit(int(n), MINIMUM_POINTS, alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)]
-    )
-    sigma = np.sqrt(2.0) * orientation.sigma0[pairs.pair]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        value = np.abs(orientation.parallax) * np.sqrt(pairs.weight) / (sigma * np.sqrt(orientation.redundancy))
-    value[~(orientation.redundancy > UNCONTROLLED)] = 0.0
-    return np.where(np.isfinite(value), value, 0.0), limits[pairs.pair]
+        value = np.nan_to_num(np.abs(size) / unit, posinf=0.0)
+    return value, np.where(spread > NEGLIGIBLE, limits, np.inf)[pairs.pair], unit

@@ -91,7 +91,7 @@ def test_the_logs_of_the_formula_book(example: Vector, second: str) -> None:
     compare(found, tuple(log), names, expected, example.tol)
     last = expected["log"][-1]
     if not last.get("rejected", True):  # the largest value of the last round stays below its limit
-        value, limit = screening._values(found, test, example.input["alpha"])
+        value, limit, _ = screening.tested(found, test, example.input["alpha"])
         value[~found.used] = -np.inf
         assert names[int(value.argmax())] == last["id"]
         assert value.max() == pytest.approx(last["value"], rel=rel)
@@ -160,7 +160,7 @@ def test_the_shares_of_the_published_experiment(limit: float, published: dict[st
 @pytest.mark.parametrize(("method", "share"), [("grubbs", 0.025), ("tau", 0.052)])
 def test_false_alarms_of_clean_models(method: str, share: float) -> None:
     oriented, _ = experiment(2, 4000, errors=False)
-    value, limit = screening._values(oriented, method, 0.05)
+    value, limit, _ = screening.tested(oriented, method, 0.05)
     alarms = np.maximum.reduceat(value > limit, oriented.pairs.starts).mean()
     assert alarms == pytest.approx(share, abs=4 * np.sqrt(share / 4000))
 
@@ -276,24 +276,24 @@ def test_a_pair_keeps_six_points(method: str) -> None:
 
 def test_grubbs_needs_seven_points() -> None:
     six = spoiled(clean(10, points=(1,) * 6), {0: 3.0})
-    assert np.all(screening._values(six, "grubbs", 0.05)[1] == np.inf)
+    assert np.all(screening.tested(six, "grubbs", 0.05)[1] == np.inf)
     seven = spoiled(clean(10, points=(2, 1, 1, 1, 1, 1)), {0: 3.0})
-    assert screening._values(seven, "grubbs", 0.05)[1][0] == pytest.approx(grubbs_limit(7, 0.05))
+    assert screening.tested(seven, "grubbs", 0.05)[1][0] == pytest.approx(grubbs_limit(7, 0.05))
 
 
 def test_residuals_below_a_millionth_of_a_micrometre_are_rounding() -> None:
     oriented = clean(10).orient()
     pattern = np.where(np.arange(16) % 2, 1.0, -1.0) * np.sqrt(15 / 16)  # of a standard deviation of one
     for size, tested in ((0.8e-9, False), (1.6e-9, True)):
-        limit = screening._values(replace(oriented, parallax=size * pattern), "grubbs", 0.05)[1]
+        limit = screening.tested(replace(oriented, parallax=size * pattern), "grubbs", 0.05)[1]
         assert np.isfinite(limit).all() == tested
 
 
 def test_tau_needs_a_redundancy_of_three() -> None:
     seven = spoiled(clean(10, points=(2, 1, 1, 1, 1, 1)), {0: 3.0})
-    assert np.all(screening._values(seven, "tau", 0.05)[1] == np.inf)
+    assert np.all(screening.tested(seven, "tau", 0.05)[1] == np.inf)
     eight = spoiled(clean(10, points=(2, 2, 1, 1, 1, 1)), {0: 3.0})
-    assert screening._values(eight, "tau", 0.05)[1][0] == pytest.approx(tau_limit(8, 5, 0.05))
+    assert screening.tested(eight, "tau", 0.05)[1][0] == pytest.approx(tau_limit(8, 5, 0.05))
 
 
 @pytest.mark.parametrize("method", ["ransac", "Tau", ""])
