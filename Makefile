@@ -63,7 +63,7 @@ site: $(VENV)/photostrip.installed ## the documentation as a site with search, i
 	rm -rf build/docs
 	mkdir -p build
 	cp -r docs build/docs
-	$(BIN)/python -m tests.reference build/docs/reference
+	$(BIN)/python -m tests.reference build/docs
 	mkdir build/docs/katex
 	cp -r $(KATEX)/katex.min.css $(KATEX)/katex.min.js $(KATEX)/fonts build/docs/katex
 	.venv-site/bin/zensical build --clean --strict

@@ -1,4 +1,4 @@
-"""Write the reference (``python -m tests.reference FOLDER``).
+"""Make a copy of docs/ ready for the site (``python -m tests.reference COPY``): the reference, plain fences.
 
 Names come from docstrings, commands from their help, keys of a result from their description.
 """
@@ -188,14 +188,22 @@ def keys_page() -> str:
     return "\n".join(head) + "\n" + result_page()
 
 
+def plain_fences(page: str) -> str:
+    """Take away what stands behind the kind of a block for ``tests/pages.py``: sites take such a line for prose."""
+    return re.sub(r"(?m)^(```[a-z]+) .*$", r"\1", page)
+
+
 def _anchor(title: str) -> str:
     return title.replace(" ", "-")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.reference", description=__doc__)
-    parser.add_argument("folder", type=Path)
-    folder = parser.parse_args().folder
+    parser.add_argument("folder", type=Path, metavar="COPY")
+    copy = parser.parse_args().folder
+    for page in copy.rglob("*.md"):
+        page.write_text(plain_fences(page.read_text(encoding="utf-8")), encoding="utf-8")
+    folder = copy / "reference"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "python.md").write_text(python_page(), encoding="utf-8")
     (folder / "commands.md").write_text(command_page(), encoding="utf-8")

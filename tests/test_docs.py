@@ -32,6 +32,23 @@ def test_links_lead_somewhere(page: Path) -> None:
     assert [target for target in targets if not (page.parent / target).exists()] == []
 
 
+def anchors(page: Path) -> set[str]:
+    """Give what a link to a heading of a page may name."""
+    headings = re.findall(r"(?m)^#+ (.+)$", page.read_text(encoding="utf-8"))
+    return {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}
+
+
+def test_links_to_headings_lead_there() -> None:
+    links = [
+        (page, target, anchor)
+        for page in pages()
+        for target, anchor in re.findall(r"\]\((?!https?:)([^)#\s]*)#([^)\s]+)\)", page.read_text(encoding="utf-8"))
+    ]
+    wrong = [f"{page.name}: {target}#{anchor}" for page, target, anchor in nonempty(links)
+             if anchor not in anchors((page.parent / target) if target else page)]  # fmt: skip
+    assert wrong == []
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_console_blocks_are_run_or_say_why_not(page: Path) -> None:
     found = blocks(page)

@@ -8,7 +8,7 @@ import photostrip
 from photostrip.cli.command_table import COMMANDS
 from photostrip.cli.jobs.manual import every_command
 from tests.loops import nonempty
-from tests.reference import command_page, python_page
+from tests.reference import command_page, plain_fences, python_page
 
 
 def test_every_public_name_is_explained() -> None:
@@ -35,3 +35,10 @@ def test_every_command_is_there_with_its_options() -> None:
                 and not each.hidden and option not in part] == [], name  # fmt: skip
     links = re.findall(r"\]\(#photostrip-([\w-]+)\)", page)
     assert sorted(nonempty(links)) == sorted(each.replace(" ", "-") for each in named if " " in each)
+
+
+def test_fences_of_the_site_name_a_kind_alone() -> None:
+    assert (
+        plain_fences("```console exit=2\n$ a\n```\n```yaml file=b\nc\n```\n")
+        == "```console\n$ a\n```\n```yaml\nc\n```\n"
+    )
