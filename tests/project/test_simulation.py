@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
@@ -25,6 +26,8 @@ from photostrip.simulation import (
     Spec,
     Terrain,
 )
+from tests.loops import nonempty
+from tests.pages import blocks
 from tests.source_tree import ROOT
 
 EXAMPLES = sorted((ROOT / "configs/simulate").glob("*.yaml"))
@@ -224,22 +227,29 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path: Path) -> None:
     assert [message.split(": ")[1] for message in messages(tmp_path, text)] == ["sed", "flight.photos", "image.unit"]
 
 
-def keys(part: type, above: str = "") -> list[str]:
+def keys(part: type) -> list[str]:
     """Every key of a specification."""
     found = []
     for each in fields(part):
         inner = getattr(simulation, {"gross_errors": "GrossError"}.get(each.name, each.name.capitalize()), None)
-        found.append(above + each.name)
-        if not above and is_dataclass(inner) and isinstance(inner, type):
-            found += keys(inner, f"{each.name}.")
+        found.append(each.name)
+        if is_dataclass(inner) and isinstance(inner, type) and each.name != "camera":
+            found += keys(inner)
     return found
 
 
-def test_the_page_names_every_key() -> None:
-    page = (ROOT / "docs/simulate.md").read_text(encoding="utf-8")
-    every = [key for key in keys(Spec) if key != "camera"]
-    assert len(every) > 55
-    assert [key for key in every if f"| `{key}`" not in page and f"### `{key}`" not in page] == []
+def test_the_page_has_every_key_with_its_default(tmp_path: Path) -> None:
+    files = {block.option("file"): block.lines for block in blocks(ROOT / "docs/simulate.md")}
+    for name, lines in nonempty(files.items()):
+        (tmp_path / (name or "none")).write_text("\n".join(lines), encoding="utf-8")
+    assert load_specification(tmp_path / "defaults.yaml").spec == Spec()
+    more = load_specification(tmp_path / "more.yaml").spec
+    assert (more.film, more.gnss, more.gross_errors) == (Film(), Gnss(), (GrossError("image"),))
+    assert load_specification(tmp_path / "plotter.yaml").spec.models == Models()
+    shown = [line for name in ("defaults.yaml", "more.yaml", "plotter.yaml") for line in files[name]]
+    named = {found[1] for line in shown if (found := re.match(r"[ -]*(?:# )?(\w+):", line))}
+    assert len(keys(Spec)) > 60
+    assert [key for key in keys(Spec) if key not in named] == []
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
