@@ -444,6 +444,26 @@ def shuffled(case: Case) -> Planted | None:
     return with_photos(case, photos), NOBODY
 
 
+def with_points(case: Case, photos: Iterable[str], order: Callable[[int], NDArray[np.int_]]) -> Inputs:
+    """Give the inputs with the ids of some photos in another order."""
+    point = case.inputs.observations.point.copy()
+    for photo in photos:
+        rows = np.flatnonzero(rows_of(case, photo))
+        point[rows] = point[rows[order(len(rows))]]
+    return replace(case.inputs, observations=replace(case.inputs.observations, point=point))
+
+
+def ids_in_the_next_row(case: Case) -> Planted | None:
+    """Write the ids of one photo one row too low."""
+    photo = str(case.rng.choice(case.photos))
+    return with_points(case, [photo], lambda rows: np.roll(np.arange(rows), 1)), frozenset({photo})
+
+
+def numbered_anew(case: Case) -> Planted | None:
+    """Give the points of all photos ids in any order."""
+    return with_points(case, case.photos, case.rng.permutation), NOBODY
+
+
 def no_overlap(case: Case) -> Planted | None:
     """Give the points of all photos from one on other names, as those of another flight."""
     o = case.inputs.observations
@@ -515,6 +535,14 @@ def enough(case: Case, least: int = 6) -> bool:
     """Whether the control has some points in full, so that one of them can be told to be wrong."""
     control = case.inputs.control
     return int((control.use.all(axis=1) & ~control.check).sum()) >= least
+
+
+def shown(case: Case) -> NDArray[np.bool_]:
+    """Full points of the control that take part and that photos show."""
+    control = case.inputs.control
+    return np.asarray(
+        np.isin(control.ids, case.inputs.observations.point_ids) & control.use.all(axis=1) & ~control.check
+    )
 
 
 def axes_exchanged(case: Case) -> Planted | None:
@@ -674,15 +702,83 @@ def exchanged(case: Case) -> Planted | None:
     control = case.inputs.control
     if not enough(case, 8):
         return None
-    seen = np.flatnonzero(
-        np.isin(control.ids, case.inputs.observations.point_ids) & control.use.all(axis=1) & ~control.check
-    )
+    seen = np.flatnonzero(shown(case))
     if len(seen) < 8:
         return None
     one, other = (int(each) for each in case.rng.choice(seen, 2, replace=False))
     enu = control.enu.copy()
     enu[[one, other]] = enu[[other, one]]
     return with_control(case, enu=enu), frozenset({control.ids[one], control.ids[other]})
+
+
+def in_the_next_row(case: Case) -> Planted | None:
+    """Write the ids of all given points one row too low."""
+    ids = case.inputs.control.ids
+    return (with_control(case, ids=(*ids[-1:], *ids[:-1])), NOBODY) if enough(case, 8) else None
+
+
+def of_other_points(case: Case) -> Planted | None:
+    """Give the coordinates of the given points to other ids, in any order."""
+    ids = list(case.inputs.control.ids)
+    case.rng.shuffle(ids)
+    return (with_control(case, ids=tuple(ids)), NOBODY) if enough(case, 8) else None
+
+
+def other_columns_of_one(case: Case) -> Planted | None:
+    """Give one point its coordinates in another order; seen where east and north differ in size."""
+    control = case.inputs.control
+    if kind_of(case) != "EPSG" or not enough(case, 8):
+        return None
+    row = int(case.rng.choice(np.flatnonzero(shown(case))))
+    enu = control.enu.copy()
+    enu[row] = enu[row, list([(1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)][case.rng.integers(4)])]
+    return with_control(case, enu=enu), frozenset({control.ids[row]})
+
+
+def row_copied(case: Case) -> Planted | None:
+    """Give one point the coordinates of another."""
+    control = case.inputs.control
+    seen = np.flatnonzero(shown(case))
+    if not enough(case, 8) or len(seen) < 8:
+        return None
+    one, other = (int(each) for each in case.rng.choice(seen, 2, replace=False))
+    enu = control.enu.copy()
+    enu[other] = enu[one]
+    return with_control(case, enu=enu), frozenset({control.ids[other]})
+
+
+def heights_of_nothing(case: Case) -> Planted | None:
+    """Give all heights as zero, where the ground has relief."""
+    if kind_of(case) == "geocentric" or not seen_in_heights(case, 0.5):
+        return None
+    return with_control(case, enu=case.inputs.control.enu * [1, 1, 0]), NOBODY
+
+
+def heights_in_millimetres(case: Case) -> Planted | None:
+    """Give all heights in millimetres, where the ground has relief."""
+    if kind_of(case) == "geocentric" or not seen_in_heights(case, 0.5):
+        return None
+    return with_control(case, enu=case.inputs.control.enu * [1, 1, 1000]), NOBODY
+
+
+def sigma_in_micrometres(case: Case) -> Planted | None:
+    """State the standard deviation of image coordinates in micrometres."""
+    o = case.inputs.observations
+    return replace(case.inputs, observations=replace(o, sigma=o.sigma * 1000.0)), NOBODY
+
+
+def counted_from_a_corner(case: Case) -> Planted | None:
+    """Count image coordinates from a corner."""
+    format_ = np.array(case.spec.camera.format or (230.0, 230.0))
+    return with_xy(case, case.inputs.observations.xy + format_ / 2.0), NOBODY
+
+
+def one_from_a_corner(case: Case) -> Planted | None:
+    """Count the image coordinates of one photo from a corner."""
+    photo = str(case.rng.choice(case.photos))
+    xy = case.inputs.observations.xy.copy()
+    xy[rows_of(case, photo)] += np.array(case.spec.camera.format or (230.0, 230.0)) / 2.0
+    return with_xy(case, xy), frozenset({photo})
 
 
 def same_id(case: Case) -> Planted | None:
@@ -933,6 +1029,8 @@ MISTAKES = (
     Mistake("one id for two points of two strips", same_id_in_two_strips, ("P301",), block),
     Mistake("one id for two points of two strips, bundle", same_id_in_two_strips, ("P301",), block, "bundle"),
     Mistake("two ids for one point", two_ids, ("P302",)),
+    Mistake("ids of one photo in the next row", ids_in_the_next_row, ("P303",)),
+    Mistake("points in another order on each photo", numbered_anew, ("P303",)),
     Mistake("axes of the control exchanged", axes_exchanged, ("P401", "P103")),
     Mistake("an axis of a local system backwards", left_handed, ("P401",)),
     Mistake("crs of another country", another_crs, ("P402",)),
@@ -951,6 +1049,15 @@ MISTAKES = (
     Mistake("a digit written twice", digit_too_many, ("P406",)),
     Mistake("slip of a digit, models", lambda case: slip_of_a_digit(case, check=False), ("P406",), of_models),
     Mistake("two control points exchanged", exchanged, ("P408",)),
+    Mistake("ids of given points in the next row", in_the_next_row, ("P409",)),
+    Mistake("given points with coordinates of others", of_other_points, ("P409",)),
+    Mistake("one given point in other columns", other_columns_of_one, ("P406",)),
+    Mistake("row of a given point copied", row_copied, ("P410",)),
+    Mistake("all heights zero", heights_of_nothing, ("P410",)),
+    Mistake("heights in millimetres", heights_in_millimetres, ("P405",)),
+    Mistake("standard deviation of images in micrometres", sigma_in_micrometres, ("P108",)),
+    Mistake("image coordinates from a corner", counted_from_a_corner, ("P101",)),
+    Mistake("one photo from a corner", one_from_a_corner, ("P101",)),
     Mistake("control at one end", at_one_end, ("P501",)),
     Mistake("control on one line", on_one_line, ("P502",)),
     Mistake("control in one half", half_of_the_strip, ("P501", "P503")),

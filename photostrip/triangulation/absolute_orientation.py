@@ -37,6 +37,7 @@ CONVERGED = 1e-10  # of the strip's half length; the next step would be its squa
 LAST_AXES_UPDATE = 2  # iteration; afterwards the directions of the ground axes no longer change
 RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
 WEAK_LIMIT = 1 / 8  # well spread control has about 1; at an eighth errors of the control grow eightfold somewhere
+MOST_OFF = 0.2  # of half the strip's length, of half of the control: an error of ids or of the place
 OFF_LINE = 0.1  # breadth of given coordinates on a line over that of the strip's points, as parts of their lengths
 LEAST_WITH_ONE_FAR = 3  # control points: of three none is far from two others
 FAR_OFF = 5.0  # times as far from the middle as any other control point: a strip is no longer than its control
@@ -185,6 +186,13 @@ def orient(
         given = targets.of(similarity(strip))
         if collinearity(given) < WEAK_LIMIT**2:
             raise _on_line(given, targets.control)  # a line fits upside down as well as upright
+        off = float(np.median(np.linalg.norm(targets.misclosures(similarity(strip)), axis=1)))
+        if off > MOST_OFF * half:
+            message = (
+                f"the strip does not fit its control: half of the points are more than {off:.4g} m off, and the strip "
+                f"is {2 * half:.4g} m long; do ids and coordinates belong to the points that were measured?"
+            )
+            raise GeometryError(message, points=targets.control.ids, code="control-of-other-points")
         message = "the strip fits the control only upside down: the control coordinates are left-handed"
         expected = "the axes in the order of the columns, [north, east, up] where X is north"
         raise InputError(Fault(message, code="left-handed-control", key="control.axes", expected=expected))

@@ -28,7 +28,7 @@ from photostrip.pipeline.plausibility.image_evidence import of_images
 from photostrip.points import locate
 from photostrip.triangulation.plausibility import accepted
 from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
-from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, tied_strips
+from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, tied_strips, units
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -87,6 +87,10 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each in formed:
         findings += _of_formed(each, points)
+    in_metres = not any(each.is_error for each in findings)
+    if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
+        checks = inputs.control.check
+        findings += units.find_wrong_sigmas_of_given(predicted.off[checks], predicted.sigma[checks])
     for ties in compared_strips(stages, points.point_ids):
         findings += tied_strips.find_shared_ids_of_strips(ties)
     findings += given_cameras.centers(inputs, points, images.strips, directory)
@@ -170,7 +174,12 @@ def _of_control(
     """
     if control is None:
         return []
-    return [*control.findings, *given_control.by_strip(control, images, strips, formed, tried)]
+    copied = list(identity.find_copied_points(control.points, images.observations))
+    named = {name for each in copied for name in each.names}
+    of_strips = given_control.by_strip(control, images, strips, formed, tried)
+    # a point with the coordinates of another looks like a slip of the pen
+    of_strips = [each for each in of_strips if each.code != slips.CODE or named.isdisjoint(each.points)]
+    return [*control.findings, *copied, *of_strips]
 
 
 def _of_unadjusted_models(
@@ -231,7 +240,8 @@ def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     strip, formed = each.strip, each.formed
     whole = each.whole.formed  # rays that contradict each other may be those of two points
     sigma = float(np.median(observations.sigma))
-    findings = list(flight.find_odd_centers(formed.centers, each.depth, each.up, strip.photos, strip.id))
+    findings = units.find_wrong_sigmas(each.orientation.sigma0, sigma, strip.id)
+    findings += flight.find_odd_centers(formed.centers, each.depth, each.up, strip.photos, strip.id)
     names = observations.point_ids
     findings += identity.find_shared_ids(each.orientation, whole, names, strip.photos, sigma, strip.id)
     focal = strip.camera.principal_distance

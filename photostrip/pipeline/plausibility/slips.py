@@ -83,7 +83,7 @@ def is_doubtful(formed: EvidenceStrip, result: Result, predicted: Predicted) -> 
 def confirmed(findings: Iterable[Finding], predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
     """Give findings again; slips only as far as the adjustment shows them too, as it predicts the coordinates."""
     for each in findings:
-        if each.code == CODE:
+        if each.code == CODE and "axis" in each.evidence:  # a slip in one coordinate
             row = control.points.ids.index(each.points[0])
             yield from _confirmed(each, row, predicted, control)
         else:

@@ -21,13 +21,14 @@ class Kind(NamedTuple):
 
 
 KINDS: dict[str, Kind] = {
-    "P101": Kind("image coordinates in another unit", ERROR),
+    "P101": Kind("image coordinates in another unit, or from another origin", ERROR),
     "P102": Kind("one photo in another unit than its neighbours", ERROR),
     "P103": Kind("image coordinates mirrored", ERROR),
     "P104": Kind("one photo mirrored against its neighbours", ERROR),
     "P105": Kind("principal distance off by a factor", ERROR),
     "P106": Kind("fiducial marks measured in another unit", WARNING),
     "P107": Kind("another principal distance fits better", WARNING),
+    "P108": Kind("standard deviations in another unit", WARNING),
     "P201": Kind("photos out of flight order", ERROR),
     "P202": Kind("neighbouring photos that do not overlap", ERROR),
     "P203": Kind("the same photo twice", ERROR),
@@ -38,6 +39,7 @@ KINDS: dict[str, Kind] = {
     "P208": Kind("camera positions that share an error", WARNING),
     "P301": Kind("one id for two points", WARNING),
     "P302": Kind("two ids for one point", WARNING),
+    "P303": Kind("point ids of a photo that do not go with its neighbours", ERROR),
     "P401": Kind("control axes exchanged or left-handed", ERROR),
     "P402": Kind("control outside its coordinate reference system", ERROR),
     "P403": Kind("control in feet", ERROR),
@@ -46,6 +48,8 @@ KINDS: dict[str, Kind] = {
     "P406": Kind("slip of a digit", WARNING),
     "P407": Kind("control lists in different frames", ERROR),
     "P408": Kind("given points exchanged", WARNING),
+    "P409": Kind("control of other points", ERROR),
+    "P410": Kind("the same coordinates for several points", WARNING),
     "P501": Kind("control at one end of the strip", WARNING),
     "P502": Kind("control on one line", WARNING),
     "P503": Kind("points far beyond the control", WARNING),

@@ -626,3 +626,44 @@ def test_evidence_is_free_of_distortion_though_a_photo_stands_twice_in_the_list(
     ideal = evidence.ideal(images.observations, images.cameras, Settings())
     assert ideal.xy == pytest.approx(undistort(twin.xy, lens), abs=1e-12)
     assert codes(told(wrong)) == ["P203"]
+
+
+@pytest.mark.parametrize(
+    ("plant", "code"),
+    [
+        (plausibility.in_the_next_row, "P409"),
+        (plausibility.of_other_points, "P409"),
+        (plausibility.other_columns_of_one, "P406"),
+        (plausibility.row_copied, "P410"),
+        (plausibility.heights_of_nothing, "P410"),
+        (plausibility.heights_in_millimetres, "P405"),
+        (plausibility.sigma_in_micrometres, "P108"),
+    ],
+)
+def test_mistakes_of_whole_columns_and_rows_are_told(
+    plant: Callable[[plausibility.Case], plausibility.Planted | None], code: str
+) -> None:
+    cases = (plausibility.sound(seed) for seed in range(43001, 43020))
+    case, planted = next((case, made) for case in cases if (made := plant(case)) is not None)
+    inputs, ids = planted
+    named = plausibility.told(inputs, case.settings).after
+    assert code in named
+    assert not ids or ids & named[code]
+
+
+def test_an_id_beside_another_with_its_coordinates_is_no_copied_row_where_they_are_one_point() -> None:
+    case = next(case for case in map(plausibility.sound, range(43001, 43020)) if plausibility.row_copied(case))
+    o, control = case.inputs.observations, case.inputs.control
+    seen = np.flatnonzero(plausibility.shown(case))
+    one, other = (int(each) for each in seen[:2])
+    rows = o.point == o.point_ids.index(control.ids[one])
+    names = (*o.point_ids, "twin")
+    twin = replace(
+        o, point_ids=names, photo=np.r_[o.photo, o.photo[rows]], xy=np.r_[o.xy, o.xy[rows]],
+        point=np.r_[o.point, np.full(rows.sum(), len(names) - 1)], sigma=np.r_[o.sigma, o.sigma[rows]],
+    )  # fmt: skip
+    ids = tuple("twin" if row == other else name for row, name in enumerate(control.ids))
+    enu = control.enu.copy()
+    enu[other] = enu[one]
+    inputs = replace(case.inputs, observations=twin, control=replace(control, ids=ids, enu=enu))
+    assert "P410" not in plausibility.told(inputs, case.settings).before

@@ -43,10 +43,20 @@ if TYPE_CHECKING:
 FALSE_ALARM = 1e-5  # probability of a finding where there is nothing to find
 LEAST_SCALE_ERROR = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
 LEAST_OFFSET_SIGMAS = 8.0  # a-priori standard deviations of a height: a smaller constant does no harm
+LEVEL_SIGMAS = 3.0  # a-priori standard deviations that heights which are all the same must leave: a lake leaves none
 LEAST_GROUP = 3
 MORE_ASIDE = 2  # more points that a bend leaves aside than a constant: it does not explain them
 EXPLAINED_SHARE_IN_FEET = 0.75  # the same, for a ratio that would be a strange coincidence
 EXPLAINED_SHARE = 0.5  # of what heights leave without it: what explains a bend of the strip as well explains nothing
+
+# ratios of heights to plan, and by how much each may be off: a principal distance off by a hundred shows in its field
+HEIGHT_UNITS = (
+    (1 / FOOT, FEET_TOLERANCE, "heights in feet, plan in metres"),
+    (FOOT, FEET_TOLERANCE, "heights in metres, plan in feet"),
+    (1000.0, EXPLAINED_SHARE, "heights in millimetres, plan in metres"),
+    (100.0, EXPLAINED_SHARE, "heights in centimetres, plan in metres"),
+    (0.001, EXPLAINED_SHARE, "heights in kilometres, plan in metres"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,9 +186,12 @@ def find_wrong_heights(
     """Find heights of another unit or sense, and groups of heights that are off by a constant.
 
     floor: smallest standard deviation that makes sense, metres.
-    Yields P105, P401, P404, P405, at most one.
+    Yields P105, P401, P404, P405, P410, at most one.
     """
     in_fit, fit = heights.in_fit, heights.as_given
+    if np.ptp(given.written[in_fit, 2]) == 0 and fit.sigma0 > LEVEL_SIGMAS * floor:
+        yield _all_alike(given, on_strip, in_fit, fit.sigma0)
+        return
     ratio, sigma = 1.0 + float(heights.scaled.coefficient[0]), float(heights.scaled.sigma[0])
     feet = min(abs(ratio * each - 1.0) for each in (FOOT, 1 / FOOT)) < FEET_TOLERANCE
     explains = heights.scaled.sigma0 < (EXPLAINED_SHARE_IN_FEET if feet else EXPLAINED_SHARE) * fit.sigma0
@@ -196,6 +209,17 @@ def find_wrong_heights(
         if explains and _significant(size, sigma, offset.freedom, LEAST_OFFSET_SIGMAS * floor):
             yield _other_heights(given, on_strip, names, key, size, sigma, inside & in_fit)
             return
+
+
+def _all_alike(given: GivenPoints, on_strip: StripPoints, in_fit: Flags, left: float) -> Finding:
+    height = float(given.written[in_fit, 2][0])
+    message = (
+        f"strip {on_strip.strip}: all {int(in_fit.sum())} heights of the control are {height:g} m, and the photos show "
+        f"a relief of {left:.2g} m (standard deviation)"
+    )
+    evidence: Evidence = {"height_m": height, "left_m": left, "points": int(in_fit.sum())}
+    fix = "give the heights, or `use: xy` where they are not known"
+    return found("P410", message, fix, evidence, strips=(on_strip.strip,), key="control")
 
 
 def _shows_in_relief(heights: HeightComparison, floor: float) -> bool:
@@ -219,12 +243,11 @@ def _other_scale(on_strip: StripPoints, ratio: float, sigma: float, in_fit: Flag
     }
     head = f"strip {on_strip.strip}: heights of the control are {ratio:.3f} ± {sigma:.3f} times those of the strip"
     strips = (on_strip.strip,)
-    near = max(FEET_TOLERANCE, 4.0 * sigma / abs(ratio))
     if ratio < 0:
         message = f"{head}: they are counted downwards"
         return found("P401", message, "give heights, positive upwards", evidence, strips=strips, key="control")
-    for feet, text in ((1 / FOOT, "heights in feet, plan in metres"), (FOOT, "heights in metres, plan in feet")):
-        if abs(ratio / feet - 1.0) < near:
+    for unit, near, text in HEIGHT_UNITS:
+        if abs(ratio / unit - 1.0) < max(near, 4.0 * sigma / abs(ratio)):
             message = f"{head}, while the plan fits: {text}"
             fix = "bring heights and plan into one unit, or name a crs with the right unit of height"
             return found("P405", message, fix, evidence, strips=strips, key="control")

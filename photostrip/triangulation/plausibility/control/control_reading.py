@@ -46,12 +46,16 @@ if TYPE_CHECKING:
 
 MIRRORED_SHARE = 0.15  # of the misclosure of the strip as it is, left when it is mirrored
 FIT_SHARE = 0.1  # of the extent of the control: a misclosure above it is no fit
+LEAST_FAR, ROWS_SHARE = 3, 0.2  # points that are so far off, of all: their coordinates may stand in the next row
+FAR_LEFT = 0.35  # of them that are still far off then: the first or the last has no other row
+NO_FIT_SHARE = 0.2  # of it: no strip bends so far
+LEAST_SURE = 6  # points that tell that they are others
 
 
 class Reading(NamedTuple):
     """Given points as a strip reads them."""
 
-    findings: list[Finding]  # P103, P105, P401, P403 to P408
+    findings: list[Finding]  # P103, P105, P401, P403 to P410
     heights: HeightComparison | None = None  # None where too few go with the strip
 
 
@@ -82,7 +86,12 @@ def find_wrong_readings(
         best = mirror
         findings.append(_mirror(on_strip, normal, mirror, extent, axes_are_right=axes_are_right))
     elif normal.median > FIT_SHARE * extent:
-        return Reading(_columns(given, exchanged(), on_strip, w, in_fit, normal))
+        columns = _columns(given, exchanged(), on_strip, w, in_fit, normal)
+        return Reading(
+            columns or _rows(given, on_strip, w, normal, extent) or _of_other_points(on_strip, normal, extent)
+        )
+    elif rows := _rows(given, on_strip, w, normal, extent):
+        return Reading(rows)
     level = turn_level(
         given, LevelStrip(w=w, z=s[:, 2], similarity=best, turn=turn, depth=on_strip.depth), on_strip.floor[1], in_fit
     )
@@ -175,3 +184,42 @@ def _columns(
             fix = "put `control.axes` into the order of the columns"
             return [found("P401", message, fix, evidence, strips=(on_strip.strip,), key="control")]
     return []
+
+
+def _rows(
+    given: GivenPoints, on_strip: StripPoints, w: Complex, normal: PlanSimilarity, extent: float
+) -> list[Finding]:
+    """Try ids that were written one row too high or too low, where many points are far off."""
+
+    def far(plan: Complex, fit: PlanSimilarity) -> int:
+        return int((np.abs(fit(w) - plan) > FIT_SHARE * extent).sum())
+
+    before = far(given.plan, normal)
+    if before < max(LEAST_FAR, ROWS_SHARE * len(w)):
+        return []
+    for rows, way in ((1, "down"), (-1, "up")):
+        plan = np.roll(given.plan, rows)
+        counts = np.isfinite(w) & np.isfinite(plan)
+        fit = fit_similarity(w[counts], plan[counts])
+        if fit is not None and counts.sum() >= LEAST_SURE and far(plan, fit) < FAR_LEFT * before:
+            message = (
+                f"strip {on_strip.strip} does not fit its control in plan (middle misclosure {normal.median:.4g} m), "
+                f"but fits within {fit.median:.3g} m with the coordinates moved {way} by one row"
+            )
+            evidence: Evidence = {"misclosure_as_given_m": normal.median, "misclosure_m": fit.median}
+            fix = "put the ids into the rows of their coordinates"
+            return [found("P409", message, fix, evidence, strips=(on_strip.strip,), key="control")]
+    return []
+
+
+def _of_other_points(on_strip: StripPoints, normal: PlanSimilarity, extent: float) -> list[Finding]:
+    """Say that a strip fits its control in no way."""
+    if normal.median < NO_FIT_SHARE * extent or np.isfinite(on_strip.xyz[:, 0]).sum() < LEAST_SURE:
+        return []
+    message = (
+        f"strip {on_strip.strip} fits its control in no way: half of its points are more than {normal.median:.4g} m "
+        f"off in plan, and the control reaches {extent:.4g} m from its middle"
+    )
+    evidence: Evidence = {"misclosure_m": normal.median, "extent_of_control_m": extent}
+    fix = "do its ids and coordinates belong to these photos, and to the points that were measured?"
+    return [found("P409", message, fix, evidence, strips=(on_strip.strip,), key="control")]

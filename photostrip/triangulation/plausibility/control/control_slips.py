@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import permutations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -70,6 +71,10 @@ def find_plan_slips(
         fix = "were their ids exchanged, in the table or on the photos?"
         yield found("P408", message, fix, evidence, points=names, strips=(on_strip.strip,))
     done = {row for pair in exchanged for row in pair}
+    for row in np.flatnonzero((given.moved[:, :2] != 0).any(axis=1)).tolist():
+        if (order := _order_of_columns(given, row)) is not None:
+            done.add(row)
+            yield _in_other_columns(given, row, order, on_strip.strip)
     height, spread = left.heights()
     for row in rows:
         far = _curved(fitted, abs(fit.residual[row]))
@@ -78,6 +83,34 @@ def find_plan_slips(
         difference = np.array([fit.residual[row].real, fit.residual[row].imag, 0.0])
         if not _one_ray_is_wrong(given, on_strip, fitted, left, row):
             yield from _slips(given, on_strip, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (0, 1))
+
+
+def _order_of_columns(given: GivenPoints, row: int) -> tuple[int, ...] | None:
+    """Order in which the coordinates of a far point would lie among the others of its list."""
+    others = (given.group == given.group[row]) & (given.moved == 0).all(axis=1) & np.isfinite(given.written).all(axis=1)
+    if not others.any():
+        return None
+    low, high = given.written[others].min(axis=0), given.written[others].max(axis=0)
+    reach = np.append(np.full(2, float((high - low)[:2].max())), np.inf)
+    for order in list(permutations(range(3)))[1:]:
+        read = given.written[row, list(order)]
+        if ((read > low - reach) & (read < high + reach)).all():
+            return order
+    return None
+
+
+def _in_other_columns(given: GivenPoints, row: int, order: tuple[int, ...], strip: str) -> Finding:
+    role = "check" if given.check[row] else "control"
+    message = (
+        f"{role} point {given.ids[row]} lies far from all others; with what is called east, north, up read as "
+        f"{', '.join(GROUND_AXES[each] for each in order)} it lies among them"
+    )
+    fix = f"put the coordinates of {given.ids[row]} into their columns"
+    evidence: Evidence = {
+        "given_east": float(given.written[row, 0]),
+        "east_that_would_fit": float(given.written[row, order[0]]),
+    }
+    return found("P406", message, fix, evidence, points=(given.ids[row],), strips=(strip,))
 
 
 def _between_control(fitted: StraightenedStrip) -> Flags:

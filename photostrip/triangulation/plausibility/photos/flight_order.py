@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ from photostrip.triangulation.plausibility.photos.units import reading_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from photostrip.arrays import Floats
     from photostrip.notes import Finding
     from photostrip.points import PhotoPoints
 
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 
 TURNED_BACK = 0.3  # cosine between the directions to both neighbours; -1 in a straight flight
 SURE_COUNT = 3  # common points of a link that may speak against the list
+SURE_POINTS = 6  # common points of two photos that tell whether they show the same points
+SURE_SHARE = 0.25  # of their spread, below which they do
 SURE_MISFIT = 0.35  # of its base
 SAME_PLACE_SHARE = 0.03  # of the median base: two photos from one place
 MOST_LOOKED_AT = 24  # photos that are looked at closer; a list that is wrong at more places needs no closer look
@@ -53,12 +57,15 @@ def find_wrong_order(
     observations: image points of the project, in any unit.
     closer: gives of two photos the direction of each from the other, tilts taken into account, or None; asked where the
         layout contradicts the list.
-    Returns P102, P104, P201, P202, P203.
+    Returns P102, P104, P201, P202, P203, P303.
     Returns the strip as its photos lie.
     """
     links = mosaic.link(observations, photos)
     plane = mosaic.lay_out(links, len(photos))
+    odd = _unlike(links, len(photos))
+    plane.size[odd] = 1.0  # nothing is known of their scale
     findings = [*_scaled(plane, strip, photos), *_mirrored(plane, strip, photos)]
+    findings += _of_other_points(observations, odd, links, strip, photos)
     twice = _twice(links)
     findings += [_twin(links, pair, strip, photos) for pair in twice]
     left = [number for number in range(len(photos)) if number not in {other for _, other in twice}]
@@ -138,6 +145,52 @@ def _mirrored(plane: mosaic.Mosaic, strip: str, photos: Sequence[str]) -> Iterat
         )
         fix = "turn the photo over in its rows, or measure it from the right side"
         yield found("P104", message, fix, {}, photos=(photos[number],), strips=(strip,))
+
+
+def _of_other_points(
+    observations: PhotoPoints, odd: Sequence[int], links: mosaic.PhotoLinks, strip: str, photos: Sequence[str]
+) -> Iterator[Finding]:
+    """Photos `odd` whose points lie on no other photo as they lie on them: their ids belong to other points."""
+    names = [photos[number] for number in odd]
+    if not names:
+        return
+    shown = "photo" if len(names) == 1 else "photos"
+    message = f"strip {strip}: the points of {shown} {listed(names)} lie on no neighbour as they lie there"
+    fix = "were their ids written in another row, or points numbered anew on each photo?"
+    if len(names) == 1:
+        moved = {rows: mosaic.link(_moved_by(observations, names[0], rows), photos) for rows in (1, -1)}
+        left = {rows: _left(links, len(photos))[0][odd[0]] for rows, links in moved.items()}
+        rows = min(left, key=lambda each: float(left[each]))
+        if left[rows] < SURE_SHARE:
+            message += f"; with its ids moved {'down' if rows > 0 else 'up'} by one row they do"
+            fix = "put the ids into the rows of their points"
+    evidence = {"photos": len(names), "misfit_over_spread": float(_left(links, len(photos))[0][odd].min())}
+    yield found("P303", message, fix, evidence, photos=names, strips=(strip,), key="observations")
+
+
+def _unlike(links: mosaic.PhotoLinks, photos: int) -> list[int]:
+    """Photos that share enough points with others, and go with none of them."""
+    mean, least = _left(links, photos)
+    return [int(number) for number in np.flatnonzero((mean > mosaic.MOST_SHARE) & (least > SURE_SHARE))]
+
+
+def _left(links: mosaic.PhotoLinks, photos: int) -> tuple[Floats, Floats]:
+    """Give the mean and the least of what links of enough points leave on each photo, over the spread of the points."""
+    sure = links.count >= SURE_POINTS
+    photo, weight = links.photo[sure].ravel(), np.repeat(links.count[sure], 2).astype(float)
+    share = np.repeat(links.share[sure], 2)
+    least = np.full(photos, np.inf)
+    np.minimum.at(least, photo, share)
+    total = np.bincount(photo, weight, photos)
+    return np.bincount(photo, weight * share, photos) / np.maximum(total, 1.0), least
+
+
+def _moved_by(observations: PhotoPoints, photo: str, rows: int) -> PhotoPoints:
+    """Image points whose ids on one photo are moved along its rows."""
+    inside = observations.photo == observations.photo_ids.index(photo)
+    point = observations.point.copy()
+    point[inside] = np.roll(point[inside], rows)
+    return replace(observations, point=point)
 
 
 def _twice(links: mosaic.PhotoLinks) -> list[tuple[int, int]]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.points import locate
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.notes import Finding
-    from photostrip.points import PhotoPoints
+    from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
@@ -26,6 +27,8 @@ MOST_BY_CHANCE = 0.002  # points that may lie at the same place by chance in the
 FAR_BASES = 2.0  # bases between two places of one id: tilts move them by less
 LEAST_RAYS = 2  # photos that must agree
 TINY = 1e-12
+MOST_COPIED = 100  # that are looked for, at most
+COPIED_SIGMAS = 20.0  # standard deviations of an image coordinate between two points that cannot be one
 SAME_IMAGE_SIGMAS = 3.5  # standard deviations of the mean difference of image coordinates on common photos
 
 
@@ -177,6 +180,30 @@ def find_double_ids_in_images(observations: PhotoPoints, rows: Numbers, strip_id
         )
         evidence = {"photos": len(both), "mean_distance_mm": gap}
         yield found("P302", message, f"give {names[1]} the id {names[0]}", evidence, points=names, strips=(strip_id,))
+
+
+def find_copied_points(control: ControlPoints, observations: PhotoPoints) -> Iterator[Finding]:
+    """Find given points with the very same coordinates in plan that photos show at two places (P410)."""
+    rows = np.flatnonzero(control.use[:, :2].all(axis=1))
+    key = np.column_stack([control.frame[rows], control.enu[rows, :2]])
+    _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    one = rows[first[number.ravel()]]
+    shown = locate(control.ids, observations.point_ids)
+    both = (one != rows) & (shown[one] >= 0) & (shown[rows] >= 0)
+    for a, b in zip(one[both][:MOST_COPIED].tolist(), rows[both][:MOST_COPIED].tolist(), strict=True):
+        at = [np.flatnonzero(observations.point == shown[row]) for row in (a, b)]
+        _, left, right = np.intersect1d(observations.photo[at[0]], observations.photo[at[1]], return_indices=True)
+        gaps = np.linalg.norm(observations.xy[at[0][left]] - observations.xy[at[1][right]], axis=1)
+        evidence: dict[str, float | int | str] = {"photos": len(gaps)}
+        where = "no photo shows both"
+        if len(gaps):
+            evidence["apart_mm"] = float(np.median(gaps))
+            where = f"the photos show them {evidence['apart_mm']:.1f} mm apart"
+            if np.median(gaps) < COPIED_SIGMAS * np.median(observations.sigma[at[0]]):
+                continue  # two ids for one point
+        names = (control.ids[a], control.ids[b])
+        message = f"given points {' and '.join(names)} have the same coordinates, and {where}"
+        yield found("P410", message, "was the row of one of them copied?", evidence, points=names)
 
 
 def _depth(formed: FormedStrip) -> float:

@@ -34,6 +34,11 @@ LEAST_COMMON_OF_MIRROR = 5  # common points that tell a mirror image
 MIRROR_MISFIT_SHARE = 0.25  # of the mirrored to the plain misfit
 MOST_MIRROR_MISFIT = 0.12  # of the spread of the points; relief and tilts leave less
 LEAST_BREADTH = 0.15  # breadth over length of the common points: mirror images of a line fit as well
+MOST_SHARE = (
+    0.4  # of the spread of the points left by a link: relief leaves 0.1, an oblique mount 0.33, other points 0.9
+)
+FAR = 3.0  # times as far from the centre of a photo as four fifths of its points: a gross error, which turns any fit
+FAR_SHARE = 0.8
 SCALE_JUMP = 4.0  # ratio of the scales of two photos that neither height nor an oblique mount explains
 TINY = 1e-12
 
@@ -49,6 +54,12 @@ class PhotoLinks:
     shift: Complex
     misfit: Floats  # (l,): mean residual, in the unit of the image coordinates
     mirrored: Flags  # (l,): whether one of the two is a mirror image of the other
+    share: Floats  # (l,): mean residual over the spread of the points
+
+    @property
+    def fits(self) -> Flags:
+        """Whether two photos show the same points at all."""
+        return np.asarray(self.share < MOST_SHARE)
 
     @cached_property
     def bases(self) -> tuple[Complex, Complex]:
@@ -69,12 +80,12 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
     observations: image points of the project, in any unit.
     photos: photos of the strip; a photo that is listed twice counts where it stands first.
     """
-    pair, z_a, z_b = _common_points(observations, photos)
+    pair, z_a, z_b, near = _common_points(observations, photos)
     order = np.argsort(pair, kind="stable")
     pairs, count = np.unique(pair, return_counts=True)
     enough = count >= LEAST_COMMON
     rows = order[np.repeat(enough, count)]
-    z_a, z_b = z_a[rows], z_b[rows]
+    z_a, z_b, near = z_a[rows], z_b[rows], near[rows]
     pairs, count = pairs[enough], count[enough]
     if not len(pairs):
         none, nowhere = np.zeros(0), np.zeros(0, complex)
@@ -85,9 +96,10 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
             shift=nowhere,
             misfit=none,
             mirrored=np.zeros(0, bool),
+            share=none,
         )
     starts = np.concatenate([[0], np.cumsum(count)[:-1]])
-    plain, mirror = _similar(z_a, z_b, starts, count), _similar(np.conj(z_a), z_b, starts, count)
+    plain, mirror = (_similar(each, z_b, near, starts) for each in (z_a, np.conj(z_a)))
     spread, narrow = _shape(z_b, mirror.weight, starts)
     mirrored = (
         (mirror.misfit < MIRROR_MISFIT_SHARE * plain.misfit)
@@ -95,13 +107,16 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
         & (count >= LEAST_COMMON_OF_MIRROR)
         & ~narrow
     )
+    misfit = np.where(mirrored, mirror.misfit, plain.misfit)
+    kept = np.where(mirrored, spread, _shape(z_b, plain.weight, starts)[0])
     return PhotoLinks(
         photo=np.column_stack(np.divmod(pairs, len(photos))).astype(np.intp),
         count=count.astype(np.intp),
         turn=np.where(mirrored, mirror.turn, plain.turn),
         shift=np.where(mirrored, mirror.shift, plain.shift),
-        misfit=np.where(mirrored, mirror.misfit, plain.misfit),
+        misfit=misfit,
         mirrored=mirrored,
+        share=misfit / np.maximum(kept, TINY),
     )
 
 
@@ -112,6 +127,7 @@ class _CommonPoints(NamedTuple):
     # z_a, z_b: complex image coordinates on the first and on the second photo
     z_a: Complex
     z_b: Complex
+    near: Floats  # weight of each: nothing where it lies far outside one of the photos
 
 
 def _common_points(observations: PhotoPoints, photos: Sequence[str]) -> _CommonPoints:
@@ -124,15 +140,27 @@ def _common_points(observations: PhotoPoints, photos: Sequence[str]) -> _CommonP
     order = inside[np.lexsort((position[inside], observations.point[inside]))]
     point, position = observations.point[order], position[order]
     z = observations.xy[order, 0] + 1j * observations.xy[order, 1]
+    near = _near(np.abs(z), position)
     parts = []
     for lag in range(1, LARGEST_LAG + 1):
         rows = np.flatnonzero((point[lag:] == point[:-lag]) & (position[lag:] > position[:-lag]))
         if not len(rows):
             break
-        parts.append((position[rows] * len(photos) + position[rows + lag], z[rows], z[rows + lag]))
+        both = np.minimum(near[rows], near[rows + lag])
+        parts.append((position[rows] * len(photos) + position[rows + lag], z[rows], z[rows + lag], both))
     if not parts:
-        return _CommonPoints(np.zeros(0, np.intp), np.zeros(0, complex), np.zeros(0, complex))
+        return _CommonPoints(np.zeros(0, np.intp), np.zeros(0, complex), np.zeros(0, complex), np.zeros(0))
     return _CommonPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _near(size: Floats, photo: Numbers) -> Floats:
+    """Weights of image points, by their distances from the centres of their photos: next to nothing far outside."""
+    order = np.lexsort((size, photo))
+    count = np.bincount(photo)
+    last = np.cumsum(count) - count + (FAR_SHARE * (count - 1)).astype(np.intp)
+    reach = np.zeros(len(count))
+    reach[count > 0] = size[order[last[count > 0]]]
+    return np.where(size > FAR * reach[photo], TINY, 1.0)
 
 
 class _Similarities(NamedTuple):
@@ -144,12 +172,12 @@ class _Similarities(NamedTuple):
     weight: Floats  # of each point, which falls with its residual
 
 
-def _similar(z_a: Complex, z_b: Complex, starts: Numbers, count: Numbers) -> _Similarities:
+def _similar(z_a: Complex, z_b: Complex, near: Floats, starts: Numbers) -> _Similarities:
     """Fit a plane similarity to each segment of points, with weights that fall with the residual."""
-    segment = np.repeat(np.arange(len(count)), count)
-    weight = np.ones(len(z_a))
-    turn, shift = np.zeros(len(count), complex), np.zeros(len(count), complex)
-    misfit = np.zeros(len(count))
+    segment = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(z_a))))
+    weight = near
+    turn, shift = np.zeros(len(starts), complex), np.zeros(len(starts), complex)
+    misfit = np.zeros(len(starts))
     for _ in range(REWEIGHTINGS):
         total = np.add.reduceat(weight, starts)
         mean_a, mean_b = (np.add.reduceat(weight * z, starts) / total for z in (z_a, z_b))
@@ -159,7 +187,7 @@ def _similar(z_a: Complex, z_b: Complex, starts: Numbers, count: Numbers) -> _Si
         shift = mean_b - turn * mean_a
         size = np.abs(d_b - turn[segment] * d_a)
         misfit = np.add.reduceat(weight * size, starts) / total
-        weight = 1.0 / np.maximum(size / np.maximum(misfit, TINY)[segment], 0.5)
+        weight = near / np.maximum(size / np.maximum(misfit, TINY)[segment], 0.5)
     return _Similarities(turn=turn, shift=shift, misfit=misfit, weight=weight)
 
 
@@ -219,7 +247,8 @@ def lay_out(links: PhotoLinks, photos: int) -> Mosaic:
 
 def _grow(start: int, around: Sequence[Sequence[tuple[int, int]]], links: PhotoLinks, plane: Mosaic) -> None:
     """Place all photos that hang together with one, strongest links first; the rows of `plane` are filled in."""
-    queue = [(-int(links.count[row]), row, start, other) for row, other in around[start]]
+    rank = np.where(links.fits, -links.count, 0).tolist()
+    queue = [(rank[row], row, start, other) for row, other in around[start]]
     heapq.heapify(queue)
     while queue:
         _, row, known, new = heapq.heappop(queue)
@@ -235,11 +264,10 @@ def _grow(start: int, around: Sequence[Sequence[tuple[int, int]]], links: PhotoL
         if plane.mirrored[known]:  # the plane takes conj(z_known)
             turn, shift = turn.conjugate(), shift.conjugate()
         plane.mirrored[new] = plane.mirrored[known] ^ mirrored
-        plane.size[new] = plane.size[known] * (
-            1.0 if 1 / SCALE_JUMP < abs(turn) < SCALE_JUMP else 1 / max(abs(turn), TINY)
-        )
+        jumps = links.fits[row] and not 1 / SCALE_JUMP < abs(turn) < SCALE_JUMP
+        plane.size[new] = plane.size[known] * (1 / max(abs(turn), TINY) if jumps else 1.0)
         plane.factor[new] = plane.factor[known] * turn
         plane.offset[new] = plane.factor[known] * shift + plane.offset[known]
         for link_row, other in around[new]:
             if plane.part[other] < 0:
-                heapq.heappush(queue, (-int(links.count[link_row]), link_row, new, other))
+                heapq.heappush(queue, (rank[link_row], link_row, new, other))

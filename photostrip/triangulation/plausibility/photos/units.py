@@ -10,18 +10,20 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.notes import listed
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.notes import Finding
     from photostrip.points import PhotoPoints
 
 
 REACH_SHARE = 0.98  # of the image points; the rest may be gross errors
+FEW_SHARE = 0.5  # of the photos of a camera, at most: they are wrong, not all
 REACH = (0.12, 1.2)  # of half the format
 LIKELY_REACH = (0.3, 1.1)  # a reading that brings the reach into this range explains it
 REACH_OF_DISTANCE = (0.06, 3.0)  # of the principal distance, when no format is given: fields of 7 to 143 degrees
@@ -31,13 +33,17 @@ LIKELY_PIXELS = 2.2  # counted from a corner they reach twice as far
 HALF_DIAGONAL = (0.2, 3.5)  # of the principal distance: fields of 23 to 148 degrees
 USUAL_HALF_DIAGONAL = (0.24, 1.9)  # a 610 mm lens and an 85 mm lens on 23 cm film
 MARKS_RATIO = (0.5, 2.0)  # calibrated over measured distances; a scan is known to a percent
+TOO_GOOD = 30.0  # times better than stated: units differ by a thousand, measurements from what was thought by less
+LEAST_MEASURED = 5e-4  # mm; what is better than half a micrometre was computed, not measured
+LEAST_CHECKED = 3  # check points that tell how good given coordinates are
+INCH = 25.4
 READINGS = (
     (1e-3, "micrometres read as millimetres"),
     (1e3, "millimetres read as micrometres"),
     (0.1, "tenths of a micrometre read as micrometres"),
     (10.0, "centimetres read as millimetres, or micrometres read as tenths"),
     (1e-4, "tenths of a micrometre read as millimetres"),
-    (25.4, "inches read as millimetres"),
+    (INCH, "inches read as millimetres"),
     (1e-2, "hundredths of a millimetre read as millimetres"),
     (1e2, "a decimal point two places off"),
 )
@@ -71,22 +77,36 @@ def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | No
     return fits[0] if fits else UnitReading(1.0, "")
 
 
-def reaches(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> dict[str, tuple[float, bool]]:
-    """Measure how far image points reach, camera by camera.
+class _Reach(NamedTuple):
+    """How far image points reach, in units of half the format, or of the principal distance without a format."""
 
-    Returns by name of the camera: the reach, in units of half the format (or of the principal distance), and whether
-        the format is known.
-    """
-    size_of = {}
-    owner = [cameras[photo].name if photo in cameras else "" for photo in observations.photo_ids]
-    for name, camera in {each.name: each for each in cameras.values()}.items():
-        rows = np.array([each == name for each in owner], bool)[observations.photo]
-        if not rows.any():
-            continue
-        half = camera.principal_distance if camera.format is None else np.array(camera.format) / 2.0
-        size = (np.abs(observations.xy[rows]) / half).max(axis=1)
-        size_of[name] = float(np.quantile(size, REACH_SHARE)), camera.format is not None
-    return size_of
+    whole: float  # of all photos of a camera
+    of_photo: dict[str, float]
+    middle: Floats  # (2,): middle of what they cover
+    about_middle: float  # how far they reach from there
+
+
+def _scaled(observations: PhotoPoints, cameras: Mapping[str, Camera], camera: Camera) -> tuple[Floats, Numbers]:
+    """Image points of a camera in those units (m, 2), and their photos (m,)."""
+    of_camera = [photo in cameras and cameras[photo].name == camera.name for photo in observations.photo_ids]
+    rows = np.array(of_camera, bool)[observations.photo]
+    half = camera.principal_distance if camera.format is None else np.array(camera.format) / 2.0
+    return observations.xy[rows] / half, observations.photo[rows]
+
+
+def _reach(observations: PhotoPoints, scaled: Floats, photo: Numbers) -> _Reach:
+    """Measure how far image points of a camera reach, photo by photo and from their own middle."""
+    size = np.abs(scaled).max(axis=1)
+    middle = np.asarray(np.quantile(scaled, [1.0 - REACH_SHARE, REACH_SHARE], axis=0).mean(axis=0), float)
+    return _Reach(
+        whole=float(np.quantile(size, REACH_SHARE)),
+        of_photo={
+            observations.photo_ids[number]: float(np.quantile(size[photo == number], REACH_SHARE))
+            for number in np.unique(photo).tolist()
+        },
+        middle=middle,
+        about_middle=float(np.quantile(np.abs(scaled - middle).max(axis=1), REACH_SHARE)),
+    )
 
 
 def find_wrong_units(
@@ -99,21 +119,59 @@ def find_wrong_units(
     """
     findings, factors = [], {}
     by_name = {each.name: each for each in cameras.values()}
-    for name, (reach, known) in reaches(observations, cameras).items():
-        camera = by_name[name]
+    for name, camera in by_name.items():
+        known = camera.format is not None
         low, high = REACH if known else REACH_OF_DISTANCE
         factors[name] = 1.0
-        if not low < reach < high:
+        scaled, photo = _scaled(observations, cameras, camera)
+        if not len(scaled) or low < float(np.quantile(np.abs(scaled).max(axis=1), REACH_SHARE)) < high:
+            continue
+        reach = _reach(observations, scaled, photo)
+        odd = [photo for photo, own in reach.of_photo.items() if not low < own < high]
+        if 0 < len(odd) <= FEW_SHARE * len(reach.of_photo):
+            findings.append(_odd_photos(camera, odd, reach))
+        elif reach.whole > high and low < reach.about_middle < high:
+            findings.append(_other_origin(camera, reach))
+        else:
             likely = LIKELY_REACH if known else LIKELY_OF_DISTANCE
-            reading = reading_of(reach, likely, camera.pixel_size)
+            reading = reading_of(reach.whole, likely, camera.pixel_size)
             factors[name] = reading.factor
-            photos = [photo for photo in observations.photo_ids if photo in cameras and cameras[photo].name == name]
-            findings.append(_wrong_unit(camera, reach, reading, photos))
+            findings.append(_wrong_unit(camera, reach.whole, reading, list(reach.of_photo)))
     for camera in by_name.values():
         wrong = _unlikely_lens(camera)
         if wrong is not None:
             findings.append(wrong)
     return findings, factors
+
+
+def _unit_of_reach(camera: Camera) -> str:
+    return "half the format" if camera.format is not None else "the principal distance"
+
+
+def _odd_photos(camera: Camera, photos: Sequence[str], reach: _Reach) -> Finding:
+    """Say that some photos of a camera reach too far, or not far enough."""
+    own = float(np.median([reach.of_photo[photo] for photo in photos]))
+    others = float(np.median([each for photo, each in reach.of_photo.items() if photo not in photos]))
+    message = (
+        f"image coordinates on {listed(photos)} reach to {own:.3g} times {_unit_of_reach(camera)}, on the other photos "
+        f"of camera {camera.name} to {others:.2g}"
+    )
+    fix = "are their rows in another unit, or counted from another origin?"
+    evidence = {"reach": own, "reach_of_others": others}
+    return found("P101", message, fix, evidence, photos=photos, key="observations.unit")
+
+
+def _other_origin(camera: Camera, reach: _Reach) -> Finding:
+    """Say that image coordinates are counted from elsewhere, not from the centre."""
+    x, y = reach.middle.tolist()
+    message = (
+        f"image coordinates of camera {camera.name} reach to {reach.whole:.3g} times {_unit_of_reach(camera)}, but to "
+        f"{reach.about_middle:.2g} from their own middle, which lies at ({x:.2f}, {y:.2f}) of it: they are not counted "
+        "from the centre of the photo"
+    )
+    fix = "check `observations.origin`; subtract the middle of the fiducial marks, or give the marks"
+    evidence = {"reach": reach.whole, "reach_from_middle": reach.about_middle, "middle_x": x, "middle_y": y}
+    return found("P101", message, fix, evidence, photos=list(reach.of_photo), key="observations.origin")
 
 
 def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding]:
@@ -135,9 +193,54 @@ def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding
     return [found("P106", message, fix, evidence, photos=names, key="fiducial_measurements.unit")]
 
 
+def is_measured(sigma0: Floats) -> bool:
+    """Whether pairs of photos have noise, by their standard deviations of an image coordinate (p,), mm."""
+    known = sigma0[np.isfinite(sigma0)]
+    return bool(len(known) and np.median(known) > LEAST_MEASURED)
+
+
+def find_wrong_sigmas(sigma0: Floats, stated: float, strip: str) -> list[Finding]:
+    """Look for a standard deviation of image coordinates in another unit (P108).
+
+    sigma0: (p,), of each pair of photos, mm; stated: what the project says, mm.
+    """
+    if not is_measured(sigma0):
+        return []
+    middle = float(np.nanmedian(sigma0))
+    if middle > stated / TOO_GOOD:
+        return []
+    message = (
+        f"strip {strip}: image coordinates have a standard deviation of {1000 * middle:.1f} µm, {stated / middle:.0f} "
+        f"times less than stated ({1000 * stated:.4g} µm)"
+    )
+    evidence = {"found_mm": middle, "stated_mm": stated}
+    fix = "give `observations.sigma` in the unit of the image coordinates"
+    return [found("P108", message, fix, evidence, strips=(strip,), key="observations.sigma")]
+
+
+def find_wrong_sigmas_of_given(off: Floats, sigma: Floats) -> list[Finding]:
+    """Look for standard deviations of given coordinates in another unit (P108).
+
+    off, sigma: (c, 3), how far check points are off, and what is expected of that, metres; NaN where not known.
+    """
+    for columns, name in (([0, 1], "plan"), ([2], "height")):
+        known = np.isfinite(off[:, columns] / sigma[:, columns]).all(axis=1)
+        if known.sum() < LEAST_CHECKED:
+            continue
+        middle, expected = (float(np.median(np.abs(each[known][:, columns]))) for each in (off, sigma))
+        if middle < expected / TOO_GOOD:
+            message = (
+                f"check points are {middle:.3g} m off in {name}, less than a thirtieth of what their standard "
+                f"deviations let expect ({expected:.3g} m)"
+            )
+            evidence = {"off_m": middle, "expected_m": expected, "points": int(known.sum())}
+            fix = "give `sigma` of the control in metres"
+            return [found("P108", message, fix, evidence, key="control")]
+    return []
+
+
 def _wrong_unit(camera: Camera, reach: float, reading: UnitReading, photos: Sequence[str]) -> Finding:
-    what = "half the format" if camera.format is not None else "the principal distance"
-    message = f"image coordinates of camera {camera.name} reach to {reach:.3g} times {what}"
+    message = f"image coordinates of camera {camera.name} reach to {reach:.3g} times {_unit_of_reach(camera)}"
     if reading.name:
         message += (
             f"; multiplied by {reading.factor:g} they would reach to {reach * reading.factor:.2f}: {reading.name}"
@@ -163,8 +266,8 @@ def _unlikely_lens(camera: Camera) -> Finding | None:
         return None
     field = 2.0 * np.degrees(np.arctan(ratio))
     low, high = USUAL_HALF_DIAGONAL
-    meant = [camera.principal_distance * 10.0**k for k in (-3, -2, -1, 1, 2, 3)]
-    fits = [value for value in meant if low < half / value < high]
+    meant = [camera.principal_distance * factor for factor in (1e-3, 1e-2, 0.1, 10.0, INCH, 1e2, 1e3)]
+    fits = sorted((each for each in meant if low < half / each < high), key=lambda each: abs(np.log(half / each)))
     fix = f"is it {fits[0]:g} mm?" if fits else "take principal distance and format from the certificate"
     message = (
         f"camera {camera.name} with a principal distance of {camera.principal_distance:g} mm and a format of "

@@ -114,6 +114,38 @@ def test_a_photo_in_another_unit_is_named_with_the_unit(times: float, word: str)
     assert word in finding.message
 
 
+@pytest.mark.parametrize(("rows", "word"), [(1, "up"), (-1, "down")])
+def test_ids_of_a_photo_in_the_rows_of_other_points(rows: int, word: str) -> None:
+    made = simulation()
+    photos = made.strips[0][1]
+    o = made.observations
+    inside, point = o.photo == o.photo_ids.index(photos[3]), o.point.copy()
+    point[inside] = np.roll(point[inside], rows)
+    (finding,) = found(replace(o, point=point), photos)
+    assert (finding.code, finding.photos) == ("P303", (photos[3],))
+    assert f"moved {word} by one row they do" in finding.message
+
+
+def test_points_numbered_anew_on_each_photo() -> None:
+    made = simulation()
+    photos = made.strips[0][1]
+    point, o = made.observations.point.copy(), made.observations
+    for number in range(len(o.photo_ids)):
+        inside = np.flatnonzero(o.photo == number)
+        point[inside] = np.argsort(np.random.default_rng(number).random(len(inside)))
+    findings = [each for each in found(replace(o, point=point), photos) if each.code == "P303"]
+    assert [each.photos for each in findings] == [photos]
+
+
+@pytest.mark.parametrize("factor", [10.0, 1000.0])
+@pytest.mark.parametrize("row", range(0, 60, 7))
+def test_one_coordinate_with_its_decimal_point_lost_is_no_other_unit_of_a_photo(row: int, factor: float) -> None:
+    made = simulation()
+    xy = made.observations.xy.copy()
+    xy[row, int(np.abs(xy[row]).argmax())] *= factor
+    assert found(replace(made.observations, xy=xy), made.strips[0][1]) == []
+
+
 def test_the_same_photo_twice() -> None:
     made = simulation()
     o, photos = made.observations, made.strips[0][1]
@@ -224,6 +256,33 @@ def test_a_principal_distance_off_by_a_power_of_ten(factor: float) -> None:
     camera = replace(made.camera, principal_distance=made.camera.principal_distance * factor)
     (finding,), _ = units.find_wrong_units(made.observations, dict.fromkeys(made.strips[0][1], camera))
     assert (finding.code, finding.fix) == ("P105", "is it 153 mm?")
+
+
+def test_a_principal_distance_in_inches_is_named_in_millimetres() -> None:
+    made = simulation()
+    camera = replace(made.camera, principal_distance=153.0 / 25.4)
+    (finding,), _ = units.find_wrong_units(made.observations, dict.fromkeys(made.strips[0][1], camera))
+    assert (finding.code, finding.fix) == ("P105", "is it 153 mm?")
+
+
+def test_coordinates_from_a_corner_are_no_other_unit() -> None:
+    made = simulation()
+    o, cameras = made.observations, dict.fromkeys(made.strips[0][1], made.camera)
+    (all_of_them,), _ = units.find_wrong_units(replace(o, xy=o.xy + 115.0), cameras)
+    assert all_of_them.code == "P101"
+    assert "not counted from the centre of the photo" in all_of_them.message
+    one = np.where(o.photo[:, None] == 2, o.xy + 115.0, o.xy)
+    (of_one,), factor = units.find_wrong_units(replace(o, xy=one), cameras)
+    assert (of_one.photos, factor) == ((o.photo_ids[2],), {"film": 1.0})
+
+
+@pytest.mark.parametrize(("stated", "told"), [(0.005, False), (0.1, False), (5.0, True)])
+def test_a_standard_deviation_in_another_unit(stated: float, told: bool) -> None:
+    assert bool(units.find_wrong_sigmas(np.array([0.004, 0.006, np.nan]), stated, "A")) is told
+    assert not units.find_wrong_sigmas(np.array([4e-5, 3e-5]), stated, "A")  # computed, not measured
+    off = np.array([[0.1, -0.2, 0.3]] * 3)
+    given = [each.code for each in units.find_wrong_sigmas_of_given(off, np.full((3, 3), 20 * stated))]
+    assert given == (["P108"] if told else [])
 
 
 def test_units_without_a_format_are_seen_by_the_principal_distance() -> None:
