@@ -213,8 +213,8 @@ def _rows(
 
 
 def _of_other_points(on_strip: StripPoints, normal: PlanSimilarity, extent: float) -> list[Finding]:
-    """Say that a strip fits its control in no way."""
-    if normal.median < NO_FIT_SHARE * extent or np.isfinite(on_strip.xyz[:, 0]).sum() < LEAST_SURE:
+    """Say that a formed strip fits its control in no way; photos side by side under an oblique mount do not, either."""
+    if normal.median < NO_FIT_SHARE * extent or np.isfinite(on_strip.xyz).all(axis=1).sum() < LEAST_SURE:
         return []
     message = (
         f"strip {on_strip.strip} fits its control in no way: half of its points are more than {normal.median:.4g} m "
