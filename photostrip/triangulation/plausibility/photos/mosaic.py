@@ -80,12 +80,12 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
     observations: image points of the project, in any unit.
     photos: photos of the strip; a photo that is listed twice counts where it stands first.
     """
-    pair, z_a, z_b, near = _common_points(observations, photos)
-    order = np.argsort(pair, kind="stable")
-    pairs, count = np.unique(pair, return_counts=True)
+    common = _common_points(observations, photos)
+    order = np.argsort(common.pair, kind="stable")
+    pairs, count = np.unique(common.pair, return_counts=True)
     enough = count >= LEAST_COMMON
     rows = order[np.repeat(enough, count)]
-    z_a, z_b, near = z_a[rows], z_b[rows], near[rows]
+    z_a, z_b, near = common.z_a[rows], common.z_b[rows], common.near[rows]
     pairs, count = pairs[enough], count[enough]
     if not len(pairs):
         none, nowhere = np.zeros(0), np.zeros(0, complex)
@@ -141,16 +141,20 @@ def _common_points(observations: PhotoPoints, photos: Sequence[str]) -> _CommonP
     point, position = observations.point[order], position[order]
     z = observations.xy[order, 0] + 1j * observations.xy[order, 1]
     near = _near(np.abs(z), position)
-    parts = []
+    ones, others = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
     for lag in range(1, LARGEST_LAG + 1):
         rows = np.flatnonzero((point[lag:] == point[:-lag]) & (position[lag:] > position[:-lag]))
         if not len(rows):
             break
-        both = np.minimum(near[rows], near[rows + lag])
-        parts.append((position[rows] * len(photos) + position[rows + lag], z[rows], z[rows + lag], both))
-    if not parts:
-        return _CommonPoints(np.zeros(0, np.intp), np.zeros(0, complex), np.zeros(0, complex), np.zeros(0))
-    return _CommonPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+        ones.append(rows)
+        others.append(rows + lag)
+    one, other = np.concatenate(ones), np.concatenate(others)
+    return _CommonPoints(
+        pair=position[one] * len(photos) + position[other],
+        z_a=z[one],
+        z_b=z[other],
+        near=np.minimum(near[one], near[other]),
+    )
 
 
 def _near(size: Floats, photo: Numbers) -> Floats:
