@@ -3,8 +3,8 @@
 A test that only looks at what commands print, write and return gets its ``photostrip`` from ``Forks.command``, and its
 ``python`` from ``Forks.python``: scripts that hand their arguments, folder, environment and open files to a server,
 which forks. Loading takes half a second of the processor for each process, a copy takes a hundredth. The server has
-adjusted a project, too: that halves what the next one takes. What a copy starts with ``sys.executable`` is a copy, too,
-if it was started as ``python``. A script ends as its copy does, by the same code or signal, and a copy whose script is
+adjusted a project, too: that halves what the next one takes. What a copy starts with ``sys.executable`` is a copy, too.
+A script ends as its copy does, by the same code or signal, and a copy whose script is
 gone is killed. What tests of the start itself need (imports, encodings, threads, limits, signals that can be caught) is
 ``sys.executable`` as it is.
 """
@@ -57,18 +57,18 @@ LENGTH = struct.Struct("<q")
 STATUS = struct.Struct("<i")
 MOST_FILES = 100  # that one process hands to another
 OUT_OF_THE_WAY = 120  # no file that is handed over has a number like this or higher
-# The other end, without any module that is not built in.
+# The other end, of modules that are built in alone: ``os`` and ``signal`` take as long to import as all else it does.
 ASKING = """\
-import marshal, os, signal, sys, _socket
+import _signal, _socket, marshal, posix, sys
 names = []
-for name in os.listdir("/dev/fd"):
+for name in posix.listdir("/dev/fd"):
     try:
-        if os.get_inheritable(int(name)):
+        if posix.get_inheritable(int(name)):
             names.append(int(name))
     except OSError:
         pass
 names.sort()
-asked = marshal.dumps((sys.argv[2:], os.getcwd(), dict(os.environ), names))
+asked = marshal.dumps((sys.argv[2:], posix.getcwd(), posix.environ, names))
 with_server = _socket.socket(_socket.AF_UNIX, _socket.SOCK_STREAM)
 with_server.connect(sys.argv[1])
 handles = b"".join(number.to_bytes(4, sys.byteorder) for number in names)
@@ -77,13 +77,13 @@ while asked:
     asked = asked[with_server.send(asked):]
 for number in names:
     if number > 2:
-        os.close(number)
-code = os.waitstatus_to_exitcode(int.from_bytes(with_server.recv(4), "little"))
+        posix.close(number)
+code = posix.waitstatus_to_exitcode(int.from_bytes(with_server.recv(4), "little"))
 if code < 0:
-    if -code not in (signal.SIGKILL, signal.SIGSTOP):
-        signal.signal(-code, signal.SIG_DFL)
-    os.kill(os.getpid(), -code)
-os._exit(code)
+    if -code not in (_signal.SIGKILL, _signal.SIGSTOP):
+        _signal.signal(-code, _signal.SIG_DFL)
+    posix.kill(posix.getpid(), -code)
+posix._exit(code)
 """
 
 
@@ -104,8 +104,9 @@ class Forks:
         self.command.parent.mkdir()
         program, address = folder / "asking.py", folder / "socket"
         program.write_text(ASKING, encoding="utf-8")
-        for script, begin in ((self.python, f'"{self.python}"'), (self.command, f'"{sys.executable}" -m photostrip')):
-            script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -I -S "{program}" "{address}" {begin} "$@"\n')
+        for script, more in ((self.python, ""), (self.command, "-m photostrip ")):
+            ask = f'"{sys.executable}" -I -S "{program}" "{address}" "{self.python}"'
+            script.write_text(f'#!/bin/sh\nexec {ask} {more}"$@"\n')
             script.chmod(0o755)
         environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUTF8": "1"} | self.environment
         self._server = subprocess.Popen(
@@ -230,8 +231,8 @@ def answer(asked: bytes, handles: list[int]) -> None:
             os.dup2(handle, number)
             os.close(handle)
         os.chdir(folder)
-        os.environ.clear()
-        os.environ.update(environment)
+        os.environb.clear()
+        os.environb.update(environment)
         sys.stdin, sys.stdout = open(0, encoding="utf-8"), open(1, "w", encoding="utf-8")  # noqa: SIM115
         sys.stderr = open(2, "w", buffering=1, encoding="utf-8", errors="backslashreplace")  # noqa: SIM115
         sys.executable = arguments[0]
