@@ -4,9 +4,8 @@ A test that only looks at what commands print, write and return gets its ``photo
 ``python`` from ``Forks.python``: scripts that hand their arguments, folder, environment and open files to a server,
 which forks. Loading takes half a second of the processor for each process, a copy takes a hundredth. The server has
 adjusted a project, too: that halves what the next one takes. What a copy starts with ``sys.executable`` is a copy, too.
-A script ends as its copy does, by the same code or signal, and a copy whose script is
-gone is killed. What tests of the start itself need (imports, encodings, threads, limits, signals that can be caught) is
-``sys.executable`` as it is.
+A script ends as its copy does, by the same code or signal, and a copy whose script is gone is killed. What tests of the
+start itself need (imports, encodings, threads, limits, signals that can be caught) is ``sys.executable`` as it is.
 """
 
 from __future__ import annotations

@@ -306,6 +306,7 @@ def test_wrong_usage_is_told_in_the_form_that_was_asked_for(capsys: pytest.Captu
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 def test_a_project_that_is_not_there_is_a_fault_among_others(here: Path) -> None:
     done = run(here, "strips/s1", "strips/s9/project.yaml", "--format", "csv", "--quiet")
     assert done.returncode == 2
