@@ -163,7 +163,6 @@ def require_same(theirs: dict[str, str]) -> None:
 
 
 def executor_fault(message: str, fix: str) -> InputError:
-    """Make an error about the cluster."""
     return InputError(Fault(message, "executor", "--executor", fix=fix))
 
 

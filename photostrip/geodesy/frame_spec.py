@@ -71,7 +71,6 @@ class Refusal(Exception):  # noqa: N818 (not an error of its own: it carries one
         self.message, self.code, self.key, self.expected, self.fix = message, code, key, expected, fix
 
     def at(self, path: str) -> Fault:
-        """Return the fault its place in the project file."""
         return Fault(self.message, code=self.code, key=f"{path}.{self.key}", expected=self.expected, fix=self.fix)
 
 

@@ -50,7 +50,6 @@ class PlaneTransform:
         return values[..., :2] / values[..., 2:]
 
     def residuals(self, source: ArrayLike, target: ArrayLike) -> Floats:
-        """Subtract the target from the transformed source."""
         return np.asarray(self(source) - np.asarray(target, float), float)
 
     def jacobian(self, points: ArrayLike) -> Floats:

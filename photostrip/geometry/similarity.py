@@ -41,7 +41,6 @@ class Similarity:
         return Similarity(1 / self.scale, back, -back @ self.shift / self.scale)
 
     def residuals(self, source: ArrayLike, target: ArrayLike) -> Floats:
-        """Subtract the target from the transformed source."""
         return np.asarray(self(source) - np.asarray(target, float), float)
 
     @classmethod

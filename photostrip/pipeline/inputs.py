@@ -124,7 +124,6 @@ class Inputs:
 
     @property
     def flights(self) -> tuple[Strip | ModelStrip, ...]:
-        """The strips, of photos or of models."""
         return self.strips if self.models is None else self.models.strips
 
 

@@ -260,7 +260,6 @@ class SinglePhoto:
 
     @property
     def scale_number(self) -> float:
-        """Denominator of the photo scale."""
         return self.depth / (self.strip.camera.principal_distance / 1000)
 
 

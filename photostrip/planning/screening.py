@@ -44,7 +44,6 @@ class PairLayout:
 
     @property
     def points(self) -> int:
-        """Points of a pair."""
         return sum(self.counts)
 
     @property
@@ -80,7 +79,6 @@ def standard_pairs(rng: np.random.Generator, models: int, layout: PairLayout) ->
 
 
 def spoiled(pairs: Pairs, errors: Floats) -> Pairs:
-    """Give pairs with errors added to the y parallaxes."""
     left = pairs.left.copy()
     left[:, 1] += errors
     return replace(pairs, left=left)
@@ -114,7 +112,6 @@ class ScreeningSpec:
     seed: int = 1
 
     def settings(self, method: str) -> RelativeSettings:
-        """Return the settings of a method."""
         limit = self.parallax_limit if method == "parallax+grubbs" else None
         return RelativeSettings(screening=method, grubbs_alpha=self.grubbs_alpha, parallax_limit=limit)
 

@@ -50,7 +50,6 @@ def _section(kind: type[Section], blocks: dict[str, Any]) -> dict[str, Any]:
 
 
 def _key(entry: Key, annotation: Any, blocks: dict[str, Any]) -> dict[str, Any]:  # noqa: ANN401 (a type)
-    """Describe a key."""
     found: dict[str, Any] = {"description": entry.description}
     value = _value(annotation, blocks)
     default = entry.default

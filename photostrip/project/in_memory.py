@@ -102,7 +102,6 @@ def _values(column: Any) -> np.ndarray[Any, Any]:  # noqa: ANN401 (columns of an
 
 
 def _cell(value: object) -> object:
-    """Return nothing for what is not there."""
     if value is None or (isinstance(value, float) and isnan(value)) or type(value).__name__ == "NAType":  # of pandas
         return None
     return value.decode("utf-8", "surrogateescape") if isinstance(value, bytes) else value

@@ -236,7 +236,6 @@ def load_specification(path: Path, overrides: Sequence[str] = ()) -> Specificati
 
 
 def _spec(given: SimulationFile) -> simulation.Spec:
-    """Turn the file into the plain specification."""
     return simulation.Spec(
         name=str(given.name),
         seed=given.seed,

@@ -109,7 +109,6 @@ def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:
 
 
 def _columns(node: Node) -> dict[str, str]:
-    """Names that a table has for its columns."""
     return {name: each.text for name, each in node.mapping_at("columns").items() if each.text}
 
 

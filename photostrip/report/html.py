@@ -61,7 +61,6 @@ def batch_html(outcomes: Sequence[Document], version: str) -> str:
 
 
 def sections_html(title: str, version: str, sections: Iterable[Section]) -> str:
-    """Return a report of another command as one page."""
     return _page(title, version, _sections([("", section) for section in sections], []))
 
 

@@ -58,7 +58,6 @@ def significant(values: ArrayLike, digits: int = SIGNIFICANT) -> Plain:
 
 
 def micrometres(millimetres: ArrayLike) -> Plain:
-    """Return millimetres of the image as rounded micrometres."""
     return rounded(np.asarray(millimetres, float) * MICROMETRES, IMAGE)
 
 

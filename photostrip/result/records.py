@@ -38,13 +38,11 @@ class Records(Sequence[dict[str, Any]]):
     __hash__ = None  # type: ignore[assignment]
 
     def taken(self, order: Numbers) -> Records:
-        """Return the records in another order."""
         places = order.tolist()
         return Records({key: [column[place] for place in places] for key, column in self.columns.items()})
 
     @classmethod
     def joined(cls, parts: Iterable[Records]) -> Records:
-        """Return records of the same keys one after the other."""
         columns: dict[str, list[Plain]] = {}
         for part in parts:
             for key, column in part.columns.items():
@@ -60,5 +58,4 @@ def as_lists(value: Plain) -> Plain:
 
 
 def as_records(columns: Mapping[str, Sequence[Plain]]) -> list[Document]:
-    """Make records of columns of equal length."""
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

@@ -81,7 +81,6 @@ def _ground_units(document: Document) -> dict[tuple[str, str], str]:
 
 
 def _in_frame(column: ResultColumn, units: dict[tuple[str, str], str]) -> ResultColumn:
-    """Give a coordinate the unit that the frame has."""
     unit = units.get((column.name, column.quantity.unit), column.quantity.unit)
     return column._replace(quantity=replace(column.quantity, unit=unit))
 
@@ -97,7 +96,6 @@ def _one_by_one(groups: Iterable[Document]) -> Iterator[Document]:
 
 
 def _columns(name: str, entry: Quantity | Table | None, values: Sequence[Any]) -> Iterator[ResultColumn]:
-    """Return the columns that a key of the records makes."""
     if isinstance(entry, Mapping) and all(value is None or isinstance(value, Mapping) for value in values):
         for key, part in entry.items():
             below = [None if value is None else value.get(key) for value in values]

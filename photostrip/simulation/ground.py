@@ -85,7 +85,6 @@ class Surface:
     phase: Floats  # (m,): phases, radians
 
     def __call__(self, along: Floats, across: Floats) -> Floats:
-        """Return the heights at places."""
         plane = self.height + self.slope[0] * along + self.slope[1] * across
         angle = np.multiply.outer(along, self.wave[:, 0]) + np.multiply.outer(across, self.wave[:, 1]) + self.phase
         return np.asarray(plane + np.sin(angle) @ self.amplitude)

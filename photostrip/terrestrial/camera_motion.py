@@ -72,12 +72,10 @@ class Turn:
 
     @property
     def weighted_sum(self) -> float:
-        """Weighted sum of squared residuals of the points used."""
         return float(np.nansum(self.weights * self.residuals**2))
 
     @property
     def dof(self) -> int:
-        """Degrees of freedom of the weighted sum."""
         return int((self.weights > 0).sum()) - ANGLES
 
     def predict(self, number: int) -> tuple[Floats, Floats] | None:

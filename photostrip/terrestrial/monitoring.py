@@ -124,7 +124,6 @@ class Monitoring:
 
     @property
     def limit(self) -> float:
-        """Critical value of the test of a displacement."""
         return limit(self.settings.significance, SPACE)
 
     def significant(self, step: Step) -> Flags:

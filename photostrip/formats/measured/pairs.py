@@ -65,7 +65,6 @@ def photos_of_pairs(table: Table, photos: AbstractSet[str], findings: Findings) 
 
 
 def _coordinates(table: Table) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
-    """Coordinates on the left and on the right photo."""
     if "xl" in table.numbers:
         xl, yl, xr, yr = (table.numbers[column.name] for column in TWO_POINTS)
         return (xl, yl), (xr, yr)

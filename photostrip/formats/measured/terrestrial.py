@@ -66,7 +66,6 @@ def read_points(file: str, layout: Sequence[Column], findings: Findings) -> Tabl
 
 
 def _refuse_repeated(table: Table, keys: Numbers, where: str, findings: Findings) -> None:
-    """Refuse a second row of one point."""
     names = table.cells("point")
     for row, before in repeated_rows(keys.tolist()):
         message = f"point {names[row]} stands in line {table.lines[before]} already{where}"

@@ -77,7 +77,6 @@ def _text(value: Plain, encode: Callable[[Plain], str]) -> str:
 
 
 def _lines(records: Records, encode: Callable[[Plain], str]) -> Iterator[str]:
-    """Write records from their columns."""
     line = f"{{{', '.join(f'{encode(key)}: %s' for key in records.columns)}}}"
     return (line % row for row in zip(*(_cells(each, encode) for each in records.columns.values()), strict=True))
 

@@ -63,7 +63,6 @@ def _directions(output: GroundFrame) -> str:
 
 
 def _photos(simulation: Simulation, output: GroundFrame) -> Iterator[Document]:
-    """List the true exterior orientations."""
     truth = simulation.truth
     xyz = _rounded(output.user_from_internal(truth.centers_ground), ground_decimals(output, TRUE_STEP))
     rotations = rounded(truth.rotations_local.reshape(-1, 9), ROTATION)
@@ -76,7 +75,6 @@ def _photos(simulation: Simulation, output: GroundFrame) -> Iterator[Document]:
 
 
 def _points(simulation: Simulation, output: GroundFrame) -> Iterator[Document]:
-    """List the true coordinates of all points."""
     truth, control = simulation.truth, simulation.control
     roles = {
         name: "check" if check else "control" for name, check in zip(control.ids, control.check.tolist(), strict=True)

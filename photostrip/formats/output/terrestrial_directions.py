@@ -90,7 +90,6 @@ def directions_document(
 
 
 def photo_document(camera: Phototheodolite, attitude: Attitude, ids: Sequence[str], directions: Floats) -> Document:
-    """Return where directions meet the photo."""
     reduced = photo_from_directions(directions, camera.principal_distance, attitude.rotation)
     return _points_and_directions("photo-coordinates", camera, attitude, ids, reduced, directions)
 

@@ -41,7 +41,6 @@ class Findings:
         return self._count[file] >= LARGEST_LIST
 
     def number(self, file: str) -> int:
-        """Return the number of faults of a file so far."""
         return self._count[file]
 
     def count(self, file: str, number: int) -> None:

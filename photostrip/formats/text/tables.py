@@ -65,7 +65,6 @@ class Table:
         return [ids[code] for code in self.codes[name]]
 
     def take(self, rows: Numbers) -> Table:
-        """Return the table of some rows, in their order."""
         numbers = {name: each[rows] for name, each in self.numbers.items()}
         codes = {name: each[rows] for name, each in self.codes.items()}
         return replace(self, lines=self.lines[rows], numbers=numbers, codes=codes)

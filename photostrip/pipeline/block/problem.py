@@ -94,7 +94,6 @@ def _named(entries: Sequence[str], observations: PhotoPoints) -> Flags:
 
 
 def _cameras(inputs: Inputs, settings: Settings) -> BundleCameras:
-    """Cameras of all photos, and what is calibrated of them."""
     cameras = {strip.camera.name: strip for strip in inputs.strips}
     of_photo = locate([strip.camera.name for strip in inputs.strips for _ in strip.photos], cameras)
     focal = np.array([strip.camera.principal_distance for strip in cameras.values()])

@@ -32,7 +32,6 @@ def adjust(screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:
 def adjust_formed(
     stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
 ) -> StripResult:
-    """Take a formed strip to the ground with its own control."""
     oriented = orient_on_control(stage, control, frames, settings.absolute)
     return adjust(reject_wrong_control(oriented, settings), settings)
 

@@ -156,7 +156,6 @@ class LinkedModels:
 
 
 def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> LinkedModels:
-    """Link the models of a strip, and keep what was measured."""
     return LinkedModels(strip, measured, form_models(strip, measured, settings))
 
 

@@ -104,7 +104,6 @@ def standard_zones(base: float, width: float) -> tuple[Place, ...]:
 
 
 def control_layout(name: str, base: float, width: float) -> tuple[ControlPoint, ...]:
-    """Return a named layout of control."""
     six = standard_zones(base, width)
     places = {"corners": six[2:], "corners+centre": (*six[2:], (base / 2, 0.0)), "six": six}[name]
     return tuple(ControlPoint(place, name=f"C{number}") for number, place in enumerate(places, 1))

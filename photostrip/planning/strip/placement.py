@@ -103,7 +103,6 @@ class _Search:
         return round(float(np.sqrt(np.mean(np.square(counts)))), DECIMALS)
 
     def is_spent(self) -> bool:
-        """Whether it has looked at enough."""
         return len(self.tried) >= MOST_TRIED
 
 

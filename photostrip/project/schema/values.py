@@ -79,7 +79,6 @@ def _one_of(allowed: tuple[str, ...]) -> str:
 
 
 def choice(allowed: tuple[str, ...]) -> Read:
-    """Type of a word from a list."""
     values = [int(each) if each.isdecimal() else each for each in allowed]
     return Read(lambda value: known_word(single(value, _one_of(allowed)), allowed), {"enum": values})
 
@@ -140,7 +139,6 @@ class Range(NamedTuple):
     unit: str
 
     def __str__(self) -> str:
-        """Say what is expected."""
         return f"{self.least:g} to {self.most:g} {self.unit}".rstrip()
 
     def holds(self, value: float) -> bool:

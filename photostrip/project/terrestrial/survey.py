@@ -133,7 +133,6 @@ def _camera(name: str, given: Camera, known: dict[str, Phototheodolite], reading
 
 
 def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite], reading: Reading) -> StereoPair:
-    """Return the two stations."""
     focal = (cameras[0].principal_distance, cameras[1].principal_distance)
     if given.axes is None:
         normal = normal_pair(focal[0], given.base or 0.0)

@@ -33,7 +33,6 @@ class Place:
     column: int = 0
 
     def fault(self, message: str, code: str, *, key: str = "", expected: str = "", fix: str = "") -> Fault:
-        """Make a fault that stands here."""
         return Fault(
             message=message,
             code=code,
@@ -46,7 +45,6 @@ class Place:
         )
 
     def note(self, code: str, message: str, severity: str = "note", *, key: str = "") -> Note:
-        """Make a note that stands here."""
         return Note(code, message, severity, file=self.file, line=self.line, column=self.column, key=key)
 
 
@@ -57,7 +55,6 @@ class Override(str):
 
 
 def place_of(assignment: str) -> Place:
-    """Return the place of what an assignment sets."""
     return Place(OVERRIDE if isinstance(assignment, Override) else COMMAND_LINE)
 
 

@@ -39,7 +39,6 @@ class Reading:
         return cls(file=file, root=root, findings=findings, files=files).with_set(assignments)
 
     def with_set(self, assignments: Sequence[str]) -> Reading:
-        """Apply ``path=value`` assignments."""
         return replace(self, root=override(self.root, assignments, self.findings))
 
     def checked(self, kind: type[S]) -> S | None:

@@ -46,7 +46,6 @@ STYLES = {"good": "good", "unverified": "look", "look": "look", "not run": "look
 
 
 def batch_sections(outcomes: Sequence[Document], *, quiet: bool = False, everything: bool = False) -> list[Section]:
-    """Return the summary of a batch from the line of each project."""
     sections = [] if quiet else [Section("Projects", (_table(outcomes, everything=everything),))]
     wrong = [each for each in _worst_first(outcomes) if each["exit_code"]]
     if wrong:

@@ -16,7 +16,6 @@ SHOWN = 20  # errors that were not found; --verbose prints all
 
 
 def truth_sections(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
-    """Return the sections of a comparison with the truth."""
     photos = {"role": "photos", **{key: document["photos"][key] for key in ("count", "plan", "height")}}
     columns = [
         words("true errors of", "role"),

@@ -24,7 +24,6 @@ TITLES = {
 
 
 def step_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Return title and sections of a step."""
     parts: list[Part] = []
     if document["values"]:
         parts.append(Facts(tuple((each["name"], _written(each)) for each in document["values"])))

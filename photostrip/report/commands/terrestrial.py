@@ -21,7 +21,6 @@ def direction_report(document: Document) -> tuple[str, tuple[Section, ...]]:
 
 
 def _camera_facts(document: Document) -> list[tuple[str, str]]:
-    """Describe the camera and how it looks."""
     camera = document["camera"]
     x0, z0 = camera["principal_point_mm"]
     interior = f"f {short(camera['principal_distance_mm'], 9)} mm"

@@ -15,7 +15,6 @@ def fixed(value: Number, decimals: int) -> str:
 
 
 def metres(value: Number) -> str:
-    """Give metres to the millimetre."""
     return fixed(value, 3)
 
 

@@ -127,7 +127,6 @@ class BatchTable:
             shown.start()
 
     def stop(self) -> None:
-        """Take the table away."""
         if self._live is not None:
             live, self._live = self._live, None
             live.stop()
@@ -138,7 +137,6 @@ class BatchTable:
             self._running[project] = time.monotonic()
 
     def finished(self, project: str, *, failed: bool, unchanged: bool) -> None:
-        """Say that a project is done."""
         with self._lock:
             self._running.pop(project, None)
             self.done += 1
@@ -168,7 +166,6 @@ class BatchTable:
         return ", ".join(parts)
 
     def page(self) -> Table:
-        """Return the table as it is now."""
         from rich.table import Table
 
         now = time.monotonic()

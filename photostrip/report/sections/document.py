@@ -90,7 +90,6 @@ def named_sections(document: Document, *, everything: bool) -> Iterator[tuple[Se
 
 
 def _of_the_strips(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:
-    """Give how the strips were formed and brought to the ground."""
     if of_models(document):
         yield SectionName.LINKS, links_section(document, everything=everything)
         yield SectionName.MODELS, models_section(document, everything=everything)
@@ -107,7 +106,6 @@ def _of_the_strips(document: Document, *, everything: bool) -> Iterator[tuple[Se
 
 
 def _of_the_accuracy(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:
-    """Give what the control weighed and how precise the results are."""
     if "bundle" not in document:
         yield SectionName.WEIGHTS, weights_section(document, everything=everything)
     if "precision" in document:

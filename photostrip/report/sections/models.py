@@ -11,7 +11,6 @@ from photostrip.report.sections.strip import DIRECTIONS, photos_of, worst_first
 
 
 def of_models(document: Document) -> bool:
-    """Whether a result is one of independent models."""
     return "links" in document
 
 

@@ -223,13 +223,11 @@ def not_determined_section(document: Document, *, everything: bool) -> Section:
 
 
 def missing_points(document: Document) -> list[tuple[str, list[str]]]:
-    """Return the points without coordinates by reason."""
     missing = sorted(document["not_determined"], key=itemgetter("reason"))
     return [(reason, [row["id"] for row in group]) for reason, group in groupby(missing, key=itemgetter("reason"))]
 
 
 def notes_section(document: Document, *, everything: bool) -> Section:
-    """Return the notes of the run, said again at the end."""
     notes = document["notes"]
     limit = len(notes) if everything else 2 * WORST_SHOWN
     parts: list[Part] = [

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 
 def project_section(document: Document) -> Section:
-    """Project: what was asked for, and what its numbers mean."""
     meaning = document["conventions"]
     scale, models = scale_word(document), of_models(document)
     rows = [
@@ -165,7 +164,6 @@ def _screening(settings: Document) -> str:
 
 
 def counts_section(document: Document) -> Section:
-    """How much there is of everything."""
     facts = Facts(tuple(counts_rows(document)))
     strips = document["strips"]
     return Section("Counts", (facts, tabulated(strips, _strips(angle_unit(document)))) if len(strips) > 1 else (facts,))

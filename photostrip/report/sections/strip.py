@@ -76,7 +76,6 @@ def relative_section(document: Document, *, everything: bool) -> Section:
 
 
 def photos_of(row: Document) -> str:
-    """Name the photos of a pair."""
     return f"{row['left']} – {row['right']}"
 
 

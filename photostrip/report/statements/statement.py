@@ -30,7 +30,6 @@ OF_FRAMES = {"proj": "PROJ", "epsg": "EPSG data set"}
 
 
 def statement_section(document: Document) -> Section:
-    """Return the section of the accuracy report."""
     block = document["statement"]
     if block["status"] == "refused":
         parts: list[Part] = [Words("No accuracy can be stated by a norm:")]

@@ -180,7 +180,6 @@ def _corrections(found: Bundle) -> Iterator[Document]:
 
 
 def image_fit(found: Bundle) -> Document:
-    """Return what the summary says of the image coordinates of a bundle adjustment."""
     solution, sigma = found.screened.solution, found.screened.problem.images.sigma
     return {
         "sigma0_um": solution.sigma0 * rms(sigma) * MICROMETRES,

@@ -43,13 +43,11 @@ class Selection:
         return b"".join(each.tobytes() for each in (self.control, self.positions, self.attitudes))
 
     def without(self, kind: str, row: int, axis: int) -> Selection:
-        """Take one ray or one coordinate out."""
         flags = getattr(self, FIELDS[kind]).copy()
         flags[row if kind == "image" else (row, axis)] = False
         return replace(self, **{FIELDS[kind]: flags})
 
     def holds(self, kind: str, row: int, axis: int) -> bool:
-        """Whether one ray or one coordinate takes part."""
         flags = getattr(self, FIELDS[kind])
         return bool(flags[row] if kind == "image" else flags[row, axis])
 

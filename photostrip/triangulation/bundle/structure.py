@@ -166,7 +166,6 @@ def _with_control(batch: Batch, control: ControlNormals) -> Batch:
 
 
 def control_normals(control: ControlObservations, points: int) -> ControlNormals:
-    """Sum the control of each point."""
     controlled, row = np.unique(control.point, return_inverse=True)
     where = np.full(points, -1)
     where[controlled] = np.arange(len(controlled))

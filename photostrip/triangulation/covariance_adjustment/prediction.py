@@ -43,7 +43,6 @@ class Predicted:
 
     @classmethod
     def empty(cls, rows: ErrorRows) -> Self:
-        """Room for the errors of rows."""
         n, size = rows.by_similarity.shape[:2]
         return cls(np.zeros((n, size)), np.zeros((n, size, size)))
 

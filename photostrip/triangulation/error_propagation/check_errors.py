@@ -39,7 +39,6 @@ class CheckErrors:
 
     @property
     def points(self) -> int:
-        """Number of points that are compared."""
         return len(np.unique(self.point))
 
     @property

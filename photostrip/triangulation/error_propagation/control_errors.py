@@ -36,7 +36,6 @@ class Misclosures:
     rows: ErrorRows  # error of the strip along the axis, d = 1
 
     def take(self, some: Numbers) -> Misclosures:
-        """Select coordinates."""
         return Misclosures(
             point=self.point[some],
             axis=self.axis[some],

@@ -91,7 +91,6 @@ class ErrorRows:
         )
 
     def take(self, rows: Numbers) -> Self:
-        """Select rows, in any order."""
         return self._selected(rows, *ranges(*self.entries(rows)))
 
     def part(self, start: int, stop: int) -> Self:

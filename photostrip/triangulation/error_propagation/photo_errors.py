@@ -36,7 +36,6 @@ class Sightings:
     focal: float  # principal distance, mm
 
     def take(self, rows: Numbers | Flags) -> Sightings:
-        """Select some."""
         return take_rows(self, rows, ("photo", "point", "image", "xyz"))
 
 

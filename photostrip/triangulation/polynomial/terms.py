@@ -89,7 +89,6 @@ def ladder(stations: int, points: int, degree: int) -> tuple[str, ...]:
 
 
 def dropped(terms: tuple[str, ...], drop: str) -> tuple[str, ...]:
-    """Return the terms without one of them."""
     return tuple(term for term in terms if term != drop)
 
 

@@ -81,7 +81,6 @@ class Orientation:
 
     @property
     def points_used(self) -> Numbers:
-        """Number of points that took part, by pair."""
         return self.pairs.sums(self.used.astype(float)).astype(np.intp)
 
     @cached_property

@@ -41,7 +41,6 @@ class Pairs:
 
     @property
     def size(self) -> int:
-        """Number of pairs."""
         return len(self.starts)
 
     def rows_of(self, numbers: Numbers) -> Numbers:

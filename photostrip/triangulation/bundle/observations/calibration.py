@@ -29,7 +29,6 @@ class Calibrated:
 
 
 def parameters(cameras: BundleCameras) -> Calibrated:
-    """List the parameters to be calibrated, by camera."""
     sigma = np.zeros((len(cameras.focal), len(CALIBRATION))) if cameras.sigma is None else cameras.sigma
     camera, kind = np.nonzero(sigma > 0.0)
     return Calibrated(camera, kind, sigma[camera, kind])

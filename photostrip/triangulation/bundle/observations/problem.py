@@ -156,12 +156,10 @@ class BundleProblem:
 
     @property
     def photos(self) -> int:
-        """Number of photos m."""
         return len(self.start.centers)
 
     @property
     def points(self) -> int:
-        """Number of points q."""
         return len(self.start.points)
 
     def photo_name(self, number: int) -> str:

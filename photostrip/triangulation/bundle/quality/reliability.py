@@ -128,12 +128,10 @@ class Sigma0Test:
 
     @property
     def passed(self) -> bool:
-        """Whether sigma0 lies between its limits."""
         return self.lower <= self.sigma0 <= self.upper
 
     @property
     def too_large(self) -> bool:
-        """Whether sigma0 lies above its limits."""
         return self.sigma0 > self.upper
 
 

@@ -57,7 +57,6 @@ class Parameter:
 
     @property
     def significant(self) -> bool:
-        """Whether the parameter differs from zero."""
         return self.p < SIGNIFICANCE
 
 
@@ -105,7 +104,6 @@ def image_shift(problem: BundleProblem, common: Floats, xy: Floats, photo: Numbe
 
 
 def parameters_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Parameter, ...]:
-    """Every calibration parameter with its precision and significance, by camera."""
     sigma = problem.cameras.sigma
     if sigma is None:
         return ()
