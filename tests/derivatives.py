@@ -87,7 +87,7 @@ def written_out(rows: ErrorRows, errors: StripErrors) -> Floats:
         for slot in range(3):
             model = images.photo[image] - 2 + slot
             if 0 <= model < models:
-                units[model, :, image] = images.components[image, slot]
+                units[model, :, image] = images.components[image, :, slot].T
     flat = units.reshape(models + 3, 6, -1)
     steps = np.einsum("kab,kbc->kac", errors.steps, flat[:models])
     frames = np.concatenate([np.zeros((1, 7, count * 2)), np.cumsum(steps, axis=0)])

@@ -17,11 +17,7 @@ from photostrip.triangulation.covariance_adjustment import system
 from photostrip.triangulation.covariance_adjustment.block_tridiagonal import InverseRow
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of
 from photostrip.triangulation.error_propagation import joint_covariances
-from photostrip.triangulation.error_propagation.covariances import (
-    along_strip,
-    images_with_components,
-    local_covariances,
-)
+from photostrip.triangulation.error_propagation.covariances import NearImages, along_strip, local_covariances
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 
 if TYPE_CHECKING:
@@ -114,7 +110,7 @@ def predict(found: system.System, tables: Sequence[ErrorRows]) -> tuple[list[Pre
         middle, after = before, middle
     visit(none, middle, after)
     for each, result, order in zip(columns, predicted, orders, strict=True):
-        formed = local_covariances(found.errors, each.rows, images_with_components(found.errors, each.rows))
+        formed = local_covariances(found.errors, each.rows, NearImages.of(found.errors, each.rows))
         back = np.argsort(order, kind="stable")
         result.covariance[:] = (formed - result.covariance)[back]
         result.error[:] = result.error[back]

@@ -51,8 +51,8 @@ def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Float
     for slot in range(SPAN):
         model = errors.images.photo - REACH + slot
         inside = np.flatnonzero((model >= 0) & (model < errors.models))
-        moved = errors.images.components[inside, slot] @ images[inside, :, None]
-        np.add.at(components, model[inside], moved[:, :, 0])
+        moved = images[inside, None] @ errors.images.components[inside, :, slot]
+        np.add.at(components, model[inside], moved[:, 0])
     result = np.zeros(rows.by_similarity.shape[:2])
     for slot in range(rows.by_component.shape[1]):
         result += (rows.by_component[:, slot] @ components[rows.first + slot, :, None])[:, :, 0]

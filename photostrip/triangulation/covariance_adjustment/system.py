@@ -16,7 +16,7 @@ import numpy as np
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
-from photostrip.triangulation.error_propagation.covariances import images_with_components
+from photostrip.triangulation.error_propagation.covariances import NearImages
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, ErrorRows, ranges
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class PaddedRows:
         by_component = np.zeros((len(models), places, slots, COMPONENTS))
         images = np.zeros((len(models), places, slots + 2 * REACH, COMPONENTS))
         at = rank[:, None] * size + np.arange(size)
-        with_components = images_with_components(errors, rows)
+        with_components = NearImages.of(errors, rows).with_components
         by_component[first[:, None], at, :have] = rows.by_component.transpose(0, 2, 1, 3)
         images[first[:, None], at, : have + 2 * REACH] = with_components.transpose(0, 2, 1, 3)
         whole = images + _with_components(errors.component_covariances, by_component, models)

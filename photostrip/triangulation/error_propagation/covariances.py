@@ -9,14 +9,15 @@ Source: derived; see docs/precision.md, eq. 4-6.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows, add_by_item
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
 LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
-ENTRIES = 2000  # coefficients of image points worked on at a time: what fits into the processor's cache
+ENTRIES = 9000  # coefficients of image points worked on at a time: what fits into the processor's cache
 
 
 def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
@@ -90,7 +91,7 @@ def of_parameters(
     factor: variance factor of the image coordinates; that of the control is 1.
     """
     sums = _sums(errors, found.rows, operator)
-    with_images = _by_photo(errors, sums.by_component, np.arange(len(errors.images.row)))
+    with_images = _by_photo(errors, sums.by_component)
     with_images[sums.image] += sums.by_image
     similarities = np.zeros((errors.models + 1, SIMILARITY_PARAMETERS, len(operator)))
     similarities[1:] = np.cumsum(errors.steps @ sums.with_components, axis=0)
@@ -107,7 +108,7 @@ def of_parameters(
 def by_images(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
     """Coefficients (k, 2) of all image coordinates in a weighted sum of rows with d = 1."""
     by_component = _summed_components(errors, rows, weights[:, None])
-    result = _by_photo(errors, by_component, np.arange(len(errors.images.row)))[:, :, 0]
+    result = _by_photo(errors, by_component)[:, :, 0]
     np.add.at(result, rows.image, rows.by_image[:, 0] * weights[rows.item][:, None])
     return result
 
@@ -136,7 +137,11 @@ def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> _Sums:
     for slot in range(SPAN):
         model = images.photo[image] - REACH + slot
         inside = (model >= 0) & (model < errors.models)
-        np.add.at(with_components, model[inside], images.components[image[inside], slot] @ by_image[inside])
+        np.add.at(
+            with_components,
+            model[inside],
+            images.components[image[inside], :, slot].transpose(0, 2, 1) @ by_image[inside],
+        )
     return _Sums(by_component=by_component, with_components=with_components, image=image, by_image=by_image)
 
 
@@ -155,17 +160,17 @@ def _summed_components(errors: StripErrors, rows: ErrorRows, weights: Floats) ->
     return result
 
 
-def _by_photo(errors: StripErrors, by_component: Floats, images: Numbers) -> Floats:
-    """Coefficients of image coordinates in sums of components, shape (n, 2, t)."""
+def _by_photo(errors: StripErrors, by_component: Floats) -> Floats:
+    """Coefficients of all image coordinates in sums of components, shape (k, 2, t)."""
+    images, count = errors.images, by_component.shape[2]
     none = np.zeros((REACH, *by_component.shape[1:]))
     padded = np.concatenate([none, by_component, none[:1]])
-    photo = errors.images.photo[images]
-    result = np.zeros((len(photo), 2, by_component.shape[2]))
-    for start in range(0, len(photo), ENTRIES):
-        some = slice(start, start + ENTRIES)
-        for slot in range(SPAN):
-            components = errors.images.components[images[some], slot]
-            result[some] += components.transpose(0, 2, 1) @ padded[photo[some] + slot]
+    around = np.concatenate([padded[slot : slot + errors.models + 1] for slot in range(SPAN)], axis=1)
+    result = np.empty((len(images.row), 2, count))
+    ends = np.searchsorted(images.photo, np.arange(errors.models + 2)).tolist()
+    for nearby, (start, stop) in zip(around, pairwise(ends), strict=True):
+        components = images.components[start:stop].reshape(-1, SPAN * COMPONENTS)
+        result[start:stop] = (components @ nearby).reshape(-1, 2, count)
     return result
 
 
@@ -189,8 +194,9 @@ def covariances(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances,
     result = np.empty((len(rows.first), size, size))
     for start, stop in _slices(rows):
         part, phi = rows.part(start, stop), influence[start:stop]
-        formed = _formed(errors, part, fit.along)
-        mixed = with_parameters(part, fit) @ phi.transpose(0, 2, 1)
+        near = NearImages.of(errors, part)
+        formed = _formed(errors, part, near, fit.along)
+        mixed = with_parameters(part, near, fit) @ phi.transpose(0, 2, 1)
         result[start:stop] = formed - mixed - mixed.transpose(0, 2, 1) + phi @ fit.parameters @ phi.transpose(0, 2, 1)
     return result
 
@@ -202,10 +208,9 @@ def _slices(rows: ErrorRows) -> list[tuple[int, int]]:
     return [(start, min(start + size, count)) for start in range(0, count, size)]
 
 
-def _formed(errors: StripErrors, rows: ErrorRows, along: SimilarityCovariances) -> Floats:
+def _formed(errors: StripErrors, rows: ErrorRows, near: NearImages, along: SimilarityCovariances) -> Floats:
     """S = F P F^T + m + m^T + local, m = F times the covariances of y(first) with components and image coordinates."""
-    with_components = images_with_components(errors, rows)
-    local = local_covariances(errors, rows, with_components)
+    local = local_covariances(errors, rows, near)
     first, ahead = rows.first, along.with_components[rows.first]
     shared = ahead[:, 0] @ rows.by_component[:, 0].transpose(0, 2, 1)
     if rows.by_component.shape[1] > 1:
@@ -213,58 +218,67 @@ def _formed(errors: StripErrors, rows: ErrorRows, along: SimilarityCovariances) 
     for back in range(1, SPAN):
         inside = np.flatnonzero(first >= back)
         steps = errors.steps[first[inside] - back]
-        shared[inside] += steps @ with_components[inside, REACH - back].transpose(0, 2, 1)
+        shared[inside] += steps @ near.with_components[inside, REACH - back].transpose(0, 2, 1)
     moved = rows.by_similarity @ shared
     of_similarity = rows.by_similarity @ along.similarities[first] @ rows.by_similarity.transpose(0, 2, 1)
     return np.asarray(of_similarity + moved + moved.transpose(0, 2, 1) + local, float)
 
 
-def images_with_components(errors: StripErrors, rows: ErrorRows) -> Floats:
-    """Covariances of the image coordinates that enter rows directly with components of models near by.
+class NearImages(NamedTuple):
+    """Image points of the photos ``first`` to ``first + s`` that enter rows directly, side by side.
 
-    Returns (n, s + 2 + 2, d, 6), with the components of the models ``first - 2`` to ``first + s + 1``.
+    Rows with fewer than m of them have any others, with coefficients of zero.
     """
-    n, slots, size, _ = rows.by_component.shape
-    result = np.zeros((n, slots + 2 * REACH, size, COMPONENTS))
-    if not len(rows.item):
-        return result
-    photo = errors.images.photo[rows.image]
-    order = np.lexsort((photo, rows.item))
-    item, photo = rows.item[order], photo[order]
-    new = np.flatnonzero(np.concatenate([[True], (item[1:] != item[:-1]) | (photo[1:] != photo[:-1])]))
-    components = errors.images.components[rows.image[order]].reshape(len(order), SPAN * COMPONENTS, 2)
-    products = rows.by_image[order] @ components.transpose(0, 2, 1)
-    summed = products if len(new) == len(order) else np.add.reduceat(products, new, axis=0)
-    by_photo = summed.reshape(len(new), size, SPAN, COMPONENTS)
-    row, place = item[new], photo[new] - rows.first[item[new]]
-    for slot in range(SPAN):
-        inside = (place + slot >= 0) & (place + slot < slots + 2 * REACH)
-        result[row[inside], place[inside] + slot] += by_photo[inside, :, slot]
-    return result
+
+    image: Numbers  # (n, m)
+    by_image: Floats  # (n, d, 2 m)
+    with_components: (
+        Floats  # (n, s + 4, d, 6): covariances with components of models ``first - 2`` to ``first + s + 1``
+    )
+
+    @classmethod
+    def of(cls, errors: StripErrors, rows: ErrorRows) -> Self:
+        n, slots, size, _ = rows.by_component.shape
+        photos = slots + 1
+        photo = errors.images.photo[rows.image] - rows.first[rows.item]
+        cell = rows.item * photos + photo
+        counts = np.bincount(cell, minlength=n * photos)
+        order = np.argsort(cell, kind="stable")
+        place = np.empty(len(cell), np.intp)
+        place[order] = np.arange(len(cell)) - (np.cumsum(counts) - counts)[cell[order]]
+        most = int(counts.max(initial=0))
+        image = np.zeros((n, photos, most), np.intp)
+        image[rows.item, photo, place] = rows.image
+        by_image = np.zeros((n, size, photos, most, 2))
+        by_image[rows.item, :, photo, place] = rows.by_image
+        components = errors.images.components[image].reshape(n, photos, 2 * most, SPAN * COMPONENTS)
+        products = by_image.reshape(n, size, photos, 2 * most).transpose(0, 2, 1, 3) @ components
+        with_components = np.zeros((n, photos + REACH + 1, size, COMPONENTS))
+        for slot in range(SPAN):
+            of_slot = products[..., slot * COMPONENTS : (slot + 1) * COMPONENTS]
+            with_components[:, slot : slot + photos] += of_slot
+        return cls(image.reshape(n, photos * most), by_image.reshape(n, size, 2 * photos * most), with_components)
 
 
-def local_covariances(errors: StripErrors, rows: ErrorRows, with_components: Floats) -> Floats:
+def local_covariances(errors: StripErrors, rows: ErrorRows, near: NearImages) -> Floats:
     """Covariances of the rows without the similarity of their first model, shape (n, d, d)."""
-    n, slots, size, _ = rows.by_component.shape
     by = rows.by_component
-    result = np.zeros((n, size, size))
-    for slot in range(slots):
-        mixed = with_components[:, slot + REACH] @ by[:, slot].transpose(0, 2, 1)
+    result: Floats = near.by_image @ near.by_image.transpose(0, 2, 1)
+    for slot in range(by.shape[1]):
+        mixed = near.with_components[:, slot + REACH] @ by[:, slot].transpose(0, 2, 1)
         model = np.minimum(rows.first + slot, errors.models - 1)
-        for apart in range(min(SPAN, slots - slot)):
+        for apart in range(min(SPAN, by.shape[1] - slot)):
             term = by[:, slot] @ errors.component_covariances[model, apart] @ by[:, slot + apart].transpose(0, 2, 1)
             mixed += term / 2 if apart == 0 else term
         result += mixed + mixed.transpose(0, 2, 1)
-    add_by_item(result, rows.item, rows.by_image @ rows.by_image.transpose(0, 2, 1))
     return result
 
 
-def with_parameters(rows: ErrorRows, fit: ParameterCovariances) -> Floats:
+def with_parameters(rows: ErrorRows, near: NearImages, fit: ParameterCovariances) -> Floats:
     """C: covariances of the rows with the fitted parameters, shape (n, d, t)."""
     result: Floats = rows.by_similarity @ fit.similarities[rows.first]
     for slot in range(rows.by_component.shape[1]):
         model = rows.first + slot
         inside = np.flatnonzero(model < len(fit.components))
         result[inside] += rows.by_component[inside, slot] @ fit.components[model[inside]]
-    add_by_item(result, rows.item, rows.by_image @ fit.images[rows.image])
-    return result
+    return result + near.by_image @ fit.images[near.image].reshape(len(result), near.by_image.shape[2], result.shape[2])

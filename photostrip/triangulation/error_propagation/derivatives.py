@@ -33,7 +33,7 @@ class ImagePoints:
     row: Numbers  # (n,): row in the table of image points
     photo: Numbers  # (n,): place of its photo in the strip, ascending
     sigma: Floats  # (n, 2): stated standard deviations of x and y, mm
-    # (n, 3, 6, 2): components of the models photo - 2, photo - 1 and photo by x and y, in their standard deviations
+    # (n, 2, 3, 6): by x and y in their standard deviations: components of the models photo - 2, photo - 1 and photo
     components: Floats
 
     def rows_of(self, rows: Numbers) -> Numbers:
@@ -147,10 +147,3 @@ def ranges(start: Numbers, stop: Numbers) -> tuple[Numbers, Numbers]:
     counts = stop - start
     number = np.repeat(np.arange(len(counts)), counts)
     return number, np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts) + start[number]
-
-
-def add_by_item(target: Floats, item: Numbers, values: Floats) -> None:
-    """Add values to the rows of ascending items."""
-    if len(item):
-        present, starts = np.unique(item, return_index=True)
-        target[present] += np.add.reduceat(values, starts, axis=0)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.error_propagation.covariances import images_with_components, with_parameters
+from photostrip.triangulation.error_propagation.covariances import NearImages, with_parameters
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, ErrorRows
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def joint_covariance(errors: StripErrors, rows: ErrorRows, along: SimilarityCova
     low = max(int(first[0]) - REACH, 0)  # no image coordinate of the rows lies before the third photo from here
     high = min(int(first[-1]) + slots + REACH, errors.models)
     half = similar @ (along.similarities[low] / 2) @ similar.T + _same_images(rows) / 2
-    direct = images_with_components(errors, rows)[:, :, 0]
+    direct = NearImages.of(errors, rows).with_components[:, :, 0]
     beyond = np.zeros((REACH, COMPONENTS, len(first)))  # components of the models after a part
     for stop in range(high, low, -MODELS):
         models = np.arange(max(stop - MODELS, low), stop)
@@ -63,7 +63,7 @@ def after_fit(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, i
 
     ``influence``: (n, t), what each fitted parameter subtracts.
     """
-    mixed = with_parameters(rows, fit)[:, 0] @ influence.T
+    mixed = with_parameters(rows, NearImages.of(errors, rows), fit)[:, 0] @ influence.T
     return joint_covariance(errors, rows, fit.along) - mixed - mixed.T + influence @ fit.parameters @ influence.T
 
 

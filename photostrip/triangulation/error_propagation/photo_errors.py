@@ -11,7 +11,7 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.points import take_rows
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, add_by_item, ranges
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, ranges
 from photostrip.triangulation.resection.collinearity import partials
 from photostrip.triangulation.resection.resection import runs
 
@@ -70,23 +70,42 @@ def _some_photos(
 ) -> PhotoErrors:
     """Differentiate the resections of the photos that have sightings."""
     photos, starts, item = np.unique(sightings.photo, return_index=True, return_inverse=True)
-    by = _resected(sightings, resection, starts, item, distance)
+    place = np.arange(len(item)) - starts[item]  # among the sightings of the photo
+    by = _resected(sightings, resection, item, place, distance)
     points, images = errors.points, errors.images
-    moved = by.point @ points.by_similarity[sightings.point]
     first = np.minimum.reduceat(points.first[sightings.point], starts)
     sighting, entry = ranges(*points.entries(sightings.point))
     image, by_image = points.image[entry], by.point[sighting] @ points.by_image[entry]
     once_more = np.flatnonzero(image == images.rows_of(sightings.image)[sighting])
     by_image[once_more] += by.image[sighting[once_more]] * images.sigma[image[once_more]][:, None, :]
+
+    count, most = len(photos), int(place.max()) + 1  # points of a photo side by side, those that are none with zeros
+    by_point = np.zeros((count, 6, most, 3))
+    by_point[item, :, place] = by.point
+    point = sightings.point[np.minimum(starts[:, None] + np.arange(most), len(item) - 1)]
+    flat = by_point.reshape(count, 6, 3 * most)
+    similar = points.by_similarity[point].reshape(count, 3 * most, -1)
+    shift = np.zeros((count, most), np.intp)
+    shift[item, place] = points.first[sightings.point] - first[item]
+    along = points.by_component[point]
+    slots = along.shape[2]
+    by_component = np.zeros((count, int(shift.max()) + slots, 6, COMPONENTS))
+    for ahead in range(int(shift.max()) + 1):
+        here, beyond = (
+            (by_point * chosen[:, None, :, None]).reshape(flat.shape) for chosen in (shift == ahead, shift > ahead)
+        )
+        for slot in range(slots):
+            by_component[:, ahead + slot] += here @ along[:, :, slot].reshape(count, 3 * most, COMPONENTS)
+        by_component[:, ahead] += beyond @ similar @ errors.steps[np.minimum(first + ahead, errors.models - 1)]
     rows = ErrorRows(
         first=first,
-        by_similarity=np.add.reduceat(moved, starts, axis=0),
-        by_component=_by_component(errors, sightings, first, item, by.point, moved),
+        by_similarity=flat @ similar,
+        by_component=by_component,
         item=item[sighting],
         image=image,
         by_image=by_image,
     )
-    return PhotoErrors(rows, np.add.reduceat(by.point @ point_influence[sightings.point], starts, axis=0), photos)
+    return PhotoErrors(rows, flat @ point_influence[point].reshape(count, 3 * most, -1), photos)
 
 
 class _Resected(NamedTuple):
@@ -96,38 +115,18 @@ class _Resected(NamedTuple):
     point: Floats  # (e, 6, 3)
 
 
-def _resected(sightings: Sightings, resection: Resection, starts: Numbers, item: Numbers, distance: float) -> _Resected:
+def _resected(sightings: Sightings, resection: Resection, item: Numbers, place: Numbers, distance: float) -> _Resected:
     """Orientation by image coordinates and by points: do = N^-1 A^T (dl + A_S dX), N = A^T A of one photo."""
     rotations = resection.rotations[sightings.photo]
-    count = len(sightings.photo)
     arm = sightings.xyz - resection.centers[sightings.photo]
-    by_x, by_y, _ = partials(arm, rotations, np.full(count, sightings.focal), np.ones(count))
+    by_x, by_y, _ = partials(arm, rotations, np.full(len(item), sightings.focal), np.ones(len(item)))
     design = np.stack([by_x.T, by_y.T], axis=1)
     unit = np.array([distance] * 3 + [1.0] * 3)  # so that shifts and rotations are of one size
-    scaled = design * unit
-    normal = np.add.reduceat(scaled.transpose(0, 2, 1) @ scaled, starts, axis=0)
-    turn = np.zeros((count, 6, 6))
-    turn[:, :3, :3] = turn[:, 3:, 3:] = rotations
-    by_image = turn @ (unit[:, None] * (np.linalg.inv(normal)[item] @ scaled.transpose(0, 2, 1)))
+    scaled = np.zeros((int(item[-1]) + 1, int(place.max()) + 1, 2, 6))
+    scaled[item, place] = design * unit
+    flat = scaled.reshape(len(scaled), -1, 6)
+    solved = np.linalg.inv(flat.transpose(0, 2, 1) @ flat) @ flat.transpose(0, 2, 1)
+    turned = (unit[:, None] * solved).reshape(len(scaled), 2, 3, -1)
+    turned = resection.rotations[np.unique(sightings.photo), None] @ turned
+    by_image = turned.reshape(len(scaled), 6, -1, 2)[item, :, place]
     return _Resected(by_image, by_image @ design[:, :, :3] @ rotations.transpose(0, 2, 1))
-
-
-def _by_component(
-    errors: StripErrors, sightings: Sightings, first: Numbers, item: Numbers, by_point: Floats, moved: Floats
-) -> Floats:
-    """Coefficients of components: what the points have, and the steps from the photo's first model to the points'."""
-    points, steps = errors.points, errors.steps
-    shift = points.first[sightings.point] - first[item]
-    slots = points.by_component.shape[1]
-    result = np.zeros((len(first), int(shift.max()) + slots, by_point.shape[1], COMPONENTS))
-    for ahead in range(int(shift.max()) + 1):
-        chosen = np.flatnonzero(shift == ahead)
-        for slot in range(slots):
-            values = by_point[chosen] @ points.by_component[sightings.point[chosen], slot]
-            add_by_item(result[:, ahead + slot], item[chosen], values)
-        beyond = np.flatnonzero(shift > ahead)
-        if len(beyond):
-            present, starts = np.unique(item[beyond], return_index=True)
-            sums = np.add.reduceat(moved[beyond], starts, axis=0)
-            result[present, ahead] += sums @ steps[first[present] + ahead]
-    return result

@@ -134,11 +134,12 @@ def _image_points(
     """
     row = np.unique(orientation.rows)
     row = row[np.argsort(position[row], kind="stable")]
-    components = np.zeros((len(row), SPAN, COMPONENTS, 2))
+    components = np.zeros((len(row), 2, SPAN, COMPONENTS))
     images = ImagePoints(row=row, photo=position[row], sigma=sigma[row], components=components)
     place = images.rows_of(orientation.rows)
-    components[place[:, 0], 2, ELEMENTS] = pairs.elements_by_image[:, :, :2]
-    components[place[:, 1], 1, ELEMENTS] = pairs.elements_by_image[:, :, 2:]
+    by_left, by_right = np.split(pairs.elements_by_image.transpose(0, 2, 1), 2, axis=1)
+    components[place[:, 0], :, 2, ELEMENTS] = by_left
+    components[place[:, 1], :, 1, ELEMENTS] = by_right
     joined, models = formed.junctions, orientation.pairs.size
     before, after = scale_shares(orientation, formed, pairs)
     scale_by_elements, scale_by_next = (np.zeros((models, 5)) for _ in range(2))  # elements of a model, of the next
@@ -147,9 +148,9 @@ def _image_points(
     np.add.at(scale_by_next, joined.junction, -np.einsum("ti,tij->tj", after, pairs.point_by_elements[joined.after]))
     by_before = np.einsum("ti,tij->tj", before, pairs.point_by_image[joined.before])
     by_after = np.einsum("ti,tij->tj", after, pairs.point_by_image[joined.after])
-    components[place[joined.before, 0], 2, SCALE] += by_before[:, :2]
-    components[place[joined.before, 1], 1, SCALE] += by_before[:, 2:] - by_after[:, :2]
-    components[place[joined.after, 1], 0, SCALE] -= by_after[:, 2:]
+    components[place[joined.before, 0], :, 2, SCALE] += by_before[:, :2]
+    components[place[joined.before, 1], :, 1, SCALE] += by_before[:, 2:] - by_after[:, :2]
+    components[place[joined.after, 1], :, 0, SCALE] -= by_after[:, 2:]
     photo = images.photo
     none = np.zeros((SPAN, 5))  # beyond the ends there is no model and no share
     mine, following = (np.concatenate([shares, none]) for shares in (scale_by_elements, scale_by_next))
@@ -159,8 +160,8 @@ def _image_points(
         (1, following, photo - 1, 2),
         (0, following, photo - 2, 1),
     ):
-        components[:, slot, SCALE] += np.einsum("ni,nij->nj", shares[model], components[:, elements, ELEMENTS])
-    components *= images.sigma[:, None, None, :]
+        components[:, :, slot, SCALE] += np.einsum("ni,nji->nj", shares[model], components[:, :, elements, ELEMENTS])
+    components *= images.sigma[:, :, None, None]
     return images
 
 
@@ -183,8 +184,7 @@ def _component_covariances(images: ImagePoints, models: int) -> Floats:
     for start, stop in runs(np.concatenate([[0], np.cumsum(counts)]), IMAGES):
         padded = np.zeros((stop - start, int(counts.max()), 2, SPAN * COMPONENTS))
         rows = slice(*np.searchsorted(images.photo, [start, stop]).tolist())
-        components = images.components[rows].transpose(0, 3, 1, 2)
-        padded[images.photo[rows] - start, rank[rows]] = components.reshape(len(components), 2, -1)
+        padded[images.photo[rows] - start, rank[rows]] = images.components[rows].reshape(-1, 2, SPAN * COMPONENTS)
         flat = padded.reshape(stop - start, -1, SPAN * COMPONENTS)
         gram[start:stop] = flat.transpose(0, 2, 1) @ flat
     gram = gram.reshape(photos, SPAN, COMPONENTS, SPAN, COMPONENTS)
