@@ -11,7 +11,8 @@ Source: [001] eq. 142-149; mixed control and its weights are derived.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from photostrip.notes import listed
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.points import ControlPoints
@@ -66,16 +67,33 @@ class Targets:
 
     def of(self, xyz: Floats) -> Floats:
         """Targets of the control points: their present positions, with all given coordinates put in."""
-        cartesian = self.intermediate.cartesian_from_intermediate(xyz)
-        result = np.empty_like(cartesian)
-        for number, frame in enumerate(self.frames):
-            rows = np.flatnonzero(self.control.frame == number)
-            if len(rows):
-                ids = [self.control.ids[row] for row in rows.tolist()]
-                ground = frame.ground_from_cartesian(cartesian[rows], ids=ids)
-                ground = np.where(self.control.use[rows], self.control.enu[rows], ground)
-                result[rows] = frame.cartesian_from_ground(ground, ids=ids)
+        result = self._of_full.copy()
+        partly = np.flatnonzero(~self.control.use.all(axis=1))
+        if len(partly):
+            result[partly] = self._put_in(partly, self.intermediate.cartesian_from_intermediate(xyz[partly]))
         return self.intermediate.intermediate_from_cartesian(result)
+
+    @cached_property
+    def _of_full(self) -> Floats:
+        """Cartesian targets (n, 3) of the points whose three coordinates count, wherever the strip stands."""
+        result = np.zeros((len(self.control), 3))
+        full = np.flatnonzero(self.control.use.all(axis=1))
+        result[full] = self._put_in(full, None)
+        return result
+
+    def _put_in(self, points: Numbers, cartesian: Floats | None) -> Floats:
+        """Put the given coordinates of points into their present positions, which full points need not have."""
+        result = np.empty((len(points), 3))
+        for number, frame in enumerate(self.frames):
+            inside = np.flatnonzero(self.control.frame[points] == number)
+            rows = points[inside]
+            if len(rows):
+                ids, ground = [self.control.ids[row] for row in rows.tolist()], self.control.enu[rows]
+                if cartesian is not None:
+                    present = frame.ground_from_cartesian(cartesian[inside], ids=ids)
+                    ground = np.where(self.control.use[rows], ground, present)
+                result[inside] = frame.cartesian_from_ground(ground, ids=ids)
+        return result
 
     def axes(self, xyz: Floats) -> Floats:
         """Directions (n, 3, 3) along which the control points at positions (n, 3) are compared with the strip.
@@ -142,13 +160,21 @@ def weights(control: ControlPoints, precision: tuple[float, float], kind: str = 
     return np.where(control.use, 1 / variance, 0.0)
 
 
-def orient(
+class Laid(NamedTuple):
+    """A strip on its control."""
+
+    similarity: Similarity  # strip to intermediate frame
+    design: Floats  # (k, 7): of the last step, for motions of unit size
+    iterations: int
+
+
+def lay(
     strip: Floats,
     targets: Targets,
     weight: Floats,
     reach: Floats | None = None,
     watch: Callable[[Similarity, Floats], None] | None = None,
-) -> AbsoluteOrientation:
+) -> Laid:
     """Similarity of the strip on its control.
 
     strip: (n, 3), strip coordinates of the control points.
@@ -196,17 +222,29 @@ def orient(
         message = "the strip fits the control only upside down: the control coordinates are left-handed"
         expected = "the axes in the order of the columns, [north, east, up] where X is north"
         raise InputError(Fault(message, code="left-handed-control", key="control.axes", expected=expected))
-    misclosures = targets.misclosures(similarity(strip))
-    values = np.linalg.svd(_scaled_design(plain, root), compute_uv=False)
+    return Laid(similarity, _scaled_design(plain, root), iteration)
+
+
+def orient(
+    strip: Floats,
+    targets: Targets,
+    weight: Floats,
+    reach: Floats | None = None,
+    watch: Callable[[Similarity, Floats], None] | None = None,
+) -> AbsoluteOrientation:
+    """Lay the strip on its control, and say how well it fits."""
+    laid = lay(strip, targets, weight, reach, watch)
+    misclosures = targets.misclosures(laid.similarity(strip))
+    values = np.linalg.svd(laid.design, compute_uv=False)
     redundancy = int(targets.control.use.sum()) - PARAMETERS
     squares = float((weight * misclosures**2).sum())
     return AbsoluteOrientation(
-        similarity=similarity,
+        similarity=laid.similarity,
         misclosures=misclosures,
         sigma0=float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan"),
         redundancy=redundancy,
         condition=float(values[0] / values[-1]),
-        iterations=iteration,
+        iterations=laid.iterations,
     )
 
 

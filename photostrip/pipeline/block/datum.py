@@ -140,7 +140,7 @@ def _by_control(xyz: Floats, every: Floats, control: ControlPoints, known: Known
     """Similarity of a block to its control, plan and height points included."""
     frame = middle_frame(control, known.frames)
     targets = absolute_orientation.Targets(control, known.frames, frame)
-    found = absolute_orientation.orient(xyz, targets, control.use.astype(float), every[np.isfinite(every[:, 0])])
+    found = absolute_orientation.lay(xyz, targets, control.use.astype(float), every[np.isfinite(every[:, 0])])
     inner = found.similarity
     return Similarity(inner.scale, frame.axes @ inner.rotation, frame.cartesian_from_intermediate(inner.shift))
 

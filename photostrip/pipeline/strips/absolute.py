@@ -240,7 +240,7 @@ def to_ground(
         raise GeometryError(msg, photos=strip.photos, code="no-control")
     try:
         provisional_frame = middle_frame(control, frames)
-        provisional = absolute_orientation.orient(
+        provisional = absolute_orientation.lay(
             formed.xyz[rows],
             absolute_orientation.Targets(control, frames, provisional_frame),
             control.use.astype(float),

@@ -112,7 +112,7 @@ def _oriented(strip: IdealStrip, numbers: Numbers, control: ControlPoints) -> _F
     intermediate = IntermediateFrame.at_local_centre(strip.xyz[numbers[control.use[:, 0]]], np.pi / 2)
     targets = absolute_orientation.Targets(control, frames, intermediate)
     weight = absolute_orientation.weights(control, _precision(strip))
-    absolute_orientation.orient(strip.formed.xyz[numbers], targets, weight, strip.formed.xyz)
+    absolute_orientation.lay(strip.formed.xyz[numbers], targets, weight, strip.formed.xyz)
     return _Fit(
         numbers=numbers,
         control=control,

@@ -108,5 +108,5 @@ def similarity_steps(result: Result, strip: StripResult) -> list[SimilarityStep]
         squares = float((weight * targets.misclosures(similarity(points)) ** 2).sum())
         steps.append(SimilarityStep(replace(similarity), squares, step.copy()))
 
-    absolute_orientation.orient(points, targets, weight, strip.formed.xyz, watch)
+    absolute_orientation.lay(points, targets, weight, strip.formed.xyz, watch)
     return steps

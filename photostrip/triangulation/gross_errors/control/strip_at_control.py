@@ -83,7 +83,7 @@ class StripAtControl:
     def laid_on(self, kept: Flags) -> StripAtControl:
         """Lay the strip on what is kept: a wrong point of 200 m turns it, and its rays, by a hundredth."""
         used = Targets(replace(self.control, use=kept), self.frames, self.intermediate)
-        laid = absolute_orientation.orient(self.xyz, used, np.where(kept, self.weight, 0.0))
+        laid = absolute_orientation.lay(self.xyz, used, np.where(kept, self.weight, 0.0))
         return replace(self, similarity=laid.similarity)
 
     def misclosures(self, control: ControlPoints | None = None) -> Floats:
