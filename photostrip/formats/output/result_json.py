@@ -33,7 +33,7 @@ def to_json(document: Document, *, ascii_only: bool = False) -> str:
     Each element of a list of records stands on a line of its own, so that results can be compared line by line.
     """
     encode = _encode_ascii if ascii_only else _encode
-    return visible_json("".join(_pieces(document, encode)))
+    return "".join(map(visible_json, _pieces(document, encode)))
 
 
 def _pieces(document: Document, encode: Callable[[Plain], str]) -> Iterator[str]:

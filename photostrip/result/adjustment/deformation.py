@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import dataclass
-from photostrip.planning.model.deformation import Paraboloid, determines_paraboloid, fit_paraboloid
+from photostrip.planning.model.deformation import LEAST_POINTS, Paraboloid, determines_paraboloid, fit_paraboloid
 from photostrip.result.quantities import record
 from photostrip.statistics import t_p_value
 from photostrip.triangulation.absolute_orientation import Targets
@@ -71,6 +71,8 @@ def model_deformations(strip: StripResult, frames: Sequence[GroundFrame]) -> tup
     usable = np.flatnonzero(oriented.used & np.isfinite(formed.model_xyz).all(axis=1) & np.isin(oriented.point, number))
     ends = np.searchsorted(oriented.pairs.pair[usable], np.arange(oriented.pairs.size + 1))
     for model, (start, stop) in enumerate(pairwise(ends.tolist())):
+        if stop - start < LEAST_POINTS:
+            continue
         rows = usable[start:stop]
         control = height[order[np.searchsorted(number[order], oriented.point[rows])]]
         deformed = _of_model(strip, frames, model, rows, control)
@@ -89,8 +91,6 @@ def _of_model(
     length = float(np.hypot(base[0], base[1]))
     along = np.array([base[0], base[1]]) / length
     xyz = similarity(strip.of_photos.formed.model_xyz[rows])
-    if not len(rows):
-        return None
     arm = xyz - ends[0]
     scale = float(-arm[:, 2].mean()) / (strip.of_photos.orientation.pairs.focal / MILLIMETRES)
     xy = np.column_stack([arm[:, :2] @ along, arm[:, :2] @ (-along[1], along[0])]) / scale * MILLIMETRES

@@ -27,6 +27,9 @@ def parallax_limits(of_photos: PhotoStages, settings: RelativeSettings) -> Float
     for name, bound in stages(settings, of_photos.sigma):
         _, most, unit = tested(oriented, name, bound)
         limit = np.minimum(limit, most * unit)
-    limit[~(oriented.used & np.isfinite(limit))] = np.nan
-    parts = np.split(limit, pairs.starts[1:])
-    return np.array([np.nanmedian(part) if np.isfinite(part).any() else np.nan for part in parts])
+    known = np.flatnonzero(oriented.used & np.isfinite(limit))
+    known = known[np.lexsort((limit[known], pairs.pair[known]))]
+    ends = np.searchsorted(pairs.pair[known], np.arange(pairs.size + 1))
+    twice = ends[:-1] + ends[1:]
+    lower, upper = np.append(limit[known], np.nan)[[(twice - 1) // 2, twice // 2]]
+    return np.where(ends[1:] > ends[:-1], (lower + upper) / 2, np.nan)

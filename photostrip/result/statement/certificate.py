@@ -14,7 +14,7 @@ import sys
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from photostrip import __version__
 from photostrip.geodesy.proj_operation import proj_versions
@@ -68,14 +68,14 @@ def _lines(document: Document) -> Iterator[str]:
     yield from _rows("photo", document["photos"], ("id",), dict(zip("xyz", places, strict=True)))
     for photo in document["photos"]:
         angles = photo["angles"]
-        yield f"angles {' '.join(_number(value, ANGLES[angles['unit']]) for value in angles['values'] or ())}"
+        yield f"angles {' '.join(_written(angles['values'] or (), ANGLES[angles['unit']]))}"
     yield from _rows("given", document["control"], ("id", "role", "use"), dict.fromkeys(("dx", "dy", "dz"), METRES))
     yield from _rows("rejected", document["rejected"], ("photo", "point", "stage"), {})
     yield f"verdict {document['status']}"
     yield from _figures(document.get("statement"))
 
 
-def _figures(value: object) -> Iterator[str]:
+def _figures(value: Any) -> Iterator[str]:  # noqa: ANN401 (any value)
     """Write a line for each figure of the statement, and for each reason that forbids it."""
     if isinstance(value, dict):
         for key in sorted(value.keys() - WORDS):
@@ -84,23 +84,26 @@ def _figures(value: object) -> Iterator[str]:
     elif isinstance(value, list):
         for each in value:
             yield from _figures(each)
+    elif isinstance(value, str):
+        yield value
     else:
-        yield value if isinstance(value, str) else _number(value, METRES)
+        yield from _written([value], METRES)
 
 
 def _rows(what: str, rows: Records | list[Document], texts: Sequence[str], numbers: Mapping[str, int]) -> Iterator[str]:
     """Write a line for each record, with these texts and these numbers."""
 
-    def column(key: str) -> Sequence[object]:
+    def column(key: str) -> Sequence[Any]:
         return rows.columns[key] if isinstance(rows, Records) else [row[key] for row in rows]
 
     cells = [[str(value) for value in column(key)] for key in texts]
-    cells += [[_number(value, places) for value in column(key)] for key, places in numbers.items()]
+    cells += [_written(column(key), places) for key, places in numbers.items()]
     yield from (f"{what} {' '.join(row)}" for row in zip(*cells, strict=True))
 
 
-def _number(value: object, decimals: int) -> str:
-    return f"{value:z.{decimals}f}" if isinstance(value, int | float) else "-"
+def _written(values: Sequence[float | None], decimals: int) -> list[str]:
+    form = f"z.{decimals}f"
+    return ["-" if value is None else format(value, form) for value in values]
 
 
 @cache

@@ -232,9 +232,7 @@ class NearImages(NamedTuple):
 
     image: Numbers  # (n, m)
     by_image: Floats  # (n, d, 2 m)
-    with_components: (
-        Floats  # (n, s + 4, d, 6): covariances with components of models ``first - 2`` to ``first + s + 1``
-    )
+    with_components: Floats  # (n, s + 4, d, 6): covariances with components of the models from ``first - 2`` on
 
     @classmethod
     def of(cls, errors: StripErrors, rows: ErrorRows) -> Self:
