@@ -31,7 +31,7 @@ XYZ = "xyz"
 OF = {"interior": "mark", "chain": "photo"}  # what a row stands for; else a point
 
 
-def interior_document(ids: Sequence[str], found: Interior) -> Document:
+def interior(ids: Sequence[str], found: Interior) -> Document:
     """Return an interior orientation: the coefficients of both axes, and the residuals of the marks."""
     names = ("x", "y", "x y", "1")
     rows = zip(("x", "y", "denominator"), found.transform.coefficients, strict=True)
@@ -40,13 +40,13 @@ def interior_document(ids: Sequence[str], found: Interior) -> Document:
     return _document("interior", values, ids, _image_residuals(found.residuals))
 
 
-def refine_document(ids: Sequence[str], measured: Floats, refined: Floats) -> Document:
+def refine(ids: Sequence[str], measured: Floats, refined: Floats) -> Document:
     """Return ideal image coordinates, and what was corrected; the principal point is part of it."""
     shift = (refined - measured) * MICROMETRES
     return _document("refine", [], ids, [*columns("x y", "mm", 4, refined), *columns("dx dy", "um", 1, shift)])
 
 
-def relative_document(ids: Sequence[str], found: Relative, base: float, unit: str) -> Document:
+def relative(ids: Sequence[str], found: Relative, base: float, unit: str) -> Document:
     """Return a relative orientation: relative to the base; base and right photo in the left one; the model."""
     elements = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
     degrees = zip(elements, np.degrees(found.elements), np.degrees(found.sigmas), strict=True)
@@ -58,12 +58,12 @@ def relative_document(ids: Sequence[str], found: Relative, base: float, unit: st
     return _document("relative", [*values, _value("iterations", found.iterations)], ids, listed)
 
 
-def intersection_document(ids: Sequence[str], found: Intersection, unit: str) -> Document:
+def intersection(ids: Sequence[str], found: Intersection, unit: str) -> Document:
     """Return intersected points, and the gap between the rays."""
     return _document("intersection", [], ids, [*columns("x y z", unit, 4, found.xyz), ("gap", unit, 4, found.gap)])
 
 
-def strip_document(photos: Sequence[str], points: Sequence[str], found: Strip, unit: str) -> Document:
+def strip(photos: Sequence[str], points: Sequence[str], found: Strip, unit: str) -> Document:
     """Return the photos of a strip, the scale factors of its models, and the points that have a place."""
     values = [
         _value(f"k {left}-{right}", factor)
@@ -75,9 +75,7 @@ def strip_document(photos: Sequence[str], points: Sequence[str], found: Strip, u
     return {**document, "photos": _photos(photos, found, unit)}
 
 
-def bundle_document(
-    photos: Sequence[str], points: Sequence[str], found: Bundle, ground: Floats | None, unit: str
-) -> Document:
+def bundle(photos: Sequence[str], points: Sequence[str], found: Bundle, ground: Floats | None, unit: str) -> Document:
     """Return adjusted photos, and points with their precision and what they differ from given coordinates."""
     values = [*_fit(found.sigma0, "", found.redundancy), _value("iterations", found.iterations)]
     placed = np.flatnonzero(np.isfinite(found.points[:, 0]))
@@ -89,7 +87,7 @@ def bundle_document(
     return {**document, "photos": _photos(photos, found, unit)}
 
 
-def absolute_document(ids: Sequence[str], found: Absolute, unit: str) -> Document:
+def absolute(ids: Sequence[str], found: Absolute, unit: str) -> Document:
     """Return an absolute orientation: seven parameters, and the residuals of the points."""
     similarity = found.similarity
     values = [_value("scale", similarity.scale)]
@@ -99,19 +97,19 @@ def absolute_document(ids: Sequence[str], found: Absolute, unit: str) -> Documen
     return _document("absolute", values, ids, columns("vx vy vz", unit, 4, found.residuals))
 
 
-def chain_document(ids: Sequence[str], rotations: Floats) -> Document:
+def chain(ids: Sequence[str], rotations: Floats) -> Document:
     """Return the angles of the photos in the strip."""
     return _document("chain", [], ids, _turns(rotations))
 
 
-def scale_document(ids: Sequence[str], factor: float, departures: Floats) -> Document:
+def scale(ids: Sequence[str], factor: float, departures: Floats) -> Document:
     """Return the factor of the second model, and what each point departs from it, in parts of a million."""
     rms = float(np.sqrt((departures**2).mean()))
     values = [_value("k", factor), _value("rms departure", rms * MILLION, "ppm")]
     return _document("scale", values, ids, [("departure", "ppm", 1, departures * MILLION)])
 
 
-def polynomial_document(
+def polynomial(
     ids: Sequence[str], terms: Sequence[str], coefficients: Floats, residuals: Floats, unit: str
 ) -> Document:
     """Return the coefficients of a polynomial, and what it leaves."""
@@ -121,7 +119,7 @@ def polynomial_document(
     return _document("polynomial", values, ids, [("v", unit, 4, residuals)])
 
 
-def resection_document(ids: Sequence[str], found: OrientedPhoto, unit: str) -> Document:
+def resection(ids: Sequence[str], found: OrientedPhoto, unit: str) -> Document:
     """Return the orientation of a photo with its precision, and the image residuals."""
     sigma = np.sqrt(np.diag(found.covariance))
     values = [_value(axis, found.center[k], unit, sigma[k]) for k, axis in enumerate(XYZ)]

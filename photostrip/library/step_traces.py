@@ -36,7 +36,7 @@ _COLLINEAR = "(u, v, w) = R' (X - X0); x' = -f u/w, y' = -f v/w; v = x - x'"
 _TURNED = "(u, v, w) = R (x, y, -f); xh = -f u/w, yh = -f v/w; eq. 137"
 
 
-def interior_trace(ids: Sequence[str], measured: Floats, calibrated: Floats, found: Interior) -> Trace:
+def interior(ids: Sequence[str], measured: Floats, calibrated: Floats, found: Interior) -> Trace:
     """Show the coordinates of the marks on their way from the comparator to the photo."""
     (x, y, below), photo = found.transform.coefficients.tolist(), found.transform(measured)
     equations = [f"x' = {_linear(x)}", f"y' = {_linear(y)}"]
@@ -48,7 +48,7 @@ def interior_trace(ids: Sequence[str], measured: Floats, calibrated: Floats, fou
     ]
 
 
-def refine_trace(ids: Sequence[str], measured: Floats, refined: Floats, camera: Camera) -> Trace:
+def refine(ids: Sequence[str], measured: Floats, refined: Floats, camera: Camera) -> Trace:
     """Show what the principal point, the lens and refraction each do."""
     central = measured - np.asarray(camera.principal_point)
     lens = undistort(measured, camera, Bending()) - central
@@ -59,9 +59,7 @@ def refine_trace(ids: Sequence[str], measured: Floats, refined: Floats, camera: 
     return [_table("Corrections, one after the other", ids, rows, "x' = x - x0 + lens + refraction")]
 
 
-def relative_trace(
-    ids: Sequence[str], left: Floats, right: Floats, focal: float, found: Relative, base: float
-) -> Trace:
+def relative(ids: Sequence[str], left: Floats, right: Floats, focal: float, found: Relative, base: float) -> Trace:
     """Show the iteration of the elements, and each point from the image to the model."""
     (rounds,) = first_rounds(one_pair(left, right, focal), found.elements[None])
     elements, added = (np.degrees([getattr(each, name) for each in rounds.steps]) for name in ("elements", "step"))
@@ -84,7 +82,7 @@ def relative_trace(
     ]
 
 
-def intersection_trace(
+def intersection(
     ids: Sequence[str], images: tuple[Floats, Floats], focal: float, base: Floats, rotations: tuple[Floats, Floats]
 ) -> Trace:
     """Show each point from the image to the model."""
@@ -97,7 +95,7 @@ def intersection_trace(
     return [_matrices("Rotations, by rows", ("left", "right"), np.stack(rotations)), found]
 
 
-def absolute_trace(ids: Sequence[str], model: Floats, ground: Floats, found: Absolute, unit: str) -> Trace:
+def absolute(ids: Sequence[str], model: Floats, ground: Floats, found: Absolute, unit: str) -> Trace:
     """Show the points reduced to their centroids, and turned."""
     similarity, centre, place = found.similarity, model.mean(axis=0), ground.mean(axis=0)
     reduced, wanted = model - centre, ground - place
@@ -113,9 +111,7 @@ def absolute_trace(ids: Sequence[str], model: Floats, ground: Floats, found: Abs
     ]
 
 
-def resection_trace(
-    ids: Sequence[str], xy: Floats, ground: Floats, focal: float, found: OrientedPhoto, unit: str
-) -> Trace:
+def resection(ids: Sequence[str], xy: Floats, ground: Floats, focal: float, found: OrientedPhoto, unit: str) -> Trace:
     """Show the start in closed form, the iteration, and each ray."""
     photo, seen, added, squares = np.zeros(len(xy), np.intp), [], [], []
 
@@ -138,7 +134,7 @@ def resection_trace(
     ]
 
 
-def chain_trace(ids: Sequence[str], given: Floats, handed: Floats) -> Trace:
+def chain(ids: Sequence[str], given: Floats, handed: Floats) -> Trace:
     """Show the matrices that are multiplied."""
     return [
         _matrices("Given: each photo in the photo before it, by rows", ids, given),
@@ -146,7 +142,7 @@ def chain_trace(ids: Sequence[str], given: Floats, handed: Floats) -> Trace:
     ]
 
 
-def strip_trace(photos: Sequence[str], found: Strip) -> Trace:
+def strip(photos: Sequence[str], found: Strip) -> Trace:
     """Show what each model adds to the strip."""
     pairs = [f"{left} - {right}" for left, right in pairwise(photos)]
     bases = np.diff(found.centers, axis=0)
@@ -158,9 +154,7 @@ def strip_trace(photos: Sequence[str], found: Strip) -> Trace:
     ]
 
 
-def bundle_trace(
-    photos: Sequence[str], points: Sequence[str], rays: Rays, focal: float, found: Bundle, unit: str
-) -> Trace:
+def bundle(photos: Sequence[str], points: Sequence[str], rays: Rays, focal: float, found: Bundle, unit: str) -> Trace:
     """Show the iteration, and each ray."""
     steps: list[Column] = [("[pvv]", "", -5, [each.chi_square for each in found.steps])]
     steps += [("length", "sigma", -3, [each.length for each in found.steps])]
@@ -179,7 +173,7 @@ def bundle_trace(
     ]
 
 
-def scale_trace(ids: Sequence[str], first: Floats, second: Floats, factor: float) -> Trace:
+def scale(ids: Sequence[str], first: Floats, second: Floats, factor: float) -> Trace:
     """Show the distances and the ratio of each point."""
     before, after = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
     rows: list[Column] = [("D", "", 6, before), ("D'", "", 6, after), ("k_t", "", 7, before / after)]
@@ -187,7 +181,7 @@ def scale_trace(ids: Sequence[str], first: Floats, second: Floats, factor: float
     return [_table("Points", ids, rows, words)]
 
 
-def polynomial_trace(
+def polynomial(
     ids: Sequence[str], xyz: Floats, misclosures: Floats, terms: Sequence[str], found: tuple[Floats, Floats]
 ) -> Trace:
     """Show the design, what the polynomial is at each point, and what is left."""

@@ -93,13 +93,12 @@ def interior(
 ) -> None:
     """Fit the transformation of measured fiducial marks to calibrated ones, mm."""
     with failures_as(delivery.form):
-        from photostrip.library import steps
-        from photostrip.library.step_documents import interior_document
-        from photostrip.library.step_traces import interior_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         ids, (measured, calibrated) = _read(file, "interior", delivery)
         found = steps.interior(measured, calibrated, transform)
-        delivery.deliver(interior_document(ids, found), lambda: interior_trace(ids, measured, calibrated, found))
+        document = step_documents.interior(ids, found)
+        delivery.deliver(document, lambda: step_traces.interior(ids, measured, calibrated, found))
 
 
 @_command("refine", "point, x, y", "points.csv -f 152.12 --principal-point 0.012,-0.004 --k 2.5e-8,0,0")
@@ -124,9 +123,7 @@ def refine(
     """Reduce photo coordinates, mm, to the principal point, and correct lens distortion and refraction."""
     with failures_as(delivery.form):
         from photostrip.camera import Camera, Distortion
-        from photostrip.library import steps
-        from photostrip.library.step_documents import refine_document
-        from photostrip.library.step_traces import refine_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         ids, (xy,) = _read(file, "refine", delivery)
         k1, k2, k3 = _numbers(k, 3, "--k")
@@ -134,7 +131,7 @@ def refine(
         lens = Distortion(model="brown", direction="image_to_ideal", k=(k1, k2, k3)) if any((k1, k2, k3)) else None
         camera = Camera(name="camera", principal_distance=focal, principal_point=(x0, y0), distortion=lens)
         refined = steps.refine(xy, camera, flying_height=flying_height, ground_height=ground_height)
-        delivery.deliver(refine_document(ids, xy, refined), lambda: refine_trace(ids, xy, refined, camera))
+        delivery.deliver(step_documents.refine(ids, xy, refined), lambda: step_traces.refine(ids, xy, refined, camera))
 
 
 @_command("relative", "point, x_left, y_left, x_right, y_right", "pair.csv -f 153 --base 920 --unit m")
@@ -150,14 +147,12 @@ def relative(
     The elements stand relative to the base, and as bx, by, bz and angles of the right photo in the system of the left.
     """
     with failures_as(delivery.form):
-        from photostrip.library import steps
-        from photostrip.library.step_documents import relative_document
-        from photostrip.library.step_traces import relative_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         ids, (left, right) = _read(file, "relative", delivery)
         found = steps.relative(left, right, model.focal, base=model.base)
-        document = relative_document(ids, found, model.base, unit)
-        delivery.deliver(document, lambda: relative_trace(ids, left, right, model.focal, found, model.base))
+        document = step_documents.relative(ids, found, model.base, unit)
+        delivery.deliver(document, lambda: step_traces.relative(ids, left, right, model.focal, found, model.base))
 
 
 @_command(
@@ -186,16 +181,14 @@ def intersection(
     with failures_as(delivery.form):
         import numpy as np
 
-        from photostrip.library import steps
-        from photostrip.library.step_documents import intersection_document
-        from photostrip.library.step_traces import intersection_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         ids, (one, other) = _read(file, "intersection", delivery)
         turned = _rotation(_numbers(left, 3, "--left")), _rotation(_numbers(right, 3, "--right"))
         b = np.array(_numbers(base, 3, "--base"))
         found = steps.intersection(one, other, focal, base=b, rotations=turned, left_ray=left_ray)
-        document = intersection_document(ids, found, unit)
-        delivery.deliver(document, lambda: intersection_trace(ids, (one, other), focal, b, turned))
+        document = step_documents.intersection(ids, found, unit)
+        delivery.deliver(document, lambda: step_traces.intersection(ids, (one, other), focal, b, turned))
 
 
 @_command("chain", "photo, omega, phi, kappa (degrees)", "strip.csv")
@@ -207,28 +200,24 @@ def chain(*, file: Table, delivery: Delivery) -> None:
     with failures_as(delivery.form):
         import numpy as np
 
-        from photostrip.library import steps
-        from photostrip.library.step_documents import chain_document
-        from photostrip.library.step_traces import chain_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         ids, (given,) = _read(file, "chain", delivery)
         rotations = np.array([_rotation(each) for each in given.tolist()])
         handed = steps.chain(rotations[1:], rotations[0])
-        delivery.deliver(chain_document(ids, handed), lambda: chain_trace(ids, rotations, handed))
+        delivery.deliver(step_documents.chain(ids, handed), lambda: step_traces.chain(ids, rotations, handed))
 
 
 @_command("scale", "point, x, y, z, x_next, y_next, z_next", "junction.csv")
 def scale(*, file: Table, delivery: Delivery) -> None:
     """Bring a model to the scale of the one before it by common points, each from the perspective centre of both."""
     with failures_as(delivery.form):
-        from photostrip.library import steps
-        from photostrip.library.step_documents import scale_document
-        from photostrip.library.step_traces import scale_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         ids, (first, second) = _read(file, "scale", delivery)
         factor, departures = steps.scale_transfer(first, second)
-        document = scale_document(ids, factor, departures)
-        delivery.deliver(document, lambda: scale_trace(ids, first, second, factor))
+        document = step_documents.scale(ids, factor, departures)
+        delivery.deliver(document, lambda: step_traces.scale(ids, first, second, factor))
 
 
 @_command("strip", "photo, point, x, y", "images.csv -f 153 --base 92 --unit mm")
@@ -247,28 +236,25 @@ def strip(
     Image coordinates in mm. The steps in between are `relative`, `chain`, `intersection` and `scale`.
     """
     with failures_as(delivery.form):
-        from photostrip.library import steps
-        from photostrip.library.step_documents import strip_document
-        from photostrip.library.step_traces import strip_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         photos, points, rays = _read_rays(file, delivery)
         names = photos, points
         found = steps.strip(rays, model.focal, base=model.base, scale_transfer=scale_transfer, names=names)
-        document = strip_document(photos, points, found, unit)
-        delivery.deliver(document, lambda: strip_trace(photos, found))
+        document = step_documents.strip(photos, points, found, unit)
+        delivery.deliver(document, lambda: step_traces.strip(photos, found))
 
 
 @_command("absolute", "point, x, y, z, x_ground, y_ground, z_ground", "control.csv")
 def absolute(*, file: Table, unit: Unit = "m", delivery: Delivery) -> None:
     """Fit a model to points that are known in Cartesian ground coordinates, by seven parameters."""
     with failures_as(delivery.form):
-        from photostrip.library import steps
-        from photostrip.library.step_documents import absolute_document
-        from photostrip.library.step_traces import absolute_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         ids, (model, ground) = _read(file, "absolute", delivery)
         found = steps.absolute(model, ground)
-        delivery.deliver(absolute_document(ids, found, unit), lambda: absolute_trace(ids, model, ground, found, unit))
+        document = step_documents.absolute(ids, found, unit)
+        delivery.deliver(document, lambda: step_traces.absolute(ids, model, ground, found, unit))
 
 
 @_command("polynomial", "point, x, y, z, misclosure", "control.csv --terms 1,X,Y,X^2")
@@ -281,29 +267,25 @@ def polynomial(
 ) -> None:
     """Fit the deformation of a strip along one axis: misclosures, strip minus given, at control points."""
     with failures_as(delivery.form):
-        from photostrip.library import steps
-        from photostrip.library.step_documents import polynomial_document
-        from photostrip.library.step_traces import polynomial_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         ids, (xyz, misclosures) = _read(file, "polynomial", delivery)
         wanted, values = [each.strip() for each in terms.split(",")], misclosures[:, 0]
         found = steps.polynomial(xyz, values, wanted)
-        document = polynomial_document(ids, wanted, *found, unit)
-        delivery.deliver(document, lambda: polynomial_trace(ids, xyz, values, wanted, found))
+        document = step_documents.polynomial(ids, wanted, *found, unit)
+        delivery.deliver(document, lambda: step_traces.polynomial(ids, xyz, values, wanted, found))
 
 
 @_command("resection", "point, x, y, x_ground, y_ground, z_ground", "photo.csv -f 152.12 --sigma-um 8")
 def resection(*, file: Table, focal: Focal, sigma_um: Sigma = 5.0, unit: Unit = "m", delivery: Delivery) -> None:
     """Orient one photo on known points, at any attitude, image coordinates in mm."""
     with failures_as(delivery.form):
-        from photostrip.library import steps
-        from photostrip.library.step_documents import resection_document
-        from photostrip.library.step_traces import resection_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         ids, (xy, ground) = _read(file, "resection", delivery)
         found = steps.resection(xy, ground, focal, sigma=sigma_um / 1000.0)
-        document = resection_document(ids, found, unit)
-        delivery.deliver(document, lambda: resection_trace(ids, xy, ground, focal, found, unit))
+        document = step_documents.resection(ids, found, unit)
+        delivery.deliver(document, lambda: step_traces.resection(ids, xy, ground, focal, found, unit))
 
 
 @_command("bundle", "photo, point, x, y", "images.csv -f 153 --control control.csv --sigma-um 5")
@@ -327,9 +309,7 @@ def bundle(
     Image coordinates in mm. Without control: a free network in model coordinates, as long as its first base says.
     """
     with failures_as(delivery.form):
-        from photostrip.library import steps
-        from photostrip.library.step_documents import bundle_document
-        from photostrip.library.step_traces import bundle_trace
+        from photostrip.library import step_documents, step_traces, steps
 
         photos, points, rays = _read_rays(file, delivery)
         ground = None if control is None else _given(control, points, delivery)
@@ -342,8 +322,8 @@ def bundle(
             ground_sigma=control_sigma,
             names=(photos, points),
         )
-        document = bundle_document(photos, points, found, ground, unit)
-        delivery.deliver(document, lambda: bundle_trace(photos, points, rays, model.focal, found, unit))
+        document = step_documents.bundle(photos, points, found, ground, unit)
+        delivery.deliver(document, lambda: step_traces.bundle(photos, points, rays, model.focal, found, unit))
 
 
 def _read(file: Path, name: str, delivery: Delivery) -> tuple[list[str], Any]:
