@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
@@ -124,23 +124,12 @@ def _scale_picture(document: Document, plan: Plan, found: dict[str, list[Pair]])
     strips = list(found)
     sizes = {strip: max(abs(size) for _, size in values) for strip, values in found.items()}
     shown = _worst(strips, sizes)
-    bands = {strip: _band(document, strip, found[strip]) for strip in shown}
     curves = {strip: _polynomial(document, plan, strip, found[strip]) for strip in shown}
-    high = span(
-        [size for strip in shown for values in (found[strip], curves[strip]) for _, size in values]
-        + [sign * size for band in bands.values() for _, size in band for sign in (1, -1)]
-    )
+    high = span(size for strip in shown for values in (found[strip], curves[strip]) for _, size in values)
     layout, drawn = _layout(len(shown)), []
     marked = sum(len(found[strip]) for strip in shown) <= MOST_MARKS
     for place, strip in enumerate(shown):
         panel = layout.panel(place, span((at for at, _ in found[strip]), zero=False, room=0.02), high)
-        band = bands[strip]
-        if band:
-            drawn.append(
-                svg.polygon(
-                    [panel.at(*each) for each in (*band, *((at, -size) for at, size in reversed(band)))], "band"
-                )
-            )
         drawn += framed(panel, ("km along the strip", "ppm"), f"strip {strip}" if len(strips) > 1 else "")
         drawn.append(steps(panel, found[strip], "curve curve-1 thin"))
         if marked:
@@ -151,8 +140,6 @@ def _scale_picture(document: Document, plan: Plan, found: dict[str, list[Pair]])
     if any(curves.values()):
         taken = document["adjustment"] == "polynomial"
         entries.append(Entry("polynomial" if taken else "polynomial, not taken", "curve curve-2"))
-    if any(bands.values()):
-        entries.append(Entry("expected, one standard deviation", "band", "square"))
     drawn += legend(entries)
     caption = (
         "How much longer each base became by the adjustment, against the mean of its strip: the drift of the scale."
@@ -161,24 +148,6 @@ def _scale_picture(document: Document, plan: Plan, found: dict[str, list[Pair]])
     worst = max(sizes, key=lambda strip: sizes[strip])
     words = f"{counted(len(strips), 'strip')}; the largest departure is {sizes[worst]:.0f} ppm in strip {worst}."
     return svg.picture("scale", (WIDTH, layout.whole), svg.Texts("Drift of the scale", caption, words), drawn)
-
-
-def _band(document: Document, strip: str, values: Sequence[Pair]) -> list[Pair]:
-    """Return the standard deviation of the scale that was handed on, against its mean, at each base, ppm."""
-    rows = [row for row in document["junctions"] if row["strip"] == strip]
-    if len(rows) + 1 != len(values) or any(not row["spread_ppm"] or not row["points_used"] for row in rows):
-        return []
-    squares = [row["spread_ppm"] ** 2 / row["points_used"] for row in rows]
-    count = len(values)
-    # a sum of independent steps less its mean: step k counts with its share of the bases before it, or after it
-    shares = [(k + 1) / count for k in range(len(squares))]
-    before = [0.0, *accumulate(s * share**2 for s, share in zip(squares, shares, strict=True))]
-    after = [
-        0.0,
-        *accumulate(s * (1 - share) ** 2 for s, share in zip(reversed(squares), reversed(shares), strict=True)),
-    ]
-    after.reverse()
-    return [(at, math.sqrt(before[n] + after[n])) for n, (at, _) in enumerate(values)]
 
 
 def _polynomial(document: Document, plan: Plan, strip: str, values: Sequence[Pair]) -> list[Pair]:

@@ -189,7 +189,7 @@ def correlation_pictures(document: Document) -> list[Picture]:
                 largest = max(largest, (abs(value), one.name, other))
             if numbered:
                 drawn.append(
-                    svg.text((middle[0], corner[1] + cell - 4.0), "1" if i == j else f"{value:+.2f}", "id", "middle")
+                    svg.text((middle[0], corner[1] + cell - 4.0), "1" if i == j else f"{value:+z.2f}", "id", "middle")
                 )
     drawn += legend([Entry("positive", "positive", "square"), Entry("negative", "negative", "square")])
     caption = (
