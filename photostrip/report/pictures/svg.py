@@ -133,6 +133,12 @@ def mark(place: Point, shape: str, kind: str, hint: str, size: float = 5.0) -> s
     return polygon([(x + dx * size, y + dy * size) for dx, dy in corners[shape]], kind, hint)
 
 
+def tested(place: Point, hint: str, inside: tuple[str, str], size: float, *, outside: bool) -> str:
+    """Return the mark of what was tested; inside: shape and kind of a mark within its limit."""
+    shape, kind = ("diamond", "left-out") if outside else inside
+    return mark(place, shape, kind, hint, size)
+
+
 def picture(name: str, size: Point, texts: Texts, content: Iterable[str]) -> Picture:
     head = element("title", escape(texts.title), id=f"picture-{name}-title") + element(
         "desc", escape(texts.description), id=f"picture-{name}-desc"

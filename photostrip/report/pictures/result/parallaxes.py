@@ -55,13 +55,8 @@ def parallax_pictures(document: Document) -> list[Picture]:
     entries = [Entry("point", "fill-4", "dot")] if len(everything) <= MOST_POINTS else []
     if any(not each.used for each in everything):
         entries.append(Entry("left out", "left-out", "diamond"))
-    drawn += legend(
-        [
-            *entries,
-            Entry("mean of the pair", "curve curve-1"),
-            Entry("mean and scatter of all pairs", "spread", "square"),
-        ]
-    )
+    entries.append(Entry("mean of the pair", "curve curve-1"))
+    drawn += legend([*entries, Entry("mean and scatter of all pairs", "spread", "square")])
     worst = max((each for each in everything if each.used), key=lambda each: abs(each.size), default=everything[0])
     beyond = sum(abs(each.size) > limit for each in everything if each.used or len(everything) <= MOST_POINTS)
     caption = (
@@ -75,14 +70,8 @@ def parallax_pictures(document: Document) -> list[Picture]:
         caption += " Upright lines part the strips."
     largest = f"{worst.size:.1f} µm at point {worst.point} of {worst.names}"
     words = f"{counted(pairs, 'pair')}; the largest parallax is {largest}."
-    return [
-        svg.picture(
-            "parallaxes",
-            (WIDTH, layout.whole),
-            svg.Texts("y parallaxes by standard zone", caption, words),
-            drawn,
-        )
-    ]
+    texts = svg.Texts("y parallaxes by standard zone", caption, words)
+    return [svg.picture("parallaxes", (WIDTH, layout.whole), texts, drawn)]
 
 
 def _limit(everything: Sequence[Parallax]) -> float:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape
 
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
@@ -21,13 +22,13 @@ from photostrip.report.pictures.chart import (
 from photostrip.report.pictures.ground.sheet import ids
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from photostrip.report.page.parts import Document
     from photostrip.report.pictures.svg import Picture
 
 LIMITS = {"plan": 2.448, "height": 1.960}  # 95 % of a length in plan by its covariance, and of a height
 CELL = 46.0  # of a correlation matrix
+INSIDE = "square", "mark check"
+OUTSIDE = Entry("outside", "left-out", "diamond")
 LARGE = 0.9  # a correlation that says that two parameters are hard to tell apart
 WIDEST = 150.0  # for the names of the parameters
 POSITIONS = ("d_east", "east"), ("d_north", "north"), ("d_up", "up")
@@ -53,47 +54,23 @@ def check_pictures(document: Document) -> list[Picture]:
             svg.line((panel.x.start, panel.y(side * limit)), (panel.x.end, panel.y(side * limit)), "limit")
             for side in sides
         ]
-        places = []
         for n, name, size in known:
-            outside = abs(size) > limit
             drawn.append(svg.line(panel.at(n, 0.0), panel.at(n, size), "stem check"))
-            drawn.append(
-                svg.mark(
-                    panel.at(n, size),
-                    "diamond" if outside else "square",
-                    "left-out" if outside else "mark check",
-                    f"check point {name}: {size:+.2f}",
-                    4.0,
-                )
-            )
-            places.append((abs(size) - limit, name, panel.at(n, size)))
-        places.sort(key=lambda each: -each[0])
-        drawn += ids([(name, at) for _, name, at in places], [at for *_, at in places], (WIDTH, layout.whole))
-    drawn += legend(
-        [
-            Entry("inside", "mark check", "square"),
-            Entry("outside", "left-out", "diamond"),
-            Entry("limit of 95 %", "limit"),
-        ]
-    )
-    outside = [
-        row["id"]
-        for row in rows
-        if any(row[part] is not None and abs(row[part]) > limit for part, limit in LIMITS.items())
-    ]
+            hint = f"check point {name}: {size:+.2f}"
+            drawn.append(svg.tested(panel.at(n, size), hint, INSIDE, 4.0, outside=abs(size) > limit))
+        worst = sorted(known, key=lambda each: -abs(each[2]))
+        places = [(name, panel.at(n, size)) for n, name, size in worst]
+        drawn += ids(places, [at for _, at in places], (WIDTH, layout.whole))
+    shape, kind = INSIDE
+    drawn += legend([Entry("inside", kind, shape), OUTSIDE, Entry("limit of 95 %", "limit")])
+    outside = sum(any(abs(row[part] or 0.0) > limit for part, limit in LIMITS.items()) for row in rows)
     caption = (
         "Differences at check points over their standard deviations: in plan the length in the metric of the "
         "covariance, in height with its sign. 95 % lie inside the band when these standard deviations are right."
     )
-    words = f"{counted(len(rows), 'check point')}, {len(outside)} outside the limits in plan or height."
-    return [
-        svg.picture(
-            "check",
-            (WIDTH, layout.whole),
-            svg.Texts("Check points against their precision", caption, words),
-            drawn,
-        )
-    ]
+    words = f"{counted(len(rows), 'check point')}, {outside} outside the limits in plan or height."
+    texts = svg.Texts("Check points against their precision", caption, words)
+    return [svg.picture("check", (WIDTH, layout.whole), texts, drawn)]
 
 
 def position_pictures(document: Document) -> list[Picture]:
@@ -116,16 +93,9 @@ def position_pictures(document: Document) -> list[Picture]:
                 continue
             if sigma is not None and single:
                 drawn.append(svg.line(panel.at(n, -SIGMAS * sigma), panel.at(n, SIGMAS * sigma), "given"))
+            hint = f"photo {row['photo']}, {name}: {size:+.3f} m"
             outside = sigma is not None and abs(size) > SIGMAS * sigma
-            drawn.append(
-                svg.mark(
-                    panel.at(n, size),
-                    "diamond" if outside else "dot",
-                    "left-out" if outside else "fill-1",
-                    f"photo {row['photo']}, {name}: {size:+.3f} m",
-                    5.0,
-                )
-            )
+            drawn.append(svg.tested(panel.at(n, size), hint, ("dot", "fill-1"), 5.0, outside=outside))
     drawn += legend(
         [Entry("difference", "fill-1", "dot"), Entry("beyond two standard deviations", "left-out", "diamond")]
         + ([Entry("two given standard deviations", "given")] if single else [])
@@ -136,61 +106,39 @@ def position_pictures(document: Document) -> list[Picture]:
     return [svg.picture("positions", (WIDTH, layout.whole), svg.Texts("Camera positions", caption, words), drawn)]
 
 
-class Parameter(NamedTuple):
-    name: str
-    with_others: Sequence[float | None]
-
-
 def correlation_pictures(document: Document) -> list[Picture]:
     """Draw how far the parameters of a self-calibration are told apart, camera by camera."""
     rows = document.get("bundle", {}).get("calibration") or []
     known = [row for row in rows if row.get("correlations")]
-    cameras = list(dict.fromkeys(row["camera"] for row in known))
     if len(known) <= 1:
         return []
-    parameters = [
-        Parameter(
-            row["parameter"] if len(cameras) == 1 else f"{row['camera']}: {row['parameter']}", row["correlations"]
-        )
-        for row in known
-    ]
-    count = len(parameters)
+    single = len({row["camera"] for row in known}) == 1
+    names = [("" if single else f"{row['camera']}: ") + row["parameter"] for row in known]
+    count = len(names)
     cell = min(CELL, (WIDTH - LEFT - WIDEST - 40.0) / count)
     left, top = LEFT + WIDEST, 44.0 + WIDEST * 0.72
+    numbered = cell >= CELL * 0.7
+    room = cell - 12.0 if numbered else cell
     drawn, largest = [], (0.0, "", "")
-    for i, one in enumerate(parameters):
-        y = top + i * cell
-        drawn.append(svg.text((left - 8.0, y + cell / 2 + 4.5), one.name, "", "end"))
-        x = left + (i + 0.5) * cell
-        drawn.append(
-            svg.element(
-                "text",
-                one.name,
-                kind="label",
-                x=x + 4.0,
-                y=top - 8.0,
-                transform=f"rotate(-40 {svg.number(x + 4.0)} {svg.number(top - 8.0)})",
-            )
-        )
-        for j, value in enumerate(one.with_others[:count]):
+    for i, (one, row) in enumerate(zip(names, known, strict=True)):
+        x, y = left + (i + 0.5) * cell + 4.0, top + i * cell
+        drawn.append(svg.text((left - 8.0, y + cell / 2 + 4.5), one, "", "end"))
+        turn = f"rotate(-40 {svg.number(x)} {svg.number(top - 8.0)})"
+        drawn.append(svg.element("text", escape(one), kind="label", x=x, y=top - 8.0, transform=turn))
+        for j, (other, value) in enumerate(zip(names, row["correlations"], strict=False)):
             corner = left + j * cell, y
             drawn.append(svg.rectangle(corner, (cell, cell), "cell"))
             if value is None:
                 continue
-            numbered = cell >= CELL * 0.7
-            room = cell - 12.0 if numbered else cell
-            middle = corner[0] + cell / 2, corner[1] + room / 2 + 1.0
-            other = parameters[j].name
+            middle = corner[0] + cell / 2
             if i != j:
+                place, size = (middle, y + room / 2 + 1.0), 0.48 * room * math.sqrt(abs(value))
                 kind = "positive" if value >= 0 else "negative"
-                drawn.append(
-                    svg.circle(middle, 0.48 * room * math.sqrt(abs(value)), kind, f"{one.name}, {other}: {value:+.3f}")
-                )
-                largest = max(largest, (abs(value), one.name, other))
+                drawn.append(svg.circle(place, size, kind, f"{one}, {other}: {value:+.3f}"))
+                largest = max(largest, (abs(value), one, other))
             if numbered:
-                drawn.append(
-                    svg.text((middle[0], corner[1] + cell - 4.0), "1" if i == j else f"{value:+z.2f}", "id", "middle")
-                )
+                words = "1" if i == j else f"{value:+z.2f}"
+                drawn.append(svg.text((middle, y + cell - 4.0), words, "id", "middle"))
     drawn += legend([Entry("positive", "positive", "square"), Entry("negative", "negative", "square")])
     caption = (
         "Correlations of the calibration parameters; the area of a circle is their size. Parameters with more than "
@@ -198,11 +146,5 @@ def correlation_pictures(document: Document) -> list[Picture]:
     )
     strongest = f"{largest[0]:.2f}, of {largest[1]} with {largest[2]}"
     words = f"{counted(count, 'parameter')}; the largest correlation is {strongest}."
-    return [
-        svg.picture(
-            "correlations",
-            (WIDTH, top + count * cell + 24.0),
-            svg.Texts("Correlations of the calibration", caption, words),
-            drawn,
-        )
-    ]
+    texts = svg.Texts("Correlations of the calibration", caption, words)
+    return [svg.picture("correlations", (WIDTH, top + count * cell + 24.0), texts, drawn)]
