@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from photostrip.report.pictures import svg
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 WIDTH = 960.0  # of a picture
 LEFT, RIGHT, TOP, BOTTOM = 70.0, 24.0, 64.0, 54.0  # margins of a chart
 GAP = 66.0  # between panels, for the numbers of an axis
+MOST_STRIPS = 16  # that have a panel each
 EMPTY = 1e-12  # a range without extent
 
 
@@ -83,6 +84,28 @@ class Layout(NamedTuple):
             svg.Axis(low=x[0], high=x[1], start=left, end=left + width),
             svg.Axis(low=y[0], high=y[1], start=top + self.height, end=top),
         )
+
+
+class Multiples(NamedTuple):
+    """A panel for each strip: for all of them, or for the worst, in their order."""
+
+    strips: list[str]
+    layout: Layout
+    some: str  # what the caption says of those that are not drawn
+
+    def titled(self, strip: str) -> str:
+        return f"strip {strip}" if self.some or len(self.strips) > 1 else ""
+
+
+def multiples(sizes: Mapping[str, float], what: str) -> Multiples:
+    """Choose the strips that are drawn; what: those with the largest sizes, in words."""
+    chosen = sorted(sizes, key=lambda strip: -sizes[strip])[:MOST_STRIPS]
+    number = len(chosen)
+    return Multiples(
+        strips=[strip for strip in sizes if strip in chosen],
+        layout=Layout(columns=1 if number == 1 else 2, height=210.0 if number == 1 else 140.0, number=number),
+        some="" if number == len(sizes) else f" {number} of {len(sizes)} strips, those with the {what}.",
+    )
 
 
 def framed(panel: Panel, labels: tuple[str, str], title: str = "") -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
+from photostrip.report.pictures.ground.plan_view import middle
 from photostrip.report.pictures.ground.sheet import LETTER, LINE, bars, ids, north_arrow, sheet_of
 from photostrip.report.pictures.ground.terrain import footprints, straightened
 
@@ -33,7 +34,7 @@ def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
     sheet = sheet_of(corners, MARGIN)
     drawn_outlines = {photo: [sheet.place(corner) for corner in outline] for photo, outline in outlines.items()}
     counts = _overlap(list(drawn_outlines.values()), WIDTH / CELLS)
-    middles = [(photo, _middle(outline)) for photo, outline in drawn_outlines.items() if _holds(outline, photo)]
+    middles = [(photo, middle(outline)) for photo, outline in drawn_outlines.items() if _holds(outline, photo)]
     kind = "outline" if middles else "outline narrow"
     drawn = [_area(runs, f"overlap-{count}", WIDTH / CELLS) for count, runs in sorted(counts.items())]
     drawn += [
@@ -53,10 +54,6 @@ def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
     return [
         svg.picture("footprints", (WIDTH, sheet.height), svg.Texts("Footprints and overlap", caption, words), drawn)
     ]
-
-
-def _middle(outline: Sequence[svg.Point]) -> svg.Point:
-    return sum(x for x, _ in outline) / len(outline), sum(y for _, y in outline) / len(outline)
 
 
 def _holds(outline: Sequence[svg.Point], name: str) -> bool:

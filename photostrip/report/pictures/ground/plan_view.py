@@ -6,10 +6,16 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from photostrip.report.page.parts import Document
 
 Pair = tuple[float, float]
 EARTH = 6_371_000.0  # m, for degrees of a body whose size is not said
+
+
+def middle(places: Sequence[Pair]) -> Pair:
+    return math.fsum(x for x, _ in places) / len(places), math.fsum(y for _, y in places) / len(places)
 
 
 class Spot(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
+from photostrip.report.pictures.ground.plan_view import middle
 from photostrip.report.pictures.ground.sheet import Sheet, bars, ids, north_arrow, sheet_of
 
 if TYPE_CHECKING:
@@ -62,10 +62,7 @@ def _strip_places(places: dict[str, Pair], strip_of: dict[str, str]) -> dict[str
     by_strip: dict[str, list[Pair]] = {}
     for photo, place in places.items():
         by_strip.setdefault(strip_of[photo], []).append(place)
-    return {
-        strip: (math.fsum(x for x, _ in own) / len(own), math.fsum(y for _, y in own) / len(own))
-        for strip, own in by_strip.items()
-    }
+    return {strip: middle(own) for strip, own in by_strip.items()}
 
 
 def _shared(rows: Iterable[tuple[str, list[str]]]) -> Counter[tuple[str, str]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from photostrip.notes import counted
 from photostrip.report.page.numbers import short
 from photostrip.report.pictures import svg
-from photostrip.report.pictures.chart import WIDTH, Entry, Layout, framed, legend, span, steps
+from photostrip.report.pictures.chart import WIDTH, Entry, Layout, framed, legend, multiples, span, steps
 from photostrip.report.pictures.ground.plan import SHAPES, WORDS
 from photostrip.report.pictures.ground.plan_view import course_of
 
@@ -60,8 +60,7 @@ def deformation_pictures(document: Document, plan: Plan) -> list[Picture]:
     if any(strip.before for strip in shown):
         entries.append(Entry("control before", "before", "dot"))
     if any(strip.curve for strip in shown):
-        taken = document["adjustment"] == "polynomial"
-        entries.append(Entry("polynomial" if taken else "polynomial, not taken", "curve curve-2"))
+        entries.append(polynomial_entry(document))
     drawn += legend(entries)
     caption = "Differences at given points along each strip, along it, across it and in height: adjusted minus given"
     if any(strip.before for strip in shown):
@@ -127,6 +126,11 @@ def polynomial_at(block: Document, axis: str, x: float) -> float:
     return total
 
 
+def polynomial_entry(document: Document) -> Entry:
+    taken = document["adjustment"] == "polynomial"
+    return Entry("polynomial" if taken else "polynomial, not taken", "curve curve-2")
+
+
 def origin_of(block: Document, places: Sequence[float]) -> float:
     """Return X of the first photo: the range of the control is known in X and on the plan."""
     return float(block["reach"][0]) - min(places)
@@ -189,15 +193,14 @@ def precision_pictures(document: Document) -> list[Picture]:
     rows = document.get("precision", {}).get("along") or []
     if not rows:
         return []
-    strips = list(dict.fromkeys(row["strip"] for row in rows))
-    shown = strips[: 2 * MOST_STRIPS]
-    layout = Layout(columns=1 if len(shown) == 1 else 2, height=210.0 if len(shown) == 1 else 150.0, number=len(shown))
-    high = span(row[key] for row in rows for key, *_ in CURVES if row[key] is not None)
-    drawn: list[str] = []
-    for place, strip in enumerate(shown):
+    sizes: dict[str, float] = {}
+    for row in rows:
+        sizes[row["strip"]] = max(sizes.get(row["strip"], 0.0), *(row[key] or 0.0 for key, *_ in CURVES))
+    shown, high, drawn = multiples(sizes, "largest of them"), span(sizes.values()), []
+    for place, strip in enumerate(shown.strips):
         own = [row for row in rows if row["strip"] == strip]
-        panel = layout.panel(place, span((row["distance"] / 1000 for row in own), zero=False, room=0.02), high)
-        drawn += framed(panel, ("km along the strip", "m"), f"strip {strip}" if len(strips) > 1 else "")
+        panel = shown.layout.panel(place, span((row["distance"] / 1000 for row in own), zero=False, room=0.02), high)
+        drawn += framed(panel, ("km along the strip", "m"), shown.titled(strip))
         for key, _, kind in CURVES:
             known = [(row["distance"] / 1000, row[key]) for row in own if row[key] is not None]
             if known:
@@ -205,12 +208,10 @@ def precision_pictures(document: Document) -> list[Picture]:
     drawn += legend(Entry(words, f"curve {kind}") for _, words, kind in CURVES)
     caption = (
         "Standard deviations along each strip, mean of the points near each photo: they are smallest where the control"
-        " stands."
+        f" stands.{shown.some}"
     )
-    if len(shown) < len(strips):
-        caption += f" The first {len(shown)} of {len(strips)} strips."
     points = document["precision"]["points"]
     worst = [f"{name} {short(points[name]['max'], 3)} m at {points[name]['worst']}" for name in ("plan", "height")
              if points[name]["max"] is not None]  # fmt: skip
     texts = svg.Texts("Precision along the strip", caption, "; ".join(worst) or "Not known.")
-    return [svg.picture("precision", (WIDTH, layout.whole), texts, drawn)]
+    return [svg.picture("precision", (WIDTH, shown.layout.whole), texts, drawn)]

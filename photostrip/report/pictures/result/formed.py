@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
-from photostrip.report.pictures.chart import WIDTH, Entry, Layout, framed, framed_by_photos, legend, span, steps
+from photostrip.report.pictures.chart import WIDTH, Entry, framed, framed_by_photos, legend, multiples, span, steps
 from photostrip.report.pictures.ground.plan_view import Grid, course_of
-from photostrip.report.pictures.result.along import MOST_STRIPS, origin_of, polynomial_at
+from photostrip.report.pictures.result.along import origin_of, polynomial_at, polynomial_entry
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from photostrip.report.page.parts import Document
     from photostrip.report.pictures.ground.plan_view import Pair, Plan, Spot
@@ -25,38 +25,21 @@ PPM = 1e6
 MOST_MARKS = 600  # on a picture; more are lines without them
 
 
-def _worst(strips: Sequence[str], badness: dict[str, float]) -> list[str]:
-    """Choose the strips that are drawn: all, or the worst of them, in their order."""
-    chosen = sorted(strips, key=lambda strip: -badness.get(strip, 0.0))[: 2 * MOST_STRIPS]
-    return [strip for strip in strips if strip in chosen]
-
-
-def _layout(number: int) -> Layout:
-    return Layout(columns=1 if number == 1 else 2, height=210.0 if number == 1 else 140.0, number=number)
-
-
-def _of(shown: Sequence[str], strips: Sequence[str], what: str) -> str:
-    return "" if len(shown) == len(strips) else f" {len(shown)} of {len(strips)} strips, {what}."
-
-
 def junction_pictures(document: Document) -> list[Picture]:
     """Draw what neighbouring models differ by at the points that they have in common."""
     rows = document["junctions"] or document.get("links", [])
     rows = [row for row in rows if row["discrepancy_um"]["along"] is not None]
     if not rows:
         return []
-    strips = list(dict.fromkeys(row["strip"] for row in rows))
-    largest = {
-        strip: max(max(row["discrepancy_um"].values()) for row in rows if row["strip"] == strip) for strip in strips
-    }
-    shown, high = _worst(strips, largest), span(largest.values())
-    marked = len(KINDS) * sum(row["strip"] in shown for row in rows) <= MOST_MARKS
-    layout, drawn = _layout(len(shown)), []
-    for place, strip in enumerate(shown):
+    sizes: dict[str, float] = {}
+    for row in rows:
+        sizes[row["strip"]] = max(sizes.get(row["strip"], 0.0), _gap(row))
+    shown, high, drawn = multiples(sizes, "largest gaps"), span(sizes.values()), []
+    marked = len(KINDS) * sum(row["strip"] in shown.strips for row in rows) <= MOST_MARKS
+    for place, strip in enumerate(shown.strips):
         own = [row for row in rows if row["strip"] == strip]
-        panel = layout.panel(place, (0.0, len(own) + 1.0), high)
-        title = f"strip {strip}" if len(strips) > 1 else ""
-        drawn += framed_by_photos(panel, [row["photo"] for row in own], ("photo", "µm"), title)
+        panel = shown.layout.panel(place, (0.0, len(own) + 1.0), high)
+        drawn += framed_by_photos(panel, [row["photo"] for row in own], ("photo", "µm"), shown.titled(strip))
         for name, kind in KINDS.items():
             values = [(n, row["discrepancy_um"][name]) for n, row in enumerate(own, 1)]
             drawn.append(steps(panel, values, f"curve curve-{kind} thin"))
@@ -67,15 +50,15 @@ def junction_pictures(document: Document) -> list[Picture]:
         Entry(name, f"fill-{kind}", SHAPES[name]) if marked else Entry(name, f"curve curve-{kind} thin")
         for name, kind in KINDS.items()
     )
-    worst = max(rows, key=lambda row: max(row["discrepancy_um"].values()))
     scale = "model" if document.get("links") else "photo"
-    caption = (
-        f"Rms differences of the common points of two models at {scale} scale, at the photo that joins them."
-        f"{_of(shown, strips, 'those with the largest gaps')}"
-    )
-    words = f"{counted(len(rows), 'junction')}; the largest gap is at photo {worst['photo']}."
-    texts = svg.Texts("Gaps between models", caption, words)
-    return [svg.picture("junctions", (WIDTH, layout.whole), texts, drawn)]
+    caption = f"Rms differences of the common points of two models at {scale} scale, at the photo that joins them."
+    words = f"{counted(len(rows), 'junction')}; the largest gap is at photo {max(rows, key=_gap)['photo']}."
+    texts = svg.Texts("Gaps between models", f"{caption}{shown.some}", words)
+    return [svg.picture("junctions", (WIDTH, shown.layout.whole), texts, drawn)]
+
+
+def _gap(row: Document) -> float:
+    return float(max(row["discrepancy_um"].values()))
 
 
 def scale_pictures(document: Document, plan: Plan) -> list[Picture]:
@@ -93,23 +76,17 @@ def scale_pictures(document: Document, plan: Plan) -> list[Picture]:
         for row in document["models"]
         if row["strip"] in scale
     }
-    found = {}
-    for strip, flown in zip(document["strips"], plan.strips, strict=False):
-        values = _base_ratios(flown, formed, up)
-        if len(values) > 1:
-            found[strip["id"]] = values
-    if not found:
-        return []
-    return [_scale_picture(document, plan, found)]
+    strips = zip(document["strips"], plan.strips, strict=False)
+    found = {strip["id"]: _base_ratios(flown, formed, up) for strip, flown in strips if len(flown) > 2}
+    found = {strip: values for strip, values in found.items() if len(values) > 1}
+    return [_scale_picture(document, plan, found)] if found else []
 
 
 def _base_ratios(
-    flown: Sequence[Spot], formed: dict[tuple[str, str], float | None], up: dict[str, float]
+    flown: list[Spot], formed: Mapping[tuple[str, str], float | None], up: Mapping[str, float]
 ) -> list[Pair]:
     """Return the places of bases, km, and adjusted over formed length, ppm from the mean of the strip."""
-    if len(flown) < 2:
-        return []
-    course, found = course_of(list(flown)), []
+    course, found = course_of(flown), []
     for left, right in pairwise(flown):
         before = formed.get((left.id, right.id))
         if before:
@@ -121,33 +98,30 @@ def _base_ratios(
 
 
 def _scale_picture(document: Document, plan: Plan, found: dict[str, list[Pair]]) -> Picture:
-    strips = list(found)
     sizes = {strip: max(abs(size) for _, size in values) for strip, values in found.items()}
-    shown = _worst(strips, sizes)
-    curves = {strip: _polynomial(document, plan, strip, found[strip]) for strip in shown}
-    high = span(size for strip in shown for values in (found[strip], curves[strip]) for _, size in values)
-    layout, drawn = _layout(len(shown)), []
-    marked = sum(len(found[strip]) for strip in shown) <= MOST_MARKS
-    for place, strip in enumerate(shown):
-        panel = layout.panel(place, span((at for at, _ in found[strip]), zero=False, room=0.02), high)
-        drawn += framed(panel, ("km along the strip", "ppm"), f"strip {strip}" if len(strips) > 1 else "")
+    shown = multiples(sizes, "largest drift")
+    curves = {strip: _polynomial(document, plan, strip, found[strip]) for strip in shown.strips}
+    high = span(size for strip in shown.strips for values in (found[strip], curves[strip]) for _, size in values)
+    drawn: list[str] = []
+    marked = sum(len(found[strip]) for strip in shown.strips) <= MOST_MARKS
+    for place, strip in enumerate(shown.strips):
+        panel = shown.layout.panel(place, span((at for at, _ in found[strip]), zero=False, room=0.02), high)
+        drawn += framed(panel, ("km along the strip", "ppm"), shown.titled(strip))
         drawn.append(steps(panel, found[strip], "curve curve-1 thin"))
         if marked:
             drawn += [svg.circle(panel.at(*each), 2.6, "fill-1", f"{each[1]:+.0f} ppm") for each in found[strip]]
         if curves[strip]:
             drawn.append(steps(panel, curves[strip], "curve curve-2"))
-    entries = [Entry("bases, adjusted against formed", "fill-1", "dot")]
-    if any(curves.values()):
-        taken = document["adjustment"] == "polynomial"
-        entries.append(Entry("polynomial" if taken else "polynomial, not taken", "curve curve-2"))
-    drawn += legend(entries)
+    bases = "bases, adjusted against formed"
+    entries = [Entry(bases, "fill-1", "dot") if marked else Entry(bases, "curve curve-1 thin")]
+    drawn += legend([*entries, *([polynomial_entry(document)] if any(curves.values()) else [])])
     caption = (
         "How much longer each base became by the adjustment, against the mean of its strip: the drift of the scale."
-        f"{_of(shown, strips, 'those with the largest drift')}"
     )
     worst = max(sizes, key=lambda strip: sizes[strip])
-    words = f"{counted(len(strips), 'strip')}; the largest departure is {sizes[worst]:.0f} ppm in strip {worst}."
-    return svg.picture("scale", (WIDTH, layout.whole), svg.Texts("Drift of the scale", caption, words), drawn)
+    words = f"{counted(len(sizes), 'strip')}; the largest departure is {sizes[worst]:.0f} ppm in strip {worst}."
+    texts = svg.Texts("Drift of the scale", f"{caption}{shown.some}", words)
+    return svg.picture("scale", (WIDTH, shown.layout.whole), texts, drawn)
 
 
 def _polynomial(document: Document, plan: Plan, strip: str, values: Sequence[Pair]) -> list[Pair]:

@@ -48,7 +48,7 @@ def histogram_picture(document: Document, used: Sequence[Residual]) -> Picture:
         samples = [Sample(name="image residuals", values=tested, unit="standard deviations", sigma=1.0, limits=[limit])]
     else:
         sizes = [value for each in used for value in each.size]
-        plain = Sample(name="image residuals", values=sizes, unit="µm", sigma=_rms(sizes), limits=[])
+        plain = Sample(name="image residuals", values=sizes, unit="µm", sigma=rms(sizes), limits=[])
         samples = [plain, *_parallaxes(document)]
     layout = Layout(columns=len(samples), height=240.0, number=len(samples))
     drawn: list[str] = []
@@ -70,8 +70,8 @@ def histogram_picture(document: Document, used: Sequence[Residual]) -> Picture:
     return svg.picture("histogram", (WIDTH, layout.whole), texts, drawn)
 
 
-def _rms(values: Sequence[float]) -> float:
-    return math.sqrt(math.fsum(value**2 for value in values) / len(values))
+def rms(values: Sequence[float]) -> float:
+    return math.sqrt(math.fsum(value**2 for value in values) / len(values)) if values else 0.0
 
 
 def _parallaxes(document: Document) -> list[Sample]:
@@ -85,7 +85,7 @@ def _parallaxes(document: Document) -> list[Sample]:
     ]
     if not limits or not values:
         return []
-    return [Sample(name="y parallaxes of the pairs", values=values, unit="µm", sigma=_rms(values), limits=limits)]
+    return [Sample(name="y parallaxes of the pairs", values=values, unit="µm", sigma=rms(values), limits=limits)]
 
 
 def _columns(sample: Sample) -> tuple[list[int], list[tuple[float, float]]]:

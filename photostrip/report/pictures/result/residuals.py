@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, WIDTH
 from photostrip.report.pictures.ground.image_plane import Frame, cameras_of, frame_of, residuals_of
-from photostrip.report.pictures.result.histogram import histogram_picture
+from photostrip.report.pictures.ground.plan_view import middle
+from photostrip.report.pictures.result.histogram import histogram_picture, rms
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from photostrip.report.page.parts import Document
     from photostrip.report.pictures.ground.image_plane import Residual
+    from photostrip.report.pictures.ground.plan_view import Pair
     from photostrip.report.pictures.svg import Picture
 
 COLUMNS, ROWS = 6, 4  # of photos on the picture
@@ -61,11 +63,15 @@ def _arrow(start: svg.Point, size: tuple[float, float], factor: float, most: flo
     return svg.line(start, (start[0] + size[0] * shown, start[1] - size[1] * shown), kind)
 
 
+def _bar(length: float, words: str) -> list[str]:
+    return [svg.line((LEFT, 22.0), (LEFT + length, 22.0), "bar"), svg.text((LEFT + length + 8.0, 26.5), words)]
+
+
 def _vectors(document: Document, found: Sequence[Residual]) -> list[Picture]:
     by_photo: dict[str, list[Residual]] = {}
     for each in found:
         by_photo.setdefault(each.photo, []).append(each)
-    sizes = {photo: _rms(each.size for each in rows if each.used) for photo, rows in by_photo.items()}
+    sizes = {photo: rms([v for each in rows if each.used for v in each.size]) for photo, rows in by_photo.items()}
     chosen = sorted(by_photo, key=lambda photo: -sizes[photo])[: COLUMNS * ROWS]
     shown = [photo for photo in by_photo if photo in chosen]
     frame = _frame(document, found, set(shown))
@@ -86,36 +92,24 @@ def _vectors(document: Document, found: Sequence[Residual]) -> list[Picture]:
             hint = f"point {each.point}: {each.size[0]:+.1f}, {each.size[1]:+.1f} µm"
             kind, shape = ("fill-1", "dot") if each.used else ("left-out", "diamond")
             drawn.append(svg.mark(place, shape, kind, hint, 3.0))
-    drawn += [
-        svg.line((LEFT, 22.0), (LEFT + bar * factor, 22.0), "bar"),
-        svg.text((LEFT + bar * factor + 8.0, 26.5), f"{bar:g} µm"),
-    ]
+    drawn += _bar(bar * factor, f"{bar:g} µm")
     if any(not each.used for photo in shown for each in by_photo[photo]):
         drawn += [
             svg.mark((LEFT + 180.0, 22.0), "diamond", "left-out", "", 4.0),
             svg.text((LEFT + 194.0, 26.5), "left out"),
         ]
     rows = math.ceil(len(shown) / COLUMNS)
-    some = (
-        ""
-        if len(shown) == len(by_photo)
-        else f" The {len(shown)} of {len(by_photo)} photos with the largest residuals, in flight order."
-    )
     caption = (
         "Image residuals at their points, measured minus computed, and their rms in each photo. Errors of one point "
-        f"stand alone; errors of a photo or camera point the same way side by side.{some}"
+        "stand alone; errors of a photo or camera point the same way side by side."
     )
+    if len(shown) < len(by_photo):
+        caption += f" The {len(shown)} of {len(by_photo)} photos with the largest residuals, in flight order."
     worst = max(sizes, key=lambda photo: sizes[photo])
     words = f"{counted(len(by_photo), 'photo')}; the largest rms is {sizes[worst]:.1f} µm in photo {worst}."
     height = 62.0 + rows * (tall + 30.0)
-    return [
-        svg.picture("image-residuals", (WIDTH, height), svg.Texts("Image residuals by photo", caption, words), drawn)
-    ]
-
-
-def _rms(sizes: Iterable[tuple[float, float]]) -> float:
-    squares = [value**2 for size in sizes for value in size]
-    return math.sqrt(math.fsum(squares) / len(squares)) if squares else 0.0
+    texts = svg.Texts("Image residuals by photo", caption, words)
+    return [svg.picture("image-residuals", (WIDTH, height), texts, drawn)]
 
 
 def _grids(document: Document, used: Sequence[Residual]) -> list[Picture]:
@@ -124,18 +118,16 @@ def _grids(document: Document, used: Sequence[Residual]) -> list[Picture]:
     for each in used:
         by_camera.setdefault(cameras[each.photo]["id"], []).append(each)
     shown = list(by_camera)[:CAMERAS]
-    cells = {
-        name: _cells(_frame(document, by_camera[name], {each.photo for each in by_camera[name]}), by_camera[name])
-        for name in shown
-    }
-    lengths = [math.hypot(*mean) for _, grid in cells.values() for _, mean, _ in grid]
+    frames = {name: _frame(document, by_camera[name], {each.photo for each in by_camera[name]}) for name in shown}
+    cells = {name: _cells(frames[name], by_camera[name]) for name in shown}
+    lengths = [math.hypot(*each.mean) for grid in cells.values() for each in grid]
     if not lengths:
         return []
     factor, bar = _unit(lengths, PLANE / CELLS * 0.8)
     drawn: list[str] = []
     top = 0.0
     for number, name in enumerate(shown):
-        frame, grid = cells[name]
+        frame = frames[name]
         scale = PLANE / max(frame.high[0] - frame.low[0], frame.high[1] - frame.low[1])
         wide, high = (frame.high[0] - frame.low[0]) * scale, (frame.high[1] - frame.low[1]) * scale
         row, column = divmod(number, 2)
@@ -148,15 +140,12 @@ def _grids(document: Document, used: Sequence[Residual]) -> list[Picture]:
             svg.line((x + wide / 2, y), (x + wide / 2, y + high), "grid"),
             svg.line((x, y + high / 2), (x + wide, y + high / 2), "grid"),
         ]
-        for (u, v), mean, count in grid:
-            place = x + (u - frame.low[0]) * scale, y + (frame.high[1] - v) * scale
-            drawn.append(_arrow(place, mean, factor, PLANE / CELLS, "residual strong"))
-            hint = f"{count} residuals, mean {mean[0]:+.2f}, {mean[1]:+.2f} µm"
-            drawn.append(svg.circle(place, 1.5 + 0.6 * math.sqrt(min(count, 60)) / 2, "fill-1", hint))
-    drawn += [
-        svg.line((LEFT, 22.0), (LEFT + bar * factor, 22.0), "bar"),
-        svg.text((LEFT + bar * factor + 8.0, 26.5), f"mean {bar:g} µm"),
-    ]
+        for cell in cells[name]:
+            place = x + (cell.place[0] - frame.low[0]) * scale, y + (frame.high[1] - cell.place[1]) * scale
+            drawn.append(_arrow(place, cell.mean, factor, PLANE / CELLS, "residual strong"))
+            hint = f"{cell.residuals} residuals, mean {cell.mean[0]:+.2f}, {cell.mean[1]:+.2f} µm"
+            drawn.append(svg.circle(place, 1.5 + 0.6 * math.sqrt(min(cell.residuals, 60)) / 2, "fill-1", hint))
+    drawn += _bar(bar * factor, f"mean {bar:g} µm")
     caption = (
         "Mean image residual in each part of the image plane, over all photos of a camera. Vectors that follow a "
         "pattern tell of a lens, a film or a plate that the calibration does not describe; those of good photos are "
@@ -167,22 +156,21 @@ def _grids(document: Document, used: Sequence[Residual]) -> list[Picture]:
     return [svg.picture("image-plane", (WIDTH, top + 20.0), texts, drawn)]
 
 
-def _cells(
-    frame: Frame, used: Sequence[Residual]
-) -> tuple[Frame, list[tuple[tuple[float, float], tuple[float, float], int]]]:
-    """Return the mean place and residual in each cell of the image plane that has enough of them, and their number."""
+class Cell(NamedTuple):
+    place: Pair  # mean of its residuals' places
+    mean: Pair
+    residuals: int
+
+
+def _cells(frame: Frame, used: Sequence[Residual]) -> list[Cell]:
+    """Return the cells of the image plane that have enough residuals."""
     size = max(frame.high[0] - frame.low[0], frame.high[1] - frame.low[1]) / CELLS
     found: dict[tuple[int, int], list[Residual]] = {}
     for each in used:
-        place = math.floor((each.place[0] - frame.low[0]) / size), math.floor((each.place[1] - frame.low[1]) / size)
-        found.setdefault(place, []).append(each)
-
-    def mean(values: Iterable[tuple[float, float]], count: int) -> tuple[float, float]:
-        one, other = zip(*values, strict=True)
-        return math.fsum(one) / count, math.fsum(other) / count
-
-    return frame, [
-        (mean((each.place for each in rows), len(rows)), mean((each.size for each in rows), len(rows)), len(rows))
+        cell = math.floor((each.place[0] - frame.low[0]) / size), math.floor((each.place[1] - frame.low[1]) / size)
+        found.setdefault(cell, []).append(each)
+    return [
+        Cell(middle([each.place for each in rows]), middle([each.size for each in rows]), len(rows))
         for _, rows in sorted(found.items())
         if len(rows) >= LEAST_IN_CELL
     ]
