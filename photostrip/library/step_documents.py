@@ -9,6 +9,7 @@ import numpy as np
 
 from photostrip.geometry.rotation import angles
 from photostrip.library.step_arguments import sigma0_of
+from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
@@ -48,12 +49,11 @@ def refine(ids: Sequence[str], measured: Floats, refined: Floats) -> Document:
 
 def relative(ids: Sequence[str], found: Relative, base: float, unit: str) -> Document:
     """Return a relative orientation: relative to the base; base and right photo in the left one; the model."""
-    elements = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
-    degrees = zip(elements, np.degrees(found.elements), np.degrees(found.sigmas), strict=True)
+    degrees = zip(ELEMENTS, np.degrees(found.elements), np.degrees(found.sigmas), strict=True)
     values = [_value(name, value, "deg", sigma) for name, value, sigma in degrees]
     values += [_value(name, base * each, unit) for name, each in zip(("bx", "by", "bz"), found.base, strict=True)]
     values += _angles(found.rotation)
-    values += _fit(found.sigma0 * MICROMETRES, "um", len(ids) - len(elements))
+    values += _fit(found.sigma0 * MICROMETRES, "um", len(ids) - len(ELEMENTS))
     listed = [("q", "um", 2, found.parallax * MICROMETRES), *columns("x y z", unit, 4, found.model)]
     return _document("relative", [*values, _value("iterations", found.iterations)], ids, listed)
 
