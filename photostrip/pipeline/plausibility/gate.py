@@ -84,6 +84,9 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     tried = {} if slips.fits_measurements(result) else stretched
     of_control = _of_control(control, images, strips, doubtful, tried)
     findings = [*images.findings, *(of_control if control is None else slips.confirmed(of_control, predicted, control))]
+    if control is not None and not any(each.is_error for each in findings):
+        named = {name for each in findings for name in each.points}
+        findings += [each for each in slips.of_rejected(result, predicted, control) if named.isdisjoint(each.points)]
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each in formed:
         findings += _of_formed(each, points)

@@ -128,6 +128,20 @@ def _tested(result: Result) -> Flags:
     return tested
 
 
+def of_rejected(result: Result, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
+    """Give the slips of control points of which a run called one coordinate wrong, and not an image.
+
+    Where few heights are given, their bending hides from the gate what the strip's own precision shows.
+    """
+    ids = control.points.ids
+    for note in result.notes:
+        for name in note.points if note.code == "control-rejected" and note.strip else ():
+            row = ids.index(name)
+            odd = [axis for axis in range(3) if predicted.stands_out(row, axis)]
+            if len(odd) == 1 and (slip := _slip(row, odd[0], note.strip, predicted, control)) is not None:
+                yield slip
+
+
 def of_models(result: Result, models: MeasuredModels, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
     """Give the slips of given points that stand out against the adjustment of models, in one coordinate.
 

@@ -305,9 +305,9 @@ def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2100250, 2100416, 2100594])
+@pytest.mark.parametrize("seed", [2100250, 2100416, 2100594, 2200192])
 def test_a_slip_that_the_run_could_not_test_is_named(seed: int) -> None:
-    """Kilometres off, the point bent the strip or stood beside it, was called tested, and was not named."""
+    """Kilometres off, the point was called tested; 20 m off in height, the gate took the scatter from few heights."""
     case = plausibility.sound(seed)
     planted = plausibility.slip_of_a_digit(case, check=False)
     assert planted is not None
