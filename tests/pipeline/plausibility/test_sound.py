@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from benchmarks import false_alarms
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.pipeline.plausibility import gate
@@ -48,6 +49,20 @@ def test_the_bend_of_a_long_strip_is_no_stretch_of_its_heights(photos: int, came
     )
     made = simulate(spec)
     assert told(inputs_of(made), settings_of(made)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("layout", "seed"),
+    [
+        ("end lap of 75-85 %", 31040),  # tilts hide a base of 35 mm: no photo twice
+        ("oblique mounts", 31004),  # photos side by side fit no control, the strip does
+        ("two lists in two zones", 32009),  # a single point of a list, half the flying height off between photos
+    ],
+)
+def test_photos_laid_side_by_side_prove_little(layout: str, seed: int) -> None:
+    made = false_alarms.LAYOUTS[layout](seed)
+    assert [each.code for each in gate.of_inputs(made.inputs, made.settings)] == []
 
 
 def test_the_bend_of_a_long_strip_of_models_is_no_slip() -> None:

@@ -55,6 +55,8 @@ def find_foreign_lists(
     wrong, findings = [], []
     for number in (int(each) for each in numbers if each != first):
         rows = in_fit & (given.group == number)
+        if rows.sum() < 2 and not np.isfinite(level.z[rows]).any():
+            continue  # photos that are only laid side by side misplace single points by half the flying height
         off = base.plan.residual[rows]
         limit = np.maximum(base.plan.limit[rows], LEAST_OFFSET * np.abs(reference.turn) * level.depth)
         if (np.abs(off) > limit).mean() <= MOST_ODD_SHARE:
