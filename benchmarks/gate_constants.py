@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Inputs, Settings
 
 # what things are, not where a limit lies: numbers of unknowns, axes, units, guards against a division by nothing
-FACTS = {"CIRCLE_DEG", "DEGREES", "EARTH_RADIUS", "FOOT", "GONS", "HEIGHT", "MILLION", "PLAN_UNKNOWNS", "TINY"}
+FACTS = {"CIRCLE_DEG", "DEGREES", "EARTH_RADIUS", "FOOT", "GONS", "HEIGHT", "INCH", "MILLION", "PLAN_UNKNOWNS", "TINY"}
 IN_THE_RUN = "shared_by_control"  # tests that a run makes itself: with them it is adjusted again
 SOUND = "sound: "
 
