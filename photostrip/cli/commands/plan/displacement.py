@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import SIGMA_UM, PlanFile, PlanOptions, Sets
 from photostrip.cli.failures import failures_as
@@ -16,21 +14,15 @@ from photostrip.frozen import dataclass
 class SurveyOptions(PlanOptions):
     """Options that describe the survey."""
 
-    camera: Annotated[
-        str | None, typer.Option("--camera", metavar="NAME", help="Phototheodolite of the list."), Sets("camera")
-    ] = None
+    camera: Annotated[str | None, Sets("--camera", "NAME", "Phototheodolite of the list.", "camera")] = None
     stations: Annotated[
-        str | None,
-        typer.Option("--stations", metavar="N", help="2, or 1 with known distances of the points."),
-        Sets("stations"),
+        str | None, Sets("--stations", "N", "2, or 1 with known distances of the points.", "stations")
     ] = None
-    base: Annotated[str | None, typer.Option("--base", metavar="M", help="Length of the base."), Sets("base")] = None
+    base: Annotated[str | None, Sets("--base", "M", "Length of the base.", "base")] = None
     distances: Annotated[
-        str | None,
-        typer.Option("--distances", metavar="M,M", help="Distances of the object from the base."),
-        Sets("distances", several=True),
+        str | None, Sets("--distances", "M,M", "Distances of the object from the base.", "distances", several=True)
     ] = None
-    sigma_um: Annotated[str | None, SIGMA_UM, Sets("sigma_um")] = None
+    sigma_um: Annotated[str | None, Sets(*SIGMA_UM, "sigma_um")] = None
 
 
 def displacement(*, file: PlanFile = None, survey: SurveyOptions, delivery: Delivery) -> None:

@@ -23,12 +23,10 @@ FINE = 41  # points along and across of a picture
 class ControlOptions(PlanOptions):
     """Options that say what orients the model, and what is wrong with it."""
 
-    control: Annotated[
-        str | None,
-        typer.Option("--control", metavar="LAYOUT", help="corners, corners+centre or six."),
-        Sets("control.layout"),
-    ] = None
-    control_sigma: Annotated[str | None, CONTROL_SIGMA, Sets("control.sigma", several=True)] = None
+    control: Annotated[str | None, Sets("--control", "LAYOUT", "corners, corners+centre or six.", "control.layout")] = (
+        None
+    )
+    control_sigma: Annotated[str | None, Sets(*CONTROL_SIGMA, "control.sigma", several=True)] = None
     elements: Annotated[
         str | None,
         typer.Option(

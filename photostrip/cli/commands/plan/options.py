@@ -4,30 +4,30 @@ from __future__ import annotations
 
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, NamedTuple, get_args, get_type_hints
+from typing import Annotated, get_args, get_type_hints
 
 import typer
+from typer.models import OptionInfo
 
 from photostrip.frozen import dataclass
 
 Options = dict[str, tuple[str, str | None]]  # by the key that it sets: name of an option, and its value
 
 
-class Sets(NamedTuple):
-    """The key of a plan that an option sets."""
+class Sets(OptionInfo):
+    """An option that sets a key of a plan; of several values there are commas between them."""
 
-    key: str
-    several: bool = False  # values with commas between them
+    def __init__(self, option: str, metavar: str, text: str, key: str, *, several: bool = False) -> None:
+        super().__init__(default=option, metavar=metavar, help=text)  # where typer looks for the name of an annotation
+        self.option, self.key, self.several = option, key, several
 
 
 PlanFile = Annotated[
     Path | None,
     typer.Argument(metavar="[FILE]", help="Plan (YAML); without one the options say all.", show_default=False),
 ]
-CONTROL_SIGMA = typer.Option(
-    "--control-sigma", metavar="X,Y,Z", help="Standard deviations of given coordinates, metres."
-)
-SIGMA_UM = typer.Option("--sigma-um", metavar="UM", help="Standard deviation of an image coordinate.")
+CONTROL_SIGMA = ("--control-sigma", "X,Y,Z", "Standard deviations of given coordinates, metres.")
+SIGMA_UM = ("--sigma-um", "UM", "Standard deviation of an image coordinate.")
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,9 @@ class PlanOptions:
         found: Options = {}
         hints = get_type_hints(type(self), include_extras=True)
         for each in fields(self):
-            _, option, *sets = get_args(hints[each.name])
-            value = getattr(self, each.name)
-            name = option.default  # where typer keeps the first argument until it reads the annotation
-            for key, several in sets:
-                found[key] = (name, f"[{value}]" if several and value is not None else value)
+            option, value = get_args(hints[each.name])[1], getattr(self, each.name)
+            if isinstance(option, Sets):
+                found[option.key] = (option.option, f"[{value}]" if option.several and value is not None else value)
         return found
 
 
@@ -51,18 +49,12 @@ class PlanOptions:
 class PlanCamera(PlanOptions):
     """Options that say which camera is flown."""
 
-    camera: Annotated[
-        str | None, typer.Option("--camera", metavar="NAME", help="Preset: film or digital."), Sets("camera.preset")
-    ] = None
+    camera: Annotated[str | None, Sets("--camera", "NAME", "Preset: film or digital.", "camera.preset")] = None
     principal_distance: Annotated[
-        str | None,
-        typer.Option("--principal-distance", metavar="MM", help="Principal distance."),
-        Sets("camera.principal_distance"),
+        str | None, Sets("--principal-distance", "MM", "Principal distance.", "camera.principal_distance")
     ] = None
     photo_format: Annotated[
-        str | None,
-        typer.Option("--photo-format", metavar="L,W", help="Length and width of a photo, mm."),
-        Sets("camera.format", several=True),
+        str | None, Sets("--photo-format", "L,W", "Length and width of a photo, mm.", "camera.format", several=True)
     ] = None
 
 
@@ -70,17 +62,9 @@ class PlanCamera(PlanOptions):
 class Flight(PlanOptions):
     """Options that say how it is flown, and measured."""
 
-    overlap: Annotated[
-        str | None,
-        typer.Option("--overlap", metavar="PERCENT", help="Overlap along the flight."),
-        Sets("end_lap_percent"),
-    ] = None
-    scale: Annotated[
-        str | None, typer.Option("--scale", metavar="M", help="Denominator of the photo scale."), Sets("scale")
-    ] = None
+    overlap: Annotated[str | None, Sets("--overlap", "PERCENT", "Overlap along the flight.", "end_lap_percent")] = None
+    scale: Annotated[str | None, Sets("--scale", "M", "Denominator of the photo scale.", "scale")] = None
     flying_height: Annotated[
-        str | None,
-        typer.Option("--flying-height", metavar="M", help="Flying height in metres, instead of the scale."),
-        Sets("flying_height"),
+        str | None, Sets("--flying-height", "M", "Flying height in metres, instead of the scale.", "flying_height")
     ] = None
-    sigma_um: Annotated[str | None, SIGMA_UM, Sets("image_sigma_um")] = None
+    sigma_um: Annotated[str | None, Sets(*SIGMA_UM, "image_sigma_um")] = None

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import PlanFile, PlanOptions, Sets
 from photostrip.cli.failures import failures_as
@@ -17,40 +15,25 @@ class Experiment(PlanOptions):
     """Options that describe the pairs and their errors."""
 
     principal_distance: Annotated[
-        str | None,
-        typer.Option("--principal-distance", metavar="MM", help="Principal distance."),
-        Sets("principal_distance"),
+        str | None, Sets("--principal-distance", "MM", "Principal distance.", "principal_distance")
     ] = None
-    base: Annotated[str | None, typer.Option("--base", metavar="MM", help="Photo base."), Sets("base")] = None
-    width: Annotated[
-        str | None,
-        typer.Option("--width", metavar="MM", help="Distance of the side zones from the base."),
-        Sets("width"),
-    ] = None
+    base: Annotated[str | None, Sets("--base", "MM", "Photo base.", "base")] = None
+    width: Annotated[str | None, Sets("--width", "MM", "Distance of the side zones from the base.", "width")] = None
     zone_points: Annotated[
         str | None,
-        typer.Option("--zone-points", metavar="N,N,N,N,N,N", help="Points in the standard zones 1 to 6."),
-        Sets("zone_points", several=True),
+        Sets("--zone-points", "N,N,N,N,N,N", "Points in the standard zones 1 to 6.", "zone_points", several=True),
     ] = None
     sigma_um: Annotated[
-        str | None,
-        typer.Option("--parallax-sigma-um", metavar="UM", help="Standard deviation of a y parallax."),
-        Sets("parallax_sigma_um"),
+        str | None, Sets("--parallax-sigma-um", "UM", "Standard deviation of a y parallax.", "parallax_sigma_um")
     ] = None
     sizes: Annotated[
-        str | None,
-        typer.Option("--sizes-um", metavar="UM,UM", help="Sizes of the errors of y parallaxes."),
-        Sets("error_sizes_um", several=True),
+        str | None, Sets("--sizes-um", "UM,UM", "Sizes of the errors of y parallaxes.", "error_sizes_um", several=True)
     ] = None
     methods: Annotated[
-        str | None,
-        typer.Option("--methods", metavar="A,B", help="Methods of search, as auto,parallax+grubbs."),
-        Sets("methods", several=True),
+        str | None, Sets("--methods", "A,B", "Methods of search, as auto,parallax+grubbs.", "methods", several=True)
     ] = None
     repetitions: Annotated[
-        str | None,
-        typer.Option("--repetitions", metavar="N", help="How often the experiment is made."),
-        Sets("repetitions"),
+        str | None, Sets("--repetitions", "N", "How often the experiment is made.", "repetitions")
     ] = None
 
 

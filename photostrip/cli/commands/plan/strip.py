@@ -16,9 +16,7 @@ from photostrip.frozen import dataclass
 class Length(PlanOptions):
     """How long the strip is."""
 
-    models: Annotated[
-        str | None, typer.Option("--models", metavar="N", help="Models, one less than photos."), Sets("models")
-    ] = None
+    models: Annotated[str | None, Sets("--models", "N", "Models, one less than photos.", "models")] = None
 
 
 @dataclass(frozen=True)
@@ -29,32 +27,29 @@ class StripControl(PlanOptions):
         list[str] | None,
         typer.Option("--control", metavar="LAYOUT", help="corners, corners+centre, bands=N, every=N; may be repeated."),
     ] = None
-    control_sigma: Annotated[str | None, CONTROL_SIGMA, Sets("control_sigma", several=True)] = None
+    control_sigma: Annotated[str | None, Sets(*CONTROL_SIGMA, "control_sigma", several=True)] = None
     gnss: Annotated[
         str | None,
-        typer.Option(
-            "--gnss", metavar="X,Y,Z", help="Compare with measured perspective centres, too; their sigmas, metres."
+        Sets(
+            "--gnss",
+            "X,Y,Z",
+            "Compare with measured perspective centres, too; their sigmas, metres.",
+            "gnss",
+            several=True,
         ),
-        Sets("gnss", several=True),
     ] = None
     methods: Annotated[
-        str | None,
-        typer.Option("--methods", metavar="A,B", help="Methods of adjustment; default: all."),
-        Sets("methods", several=True),
+        str | None, Sets("--methods", "A,B", "Methods of adjustment; default: all.", "methods", several=True)
     ] = None
     required: Annotated[
         str | None,
         typer.Option("--required", metavar="PLAN,HEIGHT", help="Accuracy needed everywhere, metres: how many bands?"),
     ] = None
     place: Annotated[
-        str | None,
-        typer.Option("--place", metavar="N", help="Find the best places for N more control points."),
-        Sets("place.points"),
+        str | None, Sets("--place", "N", "Find the best places for N more control points.", "place.points")
     ] = None
     into: Annotated[
-        str | None,
-        typer.Option("--into", metavar="LAYOUT", help="With --place: the layout that they are added to."),
-        Sets("place.into"),
+        str | None, Sets("--into", "LAYOUT", "With --place: the layout that they are added to.", "place.into")
     ] = None
 
     def keys(self) -> Options:
