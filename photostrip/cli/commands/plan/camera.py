@@ -23,14 +23,12 @@ def camera(
     with failures_as(delivery.form):
         from photostrip.errors import Fault, InputError
         from photostrip.formats.output.plans.cameras import source_document
-        from photostrip.library.plan import planned
 
         if source_table == (file is not None):
             message = "a list of cameras and --source-table exclude each other" if file else "no cameras are given"
             raise InputError(Fault(message, "plan-cameras", fix="name a YAML file, or use --source-table"))
-        delivery.require_output()
         if file is None:
+            delivery.require_output()
             delivery.deliver(source_document(), ())
         else:
-            plan = planned("camera", file, delivery.assignments or [])
-            delivery.deliver(plan.document, plan.files)
+            delivery.plan("camera", file, {})

@@ -60,6 +60,15 @@ class Delivery:
             raise typer.BadParameter(message, param_hint="--output")
         return False
 
+    def plan(self, kind: str, file: Path | None, options: Options) -> None:
+        """Read a plan, compute it, print and write it."""
+        from photostrip.library.plan import planned
+
+        self.require_output()
+        with self.assigned(options) as assignments:
+            plan = planned(kind, file, assignments)
+        self.deliver(plan.document, plan.files)
+
     def deliver(self, document: Document, files: Sequence[str], fine: Document | None = None) -> None:
         """Print a plan; write it, and the rule for make, when a file is named.
 

@@ -28,9 +28,4 @@ class SurveyOptions(PlanOptions):
 def displacement(*, file: PlanFile = None, survey: SurveyOptions, delivery: Delivery) -> None:
     """Compute how well displacements will be known, and the smallest that will be found."""
     with failures_as(delivery.form):
-        from photostrip.library.plan import planned
-
-        delivery.require_output()
-        with delivery.assigned(survey.keys()) as assignments:
-            plan = planned("displacement", file, assignments)
-        delivery.deliver(plan.document, plan.files)
+        delivery.plan("displacement", file, survey.keys())

@@ -43,9 +43,4 @@ def screening(*, file: PlanFile = None, experiment: Experiment, delivery: Delive
     Tells what each method finds, by zone and by size, and what an error that is not found does to the elements.
     """
     with failures_as(delivery.form):
-        from photostrip.library.plan import planned
-
-        delivery.require_output()
-        with delivery.assigned(experiment.keys()) as assignments:
-            plan = planned("screening", file, assignments)
-        delivery.deliver(plan.document, plan.files)
+        delivery.plan("screening", file, experiment.keys())

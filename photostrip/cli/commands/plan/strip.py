@@ -77,12 +77,7 @@ def strip(
 ) -> None:
     """Compute the expected accuracy along a strip, for layouts of control and methods of adjustment."""
     with failures_as(delivery.form):
-        from photostrip.library.plan import planned
-
         options = {**camera.keys(), **flight.keys(), **length.keys(), **control.keys()}
         if control.into is not None and control.place is None and file is None:
             raise typer.BadParameter("there is nothing to be placed: give --place as well", param_hint="--into")
-        delivery.require_output()
-        with delivery.assigned(options) as assignments:
-            plan = planned("strip", file, assignments)
-        delivery.deliver(plan.document, plan.files)
+        delivery.plan("strip", file, options)
