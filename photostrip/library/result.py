@@ -185,7 +185,7 @@ class Result:
                 from photostrip.report.html import check_html, to_html
 
                 check_html("report")
-                return to_html(self._document)
+                return to_html(self.document)  # its tables are looped over often
             names = [SectionName(each) for each in sections]
             chosen = chosen_sections(self._document, names=names, everything=everything, width=layout.USUAL)
             title = "" if sections else title_of(self._document)
@@ -251,7 +251,7 @@ class Result:
         from photostrip.report.pictures.result.pictures import picture_files
 
         with faults_instead(self.name, "reported"):
-            return picture_files(self._document)
+            return picture_files(self.document)
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> None:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none."""

@@ -30,14 +30,16 @@ class Sample(NamedTuple):
     unit: str
     sigma: float
     limits: list[float]  # none: not tested
+    reach: float  # what the axis holds, to both sides
 
     @property
     def limit(self) -> float:
         return median(self.limits)
 
-    @property
-    def reach(self) -> float:
-        return max(REACH * self.sigma, 1.1 * max(self.limits, default=0.0)) or 1.0
+
+def _sample(name: str, values: list[float], unit: str, sigma: float, limits: list[float]) -> Sample:
+    reach = max(REACH * sigma, 1.1 * max(limits, default=0.0)) or 1.0
+    return Sample(name=name, values=values, unit=unit, sigma=sigma, limits=limits, reach=reach)
 
 
 def histogram_picture(document: Document, used: Sequence[Residual]) -> Picture:
@@ -45,11 +47,10 @@ def histogram_picture(document: Document, used: Sequence[Residual]) -> Picture:
     tested = [value for each in used if each.test for value in each.test]
     if tested:
         limit = document["bundle"]["screening"]["limit"]
-        samples = [Sample(name="image residuals", values=tested, unit="standard deviations", sigma=1.0, limits=[limit])]
+        samples = [_sample("image residuals", tested, "standard deviations", 1.0, [limit])]
     else:
         sizes = [value for each in used for value in each.size]
-        plain = Sample(name="image residuals", values=sizes, unit="µm", sigma=rms(sizes), limits=[])
-        samples = [plain, *_parallaxes(document)]
+        samples = [_sample("image residuals", sizes, "µm", rms(sizes), []), *_parallaxes(document)]
     layout = Layout(columns=len(samples), height=240.0, number=len(samples))
     drawn: list[str] = []
     for place, sample in enumerate(samples):
@@ -85,7 +86,7 @@ def _parallaxes(document: Document) -> list[Sample]:
     ]
     if not limits or not values:
         return []
-    return [Sample(name="y parallaxes of the pairs", values=values, unit="µm", sigma=rms(values), limits=limits)]
+    return [_sample("y parallaxes of the pairs", values, "µm", rms(values), limits)]
 
 
 def _columns(sample: Sample) -> tuple[list[int], list[tuple[float, float]]]:
