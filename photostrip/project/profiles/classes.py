@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated
 
 from photostrip.project.schema.sections import Read, Section, key
@@ -103,3 +104,16 @@ def _check(reading: Reading, given: ClassFile) -> None:
         if not _limits(each.plan) and not _limits(each.height):
             message = f"the class `{each.name}` has no limit"
             reading.refuse(("classes", number), message, "no-value", expected="a limit in plan or in height")
+    for number, (one, other) in enumerate(pairwise(given.classes), 1):
+        pairs = [
+            (limit, after[name])
+            for before, after in (
+                (_limits(one.plan), _limits(other.plan)),
+                (_limits(one.height), _limits(other.height)),
+            )
+            for name, limit in before.items()
+            if name in after
+        ]
+        if pairs and all(after < before for before, after in pairs):  # a statement names the first that is kept
+            message = f"the class `{other.name}` is narrower than `{one.name}` before it"
+            reading.refuse(("classes", number), message, "order", expected="the narrowest class first")

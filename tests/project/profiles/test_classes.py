@@ -89,6 +89,10 @@ def test_a_class_needs_its_check_points(tmp_path: Path) -> None:
             "classes: [{name: a, plan: {rmse: 1}}, {name: a, plan: {rmse: 2}}]\n",
             "classes[1].name: the class `a` stands twice",
         ),
+        (
+            "classes: [{name: a, plan: {rmse: 2}}, {name: b, plan: {rmse: 1}}]\n",
+            "classes[1]: the class `b` is narrower than `a` before it; expected the narrowest class first",
+        ),
         ("classes: [{name: a, plan: {rmse: -1}}]\n", "larger than 0"),
         ("classes: [{name: a, plan: {rmse: .nan}}]\n", "`.nan`"),
         ("classes: [{name: a, plan: {le90: 1}}]\n", "`le90` is not known"),
