@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
 from photostrip.points import ControlPoints, PhotoPoints, locate
 
 if TYPE_CHECKING:
@@ -53,20 +52,14 @@ def axes_of(numbers: Numbers, frames: Sequence[GroundFrame], cartesian: Floats, 
     return axes
 
 
-@dataclass(frozen=True, eq=False)
-class AtGivenPoints:
-    """The result at control and check points."""
-
-    rows: Numbers  # (c,): row of each given point in the adjusted points; -1 where it has no coordinates
-    # (c, 3): adjusted minus given in metres along east, north, up of the point's own ground frame; NaN where it is not
-    # given, does not count or has no result
-    differences: Floats
-
-
 def compare_with_given(
     control: ControlPoints, frames: Sequence[GroundFrame], points: Adjusted, observations: PhotoPoints
-) -> AtGivenPoints:
-    """Compare adjusted with given coordinates at control and check points, each in its own ground frame."""
+) -> tuple[Numbers, Floats]:
+    """Compare adjusted with given coordinates at control and check points, each in its own ground frame.
+
+    Returns the row of each given point in the adjusted points (c,), -1 where it has no coordinates, and adjusted minus
+        given (c, 3), metres along east, north, up; NaN where it is not given, does not count or has no result.
+    """
     rows = rows_of_given(control.ids, points.number, observations.point_ids)
     differences = np.full((len(control), 3), np.nan)
     for index, frame in enumerate(frames):
@@ -75,7 +68,7 @@ def compare_with_given(
             adjusted = frame.ground_from_cartesian(points.cartesian[rows[inside]])
             given = np.where(np.isnan(control.enu[inside]), adjusted, control.enu[inside])
             differences[inside] = frame.difference(adjusted, given)
-    return AtGivenPoints(rows, np.where(control.use, differences, np.nan))
+    return rows, np.where(control.use, differences, np.nan)
 
 
 def rejected_control(result: Result) -> Flags:

@@ -72,7 +72,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     def on_the_ground(inputs: Inputs) -> Result:
         adjusted = _adjusted(inputs, settings, ground, refined.observations, formed)
         # 9 residuals, check points
-        at_given = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
+        rows, differences = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
         return Result(
             inputs=inputs,
             settings=settings,
@@ -83,8 +83,8 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
             refined=replace(refined, observations=adjusted.observations),
             strips=adjusted.strips,
             points=adjusted.points,
-            control_rows=at_given.rows,
-            control_differences=at_given.differences,
+            control_rows=rows,
+            control_differences=differences,
             ties=adjusted.ties,
             not_determined=not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips),
             notes=(

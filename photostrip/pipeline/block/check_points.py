@@ -25,19 +25,19 @@ def check_errors(
 ) -> CheckErrors | None:
     """Compare a bundle adjustment with its check points; None without any."""
     points = adjusted.points
-    compared = compare_with_given(given, frames, points, adjusted.observations)
-    rows = np.flatnonzero(given.check & np.isfinite(compared.differences).any(axis=1))
+    places, differences = compare_with_given(given, frames, points, adjusted.observations)
+    rows = np.flatnonzero(given.check & np.isfinite(differences).any(axis=1))
     if not len(rows):
         return None
     if len(rows) > MOST:
         rows = rows[np.linspace(0, len(rows) - 1, MOST).round().astype(int)]
-    rows = rows[np.argsort(compared.rows[rows], kind="stable")]
-    at = compared.rows[rows]
+    rows = rows[np.argsort(places[rows], kind="stable")]
+    at = places[rows]
     axes = axes_of(given.frame[rows], frames, points.cartesian[at])
     solution = bundle.screened.solution
     joint = joint_cofactors(solution, points.number[at]).reshape(len(at), 3, len(at), 3) * bundle.unit**2
     turned = np.einsum("iap,ipjq,jbq->iajb", axes, joint, axes).reshape(3 * len(at), 3 * len(at))
-    difference = compared.differences[rows].ravel()
+    difference = differences[rows].ravel()
     known = np.flatnonzero(np.isfinite(difference))
     covariance = turned[np.ix_(known, known)] + np.diag(given.sigma[rows].ravel()[known] ** 2)
     return CheckErrors(ids=given.take(rows).ids, point=known // 3, difference=difference[known], covariance=covariance)

@@ -60,6 +60,8 @@ def build(
     given, control_rows = _control(control, ground.control, observations, start, origin)
     positions = _positions(inputs, ground.positions, ground.orientations, start, origin)
     attitudes = _attitudes(inputs.orientations, ground.orientations, start)
+    in_block = inputs.positions is not None and inputs.positions.group == BLOCK
+    geocentric = ground.positions is not None and ground.positions.kind == "geocentric"
     problem = BundleProblem(
         images=images,
         cameras=_cameras(inputs, settings),
@@ -70,8 +72,8 @@ def build(
         photo_ids=start.photos,
         point_ids=observations.point_ids,
         camera_ids=tuple(dict.fromkeys(strip.camera.name for strip in inputs.strips)),
-        group_ids=_group_names(inputs),
-        position_axes=GROUND_AXES if _is_level(ground.positions) else CARTESIAN_AXES,
+        group_ids=("of the block",) if in_block else tuple(strip.id for strip in inputs.strips),
+        position_axes=CARTESIAN_AXES if geocentric else GROUND_AXES,
     )
     level = {
         "control": tuple(
@@ -209,16 +211,6 @@ def _groups(inputs: Inputs, positions: CameraPositions) -> Numbers:
     """Return the number of the group of each photo, whose positions share offset and drift."""
     strips = np.repeat(np.arange(len(inputs.strips)), [len(strip.photos) for strip in inputs.strips])
     return np.zeros_like(strips) if positions.group == BLOCK else strips
-
-
-def _group_names(inputs: Inputs) -> tuple[str, ...]:
-    if inputs.positions is not None and inputs.positions.group == BLOCK:
-        return ("of the block",)
-    return tuple(strip.id for strip in inputs.strips)
-
-
-def _is_level(frame: GroundFrame | None) -> bool:
-    return frame is None or frame.kind != "geocentric"
 
 
 def _level_positions(

@@ -23,12 +23,8 @@ if TYPE_CHECKING:
     from photostrip.triangulation.polynomial.correction import Polynomial
 
 
-def strips_of(result: Result) -> list[Document]:
-    """Return the list ``strips``: what each strip is like and how well it holds together."""
-    return [_strip(result, strip) for strip in result.strips]
-
-
-def _strip(result: Result, strip: StripResult) -> Document:
+def strip_of(result: Result, strip: StripResult) -> Document:
+    """Return a record of ``strips``: what a strip is like and how well it holds together."""
     of_photos = strip.model_stages is None
     formed = strip.of_photos.formed.junctions if of_photos else strip.of_models.formed.links
     gap = discrepancies(strip)[formed.used]  # rms() passes over points left out for their rays
@@ -105,12 +101,8 @@ def _scale_change(correction: Polynomial, x: float) -> float:
     return float(ends[0, 0] - ends[1, 0]) / (2 * step)
 
 
-def absolute_of(result: Result) -> list[Document]:
-    """Return the list ``absolute``: the similarity of every strip to its control."""
-    return [_absolute(strip) for strip in result.strips]
-
-
-def _absolute(strip: StripResult) -> Document:
+def absolute_of(strip: StripResult) -> Document:
+    """Return a record of ``absolute``: the similarity of a strip to its control."""
     found, use = strip.absolute, strip.control.use
     misclosures = [rms(column) for column in np.where(use, found.misclosures, np.nan).T]
     values = {
