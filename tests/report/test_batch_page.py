@@ -69,3 +69,14 @@ def test_a_map_keeps_lengths_and_north() -> None:
     assert x2 > x1
     assert v2 < v1  # north is up
     assert abs((x2 - x1) - (v1 - v2)) < 0.5
+
+
+def test_names_on_the_map_do_not_lie_on_each_other() -> None:
+    side_by_side = [outcome(f"strip-{n}", track=[[[15.0, 50.0 + n / 100], [15.3, 50.0 + n / 100]]]) for n in range(60)]
+    (picture,) = batch_maps(side_by_side)
+    labels = re.findall(r'<text x="([\d.]+)" y="([\d.]+)" class="label id"[^>]*>(strip-\d+)<', picture.svg)
+    places = [(float(x), float(y)) for x, y, _ in nonempty(labels)]
+    assert len(labels) < len(side_by_side)
+    marks = re.findall(r'<circle [^>]*cx="([\d.]+)"', picture.svg)
+    assert max(x for x, _ in places) < float(marks[-1])  # the strips go to the right
+    assert all(abs(x - u) > 40 or abs(y - v) > 10 for n, (x, y) in enumerate(places) for u, v in places[:n])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, radians
+from math import cos, dist, radians
 from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 MARGIN = 60.0
 NAMED = 40  # projects whose names stand in the description
+AHEAD = 18.0  # on the picture
 SHAPES = {"good": "dot", "unverified": "square", "look": "diamond", "failed": "triangle"}
 
 
@@ -49,7 +50,8 @@ def _map(number: int, projects: Sequence[Document]) -> svg.Picture:
         ]
         hint = f"{each['project']}: {each['status']}"
         found.append(svg.mark(spot, SHAPES[each["status"]], f"verdict-mark {each['status']}", hint))
-    found += ids(zip(map(_name, projects), spots, strict=True), spots, (WIDTH, sheet.height - 30.0))
+    ways = [_ahead(spot, sheet.place(ground(each["track"][0][1]))) for each, spot in zip(projects, spots, strict=True)]
+    found += ids(zip(map(_name, projects), spots, strict=True), [*spots, *ways], (WIDTH, sheet.height - 30.0))
     places = ", ".join(f"{_name(each)} ({each['status']})" for each in projects[:NAMED])
     texts = svg.Texts(
         f"{counted(len(projects), 'project')} on a body of {projects[0]['body'] / 1000:.0f} km radius",
@@ -57,6 +59,12 @@ def _map(number: int, projects: Sequence[Document]) -> svg.Picture:
         f"Strips of {places}",
     )
     return svg.picture(f"map-{number}", (WIDTH, max(sheet.height, TOP)), texts, found)
+
+
+def _ahead(start: svg.Point, end: svg.Point) -> svg.Point:
+    """Return where a strip goes from its first photo: its name stands elsewhere."""
+    share = AHEAD / max(dist(start, end), AHEAD)
+    return start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])
 
 
 def _entries(projects: Iterable[Document]) -> list[Entry]:

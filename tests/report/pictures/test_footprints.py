@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import re
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -179,3 +180,18 @@ def test_the_overlap_is_counted_within_the_outlines() -> None:
 def test_straight_sides_lose_their_corners() -> None:
     square = [(0.0, 0.0), (5.0, 0.2), (10.0, 0.0), (10.0, 10.0), (4.0, 8.0), (0.0, 10.0)]
     assert straightened(square, 0.5) == [square[0], *square[2:]]
+
+
+def test_ids_stand_in_footprints_that_have_room_for_them() -> None:
+    _, document = flown(Terrain(relief=0.0))
+    (picture,) = footprint_pictures(document, plan_of(document))
+    assert len(re.findall(r'class="label id"', picture.svg)) == len(document["photos"])
+    assert 'class="outline"' in picture.svg
+    longer = copy.deepcopy(dict(document))
+    for photo in longer["photos"]:  # as wide as the id is long
+        photo["id"] = "p" * 60 + photo["id"]
+    for row in longer["residuals"]:
+        row["photo"] = "p" * 60 + row["photo"]
+    (picture,) = footprint_pictures(longer, plan_of(longer))
+    assert 'class="label id"' not in picture.svg
+    assert 'class="outline narrow"' in picture.svg

@@ -65,7 +65,8 @@ def plan_picture(document: Document, plan: Plan) -> Picture:
     caption = (
         f"Vectors: adjusted minus given in plan; ellipses: standard deviations{' of given points' if crowded else ''}. "
         f"Both are {enlarged} times as large as the ground. "
-        f"{'The first strip runs' if plan.strips[0] else 'East is'} to the right."
+        f"{'East is' if not plan.strips[0] else 'The first strip runs' if document['strips'] else 'The photos run'} "
+        "to the right."
     )
     counts = counted(len(plan.strips), "strip"), counted(len(plan.spots), "point")
     words = f"{', '.join(counts)}; the tables of control and check points have the numbers."

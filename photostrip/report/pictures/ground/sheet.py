@@ -95,7 +95,7 @@ def ids(
         wide = LETTER * len(name)
         around = (x + 7.0, y + 4.0), (x - 7.0 - wide, y + 4.0), (x - wide / 2, y - 8.0), (x - wide / 2, y + 16.0)
         for left, low in around if beside else ((x - wide / 2, y + 4.0),):
-            box = left, low - LINE + 2.0, left + wide + APART, low + 1.0
+            box = left - APART / 2, low - LINE + 2.0, left + wide + APART / 2, low + 1.0
             if box[0] < 0 or box[1] < 0 or box[2] > size[0] or box[3] > size[1] or not boxes.free(box):
                 continue
             boxes.add(box)
