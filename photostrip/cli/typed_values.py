@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
     from typer._click.core import Command
 
-READER = "_runtime_param"  # where typer keeps what reads the values of an option, once it has made it
+READER = "get_runtime_param"  # method of an option that gives typer what reads its values
 
 
 def read_plainly(command: Command, above: typer.Context | None = None) -> None:
     """Read the values of a command, and of its subcommands, without pydantic where that is possible."""
     context = typer.Context(command, above, **command.context_settings)
     for each in command.get_params(context):  # --help among them, which is made when it is asked for
-        vars(each)[READER] = _Plain()
+        vars(each)[READER] = _Plain
     for below in getattr(command, "commands", {}).values():
         read_plainly(below, context)
 
@@ -41,7 +41,7 @@ class _Plain:
         texts = value if several else [value]
         read = _reader(get_args(annotation)[0] if several else annotation, texts)
         if read is None or info.parser or info.exists or info.resolve_path:
-            vars(param)[READER] = None
+            del vars(param)[READER]
             return param.get_runtime_param().coerce(value, param=param, ctx=ctx)
         found = [read(text) for text in texts]
         return found if several else found[0]
