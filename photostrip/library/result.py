@@ -168,8 +168,8 @@ class Result:
         Raises InputError when HTML is asked for and jinja2 is not installed; ValueError for another form.
         """
         from photostrip.errors import faults_instead
-        from photostrip.report import SectionName, chosen_sections, require_complete, title_of
         from photostrip.report.page import layout, text
+        from photostrip.report.sections.document import SectionName, chosen_sections, require_complete, title_of
 
         _require_form(form, get_args(ReportForm))
         if form == "json":

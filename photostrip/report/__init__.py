@@ -7,7 +7,3 @@ and from these text, Markdown, HTML or a coloured terminal. Nothing is computed;
 - ``page``: parts of a page, tables, numbers as they are printed, and the ways to show them;
 - ``html`` with ``templates`` and ``pictures``: the report as one page with pictures.
 """
-
-from photostrip.report.sections.document import SectionName, chosen_sections, require_complete, sections_of, title_of
-
-__all__ = ["SectionName", "chosen_sections", "require_complete", "sections_of", "title_of"]

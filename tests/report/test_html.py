@@ -16,7 +16,6 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.formats.output.result_json import to_json
-from photostrip.report import sections_of
 from photostrip.report.html import to_html
 from photostrip.report.page.parts import Facts, Table, Words
 from photostrip.report.pictures import style
@@ -25,6 +24,7 @@ from photostrip.report.pictures.ground.plan import LONGEST
 from photostrip.report.pictures.ground.plan_view import plan_of
 from photostrip.report.pictures.result.pictures import picture_files, pictures_of
 from photostrip.report.pictures.svg import Axis, nice
+from photostrip.report.sections.document import sections_of
 from tests.loops import nonempty
 from tests.reports import saved
 from tests.results import FRAMES, case, spec, write_project

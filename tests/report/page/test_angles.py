@@ -15,10 +15,10 @@ from photostrip.cli.main import main
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
-from photostrip.report import sections_of
 from photostrip.report.html import to_html
 from photostrip.report.page.angles import UNITS
 from photostrip.report.page.parts import Table
+from photostrip.report.sections.document import sections_of
 from photostrip.result.adjustment.bundle import kinds
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty

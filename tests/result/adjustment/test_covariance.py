@@ -9,8 +9,8 @@ import pytest
 
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
-from photostrip.report import sections_of, title_of
 from photostrip.report.page.text import to_text
+from photostrip.report.sections.document import sections_of, title_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import GrossError
 from photostrip.statistics import gamma_cdf
