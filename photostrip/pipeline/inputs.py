@@ -38,7 +38,7 @@ class Strip:
     camera: Camera  # the camera of all its photos
     photos: tuple[str, ...]  # photos in flight order; a single one only in a bundle adjustment
     first: FirstPhoto = NOTHING_GIVEN  # frame and scale of the strip as long as it has no control
-    # parameters of its camera that a bundle adjustment estimates, of ``bundle.settings.CALIBRATION``
+    # parameters of its camera that a bundle adjustment estimates, of ``bundle.settings.ASKED``
     calibrate: tuple[str, ...] = ()
 
     def positions(self, observations: PhotoPoints) -> Numbers:

@@ -7,11 +7,11 @@ from typing import Annotated
 from photostrip.project.schema.ground import Angles
 from photostrip.project.schema.sections import Before, Length, Rule, Section, key, wrong
 from photostrip.project.schema.values import Id, Number, Pair, Positive, Triple, choice, if_empty, quoted
-from photostrip.triangulation.bundle.settings import CALIBRATION
+from photostrip.triangulation.bundle.settings import ASKED
 from photostrip.triangulation.image_coordinates.certificate import PLACES
 
 Place = Annotated[str, choice(tuple(PLACES))]
-Parameter = Annotated[str, choice(CALIBRATION)]
+Parameter = Annotated[str, choice(ASKED)]
 
 
 class Distortion(Section):

@@ -27,7 +27,7 @@ from photostrip.project.schema.values import (
     if_empty,
     quoted,
 )
-from photostrip.triangulation.bundle.settings import CALIBRATION, SCREENINGS, TESTS
+from photostrip.triangulation.bundle.settings import ASKED, SCREENINGS, TESTS
 from photostrip.triangulation.gross_errors.pairs.screening import METHODS
 from photostrip.triangulation.independent_models.settings import METHODS as LINK_METHODS
 from photostrip.triangulation.polynomial.correction import DEGREES
@@ -122,7 +122,7 @@ class Bundle(Section):
         "Estimate the standard deviations of image coordinates, control and camera positions",
         DEFAULTS.bundle.variance_components,
     )
-    self_calibration: list[Parameter] = key(f"Parameters of the cameras that are estimated: {quoted(CALIBRATION)}", [])
+    self_calibration: list[Parameter] = key(f"Parameters of the cameras that are estimated: {quoted(ASKED)}", [])
     calibration_sigma: Annotated[dict[str, Positive], Before(if_empty)] = key(
         "A-priori standard deviations of these parameters, by name; free without one",
         {},
@@ -132,9 +132,9 @@ class Bundle(Section):
     @Rule
     def _known_parameters(self) -> None:
         for name in self.calibration_sigma:
-            if name not in CALIBRATION:
+            if name not in ASKED:
                 message = f"`{shown(name)}` is no parameter of a camera"
-                expected, fix = f"one of {', '.join(CALIBRATION)}", suggestion(name, CALIBRATION)
+                expected, fix = f"one of {', '.join(ASKED)}", suggestion(name, ASKED)
                 raise wrong(message, code="word", at="calibration_sigma", expected=expected, fix=fix)
 
 

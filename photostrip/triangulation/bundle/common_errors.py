@@ -19,9 +19,10 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation.bundle.observations.problem import CALIBRATION
+from photostrip.triangulation.bundle.observations.calibration import PRINCIPAL_DISTANCE
 from photostrip.triangulation.bundle.quality.joint_points import sum_cofactors
 from photostrip.triangulation.bundle.selection import Selection, selected, supported
+from photostrip.triangulation.bundle.settings import CALIBRATION
 from photostrip.triangulation.bundle.solve import solve
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def taken_up(problem: BundleProblem, error: CommonError) -> BundleProblem:
         return replace(problem, control=control)
     if error.kind == DISTANCE:
         sigma = np.zeros((len(cameras.focal), len(CALIBRATION))) if cameras.sigma is None else cameras.sigma.copy()
-        sigma[:, CALIBRATION.index("c")] = np.inf
+        sigma[:, PRINCIPAL_DISTANCE] = np.inf
         return replace(problem, cameras=replace(cameras, sigma=sigma))
     group = np.where(positions.group >= 0, 0 if error.of == ALL else positions.group, -1)
     count = 1 if error.of == ALL else len(positions.offset_sigma)
@@ -214,7 +215,7 @@ def _conceivable(problem: BundleProblem) -> Iterator[CommonError]:
             yield CommonError(OFFSET, EACH)
         yield CommonError(DRIFT, EACH)
     given = len(problem.control) + len(problem.positions) > 0
-    if given and (problem.cameras.sigma is None or not problem.cameras.sigma[:, CALIBRATION.index("c")].any()):
+    if given and (problem.cameras.sigma is None or not problem.cameras.sigma[:, PRINCIPAL_DISTANCE].any()):
         yield CommonError(DISTANCE, EACH)
 
 

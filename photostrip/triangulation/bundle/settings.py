@@ -3,12 +3,44 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import NamedTuple
 
 from photostrip.frozen import dataclass
 
 SCREENINGS = ("snooping", "robust", "none")
 TESTS = ("tau", "baarda")
-CALIBRATION = ("principal_distance", "principal_point", "k1", "k2", "k3", "p1", "p2", "affinity", "shear")
+
+
+class CameraParameter(NamedTuple):
+    """A calibration parameter of a camera."""
+
+    asked: str  # what a user asks for; the principal point is asked for as one
+    power: int  # of the distance from the principal point by which its correction of an image coordinate grows
+    axis: str = ""
+
+    @property
+    def title(self) -> str:
+        return f"{self.asked} {self.axis}".rstrip()
+
+    @property
+    def unit(self) -> str:
+        return {0: "mm", 1: "1"}.get(self.power, f"mm^-{self.power - 1}")
+
+
+CALIBRATION = {
+    "c": CameraParameter("principal_distance", 0),
+    "x0": CameraParameter("principal_point", 0, "x"),
+    "y0": CameraParameter("principal_point", 0, "y"),
+    "k1": CameraParameter("k1", 3),
+    "k2": CameraParameter("k2", 5),
+    "k3": CameraParameter("k3", 7),
+    "p1": CameraParameter("p1", 2),
+    "p2": CameraParameter("p2", 2),
+    "b1": CameraParameter("affinity", 1),
+    "b2": CameraParameter("shear", 1),
+}
+"""The calibration parameters of a camera, in the order of their columns: what ``corrections`` corrects by."""
+ASKED = tuple(dict.fromkeys(each.asked for each in CALIBRATION.values()))
 
 
 @dataclass(frozen=True)
@@ -25,7 +57,7 @@ class BundleSettings:
     alpha: float | None = None
     power: float = 0.80  # probability with which an error of the size of the minimal detectable one is found
     variance_components: bool = False  # whether the standard deviations of the groups of observations are estimated
-    self_calibration: tuple[str, ...] = ()  # parameters of every camera that are estimated, of ``CALIBRATION``
+    self_calibration: tuple[str, ...] = ()  # parameters of every camera that are estimated, of ``ASKED``
     # a-priori standard deviations of these parameters about the given calibration, in their units; without one a
     # parameter is free
     calibration_sigma: dict[str, float] = field(default_factory=dict)

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import dataclass
-from photostrip.triangulation.bundle.observations.problem import CALIBRATION, BundleCameras
+from photostrip.triangulation.bundle.settings import CALIBRATION
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
+    from photostrip.triangulation.bundle.observations.problem import BundleCameras
 
-PRINCIPAL_DISTANCE = CALIBRATION.index("c")
+PRINCIPAL_DISTANCE = list(CALIBRATION).index("c")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,14 @@ def parameters(cameras: BundleCameras) -> Calibrated:
 def corrections(xy: Floats) -> Floats:
     """Corrections of ideal image coordinates (2, ...) in mm by each parameter at one, shape (10, 2, ...).
 
-    See ``problem.CALIBRATION`` for the formula; zero for the principal distance.
+    Zero for the principal distance. With the ideal coordinates x, y as given, r2 = x^2 + y^2, and all parameters zero
+    at the start, what a ray should have measured is found from
+
+        x + Dx = -(f + c) u / w    Dx = -x0 + x (k1 r2 + k2 r2^2 + k3 r2^3) + p1 (r2 + 2 x^2) + 2 p2 x y + b1 x + b2 y
+        y + Dy = -(f + c) v / w    Dy = -y0 + y (k1 r2 + k2 r2^2 + k3 r2^3) + p2 (r2 + 2 y^2) + 2 p1 x y
+
+    so that c, x0, y0 (mm) are corrections of the principal distance and the principal point, k and p are those of
+    Brown's model from image to ideal coordinates, b1 is the affinity and b2 the shear.
     """
     x, y = xy
     r2 = x * x + y * y

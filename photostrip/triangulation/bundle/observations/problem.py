@@ -16,22 +16,10 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.triangulation.bundle.settings import CALIBRATION
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
-
-CALIBRATION = ("c", "x0", "y0", "k1", "k2", "k3", "p1", "p2", "b1", "b2")
-"""Names of the calibration parameters of a camera, in the order of the columns of ``Calibration``.
-
-With the ideal coordinates x, y as given, r2 = x^2 + y^2, and all parameters zero at the start, what a ray should
-have measured is found from
-
-    x + Dx = -(f + c) u / w        Dx = -x0 + x (k1 r2 + k2 r2^2 + k3 r2^3) + p1 (r2 + 2 x^2) + 2 p2 x y + b1 x + b2 y
-    y + Dy = -(f + c) v / w        Dy = -y0 + y (k1 r2 + k2 r2^2 + k3 r2^3) + p2 (r2 + 2 y^2) + 2 p1 x y
-
-so that c, x0, y0 (mm) are corrections of the principal distance and the principal point, k and p are those of
-Brown's model from image to ideal coordinates, b1 is the affinity and b2 the shear.
-"""
 
 
 def _no_rows(*shape: int) -> Floats:
@@ -174,11 +162,11 @@ class BundleProblem:
         First calibration parameters (``camera RC30: k1``), then offsets and drifts of positions (``positions A: offset
         east``; the component counts along the rows of the axes).
         """
-        names = []
+        names, parameters = [], list(CALIBRATION)
         if self.cameras.sigma is not None:
             for camera, row in enumerate(self.cameras.sigma):
                 name = self.camera_ids[camera] if self.camera_ids else f"number {camera}"
-                names += [f"camera {name}: {CALIBRATION[k]}" for k in np.flatnonzero(row > 0.0)]
+                names += [f"camera {name}: {parameters[k]}" for k in np.flatnonzero(row > 0.0)]
         for title, sigma in (("offset", self.positions.offset_sigma), ("drift", self.positions.drift_sigma)):
             for group, axis in np.argwhere(sigma > 0.0).tolist():
                 name = self.group_ids[group] if self.group_ids else f"group {group}"

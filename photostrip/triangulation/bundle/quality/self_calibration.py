@@ -9,34 +9,15 @@ import numpy as np
 from photostrip.frozen import dataclass
 from photostrip.statistics import t_p_value
 from photostrip.triangulation.bundle.observations.calibration import corrections
-from photostrip.triangulation.bundle.observations.problem import CALIBRATION, BundleProblem
+from photostrip.triangulation.bundle.settings import CALIBRATION
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats, Numbers
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-COLUMNS = {
-    "principal_distance": ("c",),
-    "principal_point": ("x0", "y0"),
-    "k1": ("k1",),
-    "k2": ("k2",),
-    "k3": ("k3",),
-    "p1": ("p1",),
-    "p2": ("p2",),
-    "affinity": ("b1",),
-    "shear": ("b2",),
-}
-"""Columns of ``CALIBRATION`` of each parameter that a user can ask for."""
-TITLES = {
-    "c": "principal_distance",
-    "x0": "principal_point x",
-    "y0": "principal_point y",
-    "b1": "affinity",
-    "b2": "shear",
-}
-UNITS = {"c": "mm", "x0": "mm", "y0": "mm", "k1": "mm^-2", "k2": "mm^-4", "k3": "mm^-6", "p1": "mm^-1", "p2": "mm^-1"}
 SIGNIFICANCE = 0.05
 KEPT = 0.3  # of a loose a-priori standard deviation that a parameter keeps which is not determined
 INSEPARABLE = 0.9999  # correlations of what cannot be told apart
@@ -67,17 +48,16 @@ def sigmas(asked: Sequence[Sequence[str]], prior: dict[str, float]) -> Floats | 
     """
     found = np.zeros((len(asked), len(CALIBRATION)))
     for row, names in enumerate(asked):
-        for name in names:
-            for column in COLUMNS[name]:
-                found[row, CALIBRATION.index(column)] = prior.get(name, np.inf)
+        for column, each in enumerate(CALIBRATION.values()):
+            if each.asked in names:
+                found[row, column] = prior.get(each.asked, np.inf)
     return found if found.any() else None
 
 
 def millimetre(xy: Floats) -> Floats:
     """Values of the parameters that move a point at the edge of the measured part of a photo by 1 mm, shape (10,)."""
     edge = max(float(np.hypot(xy[:, 0], xy[:, 1]).max(initial=1.0)), 1e-3)
-    powers = np.array([0, 0, 0, 3, 5, 7, 2, 2, 1, 1])
-    return np.asarray(edge ** -powers.astype(float), float)
+    return np.array([edge**-each.power for each in CALIBRATION.values()])
 
 
 def values_of(problem: BundleProblem, common: Floats) -> Floats:
@@ -108,9 +88,8 @@ def parameters_of(problem: BundleProblem, solution: BundleSolution, precision: C
     if sigma is None:
         return ()
     unit = solution.sigma0 if solution.redundancy > 0 else 1.0
-    found = []
+    found, kinds = [], list(CALIBRATION.values())
     for number, (camera, column) in enumerate(np.argwhere(sigma > 0.0).tolist()):
-        name = CALIBRATION[column]
         value, cofactor = float(solution.common[number]), float(precision.common[number, number])
         deviation = float(np.sqrt(cofactor)) * unit
         p = t_p_value(value / deviation, solution.redundancy) if deviation > 0 and solution.redundancy > 0 else 1.0
@@ -119,8 +98,8 @@ def parameters_of(problem: BundleProblem, solution: BundleSolution, precision: C
         found.append(
             Parameter(
                 camera=problem.camera_ids[camera] if problem.camera_ids else str(camera),
-                name=TITLES.get(name, name),
-                unit=UNITS.get(name, "1"),
+                name=kinds[column].title,
+                unit=kinds[column].unit,
                 value=value,
                 sigma=deviation,
                 p=p,
