@@ -1,1 +1,1 @@
-"""One file for each command, ``shell`` for two: its arguments, then load, call, print, exit code."""
+"""One file for each command, ``shell`` and ``info`` for two: its arguments, then load, call, print, exit code."""

@@ -15,6 +15,7 @@ from photostrip.result.records import as_records
 from photostrip.result.trace.departures import departures_of
 from photostrip.result.trace.replay import PairRound, SimilarityStep, pair_rounds, similarity_steps
 from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.polynomial.terms import POWERS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 from photostrip.triangulation.strip_formation.strip import FirstPhoto, base_angles, intersect_models
 
@@ -44,7 +45,7 @@ SYMBOLS = {
     "M": "axes of the intermediate frame, as columns, in the Cartesian frame",
     "s, xi, eta, theta": "scale and angles of the similarity, in the sense of alpha, omega, kappa",
     "[wvv]": "sum of the weighted squares of the misclosures, without unit",
-    "a0..a5": "coefficients of 1, X, Y, XY, X^2, X^3, what is added to a coordinate",
+    f"a0..a{len(POWERS) - 1}": f"coefficients of {', '.join(POWERS)}, what is added to a coordinate",
     "l": "free term of eq. 151, given minus strip; v: what the polynomial leaves",
 }
 

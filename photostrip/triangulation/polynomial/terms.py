@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
 
-# powers of X and Y; a term here and in the ladder is a term of X, Y and Z alike
+# Powers of X and Y. A term here, in the ladder and in the order of dropping is a term of X, Y and Z alike.
 POWERS = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
 # Ladder: terms, degree, stations along the strip, points for an exact fit. One more point is asked for unless forced.
 LADDER = (

@@ -34,6 +34,7 @@ from photostrip.simulation import (
     simulate,
 )
 from photostrip.triangulation.image_coordinates.corrections import undistort
+from photostrip.triangulation.plausibility import KINDS
 from photostrip.triangulation.plausibility.photos import flight_order
 from tests.pipeline.blocks import positions
 
@@ -649,6 +650,10 @@ def test_mistakes_of_whole_columns_and_rows_are_told(
     named = plausibility.told(inputs, case.settings).after
     assert code in named
     assert not ids or ids & named[code]
+
+
+def test_every_kind_of_mistake_is_planted_in_the_benchmark() -> None:
+    assert {code for mistake in plausibility.MISTAKES for code in mistake.codes} == set(KINDS)
 
 
 def test_an_id_beside_another_with_its_coordinates_is_no_copied_row_where_they_are_one_point() -> None:

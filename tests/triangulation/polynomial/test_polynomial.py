@@ -19,8 +19,9 @@ from photostrip.pipeline import triangulate
 from photostrip.triangulation.absolute_orientation import weights
 from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.polynomial.correction import FitProblem, PolynomialSettings, fit
-from photostrip.triangulation.polynomial.terms import bands, choose_terms, count_stations
+from photostrip.triangulation.polynomial.terms import DROP_ORDER, LADDER, POWERS, bands, choose_terms, count_stations
 from tests.loops import nonempty
+from tests.source_tree import ROOT
 from tests.strips import MICROMETRE, control_points, fly, project, targets
 from tests.vectors import cases, section
 
@@ -219,6 +220,14 @@ def test_control_on_one_side_carries_no_terms_across(y: list[float], terms: tupl
     xyz = np.column_stack([np.linspace(-9000, 9000, 8), y, np.zeros(8)])
     assert choose_terms(xyz, 3, problem(xyz, xyz).sizes) == terms
     assert np.linalg.matrix_rank(columns(xyz) / np.abs(columns(xyz)).max(axis=0).clip(1)) == len(terms)
+
+
+def test_every_term_can_be_dropped_and_stands_in_the_help_and_on_the_page() -> None:
+    *others, last = POWERS
+    assert {*LADDER[0][0]} == {"1", *DROP_ORDER} == {*POWERS}
+    help_text = (ROOT / "photostrip/cli/commands/step.py").read_text(encoding="utf-8")
+    assert f"Of {', '.join(others)} and {last}." in help_text
+    assert f"${', '.join(POWERS)}$" in (ROOT / "docs/method.md").read_text(encoding="utf-8")
 
 
 def test_three_bands_of_any_number_of_points_carry_no_cubic() -> None:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 ALPHA = 0.01  # of rejecting anything in a strip without wrong control
 SAME_POINT = 0.05  # of rejecting the rest of points of which a part is wrong: one identification makes both wrong
 LARGEST_SHARE = 0.5  # of the coordinates of plan or of height: nothing is said against a majority
-BENDS = ("XY", "X^2", "X^3")  # what a similarity leaves of the polynomials
+BENDS = tuple(term for term, (i, j) in terms.POWERS.items() if i + j > 1)  # what a similarity leaves
 HEIGHT = 2
 # The covariance of a strip takes most of a bend; what is left tells it all the same, as far as there are digits.
 ROUNDING = float(np.sqrt(np.finfo(float).eps))

@@ -1,4 +1,4 @@
-"""Ids of points: one id for two points, two ids for one point."""
+"""Ids of points: one id for two points, two ids for one point, the coordinates of one given for another."""
 
 from __future__ import annotations
 
