@@ -12,7 +12,13 @@ from tests.loops import nonempty
 from tests.source_tree import ROOT
 
 PYTHON = sys.executable  # loads what it runs
-pytestmark = pytest.mark.usefixtures("_quick_start")
+
+
+@pytest.fixture(autouse=True)
+def _copies(request: pytest.FixtureRequest) -> None:
+    """Let the programs be copies of a process that has loaded the libraries, but where there is none to run."""
+    if request.node.get_closest_marker("slow"):
+        request.getfixturevalue("_quick_start")
 
 
 def printed(program: str, *options: str, python: str = "") -> str:

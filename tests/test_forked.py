@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from tests.forked import Forks
 
+pytestmark = pytest.mark.slow  # starting what is copied takes 2 s, and nothing that is not slow needs it
+
 
 @pytest.mark.parametrize(
     ("code", "ending"),

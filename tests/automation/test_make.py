@@ -78,6 +78,7 @@ def test_the_depfile_lists_every_file_that_is_read(tmp_path: Path, strip: str, m
     assert done.returncode == 0
 
 
+@pytest.mark.slow
 def test_a_grid_that_is_far_away_is_listed_by_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     two_strips(tmp_path)
     grid = (tmp_path / "b/own.gtx").rename(tmp_path / "far.gtx")

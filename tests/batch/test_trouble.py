@@ -159,6 +159,7 @@ def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: pytest
     assert main(["batch", "strips", "-o", "out", "-q"]) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_quick_start")
 def test_the_lock_dies_with_its_process(here: Path) -> None:
     code = "import os, pathlib\nfrom photostrip.batch.result_folder import opened\n"

@@ -46,6 +46,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, st
 # --------------------------------------------------------------------------------------------- what comes out where
 
 
+@pytest.mark.slow
 def test_the_report_is_printed_and_nothing_else(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = sorted(project.parent.iterdir())
     code, out, err = run(capsys, "run", project)

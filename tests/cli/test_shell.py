@@ -151,6 +151,7 @@ def test_mandoc_has_nothing_to_say_but_that_there_is_no_date(tmp_path: Path) -> 
     assert [line for line in done.stdout.splitlines() if "missing date" not in line] == []
 
 
+@pytest.mark.slow
 def test_a_page_that_is_not_there_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["man", "rnu"]) == 2
     assert "there is no page of 'rnu'; there are batch" in capsys.readouterr().err

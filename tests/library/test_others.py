@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 FOLDER = ROOT / "sample_data/simulated-20"
 
 
+@pytest.mark.slow
 def test_a_result_against_its_baseline() -> None:
     result = photostrip.run(FOLDER / "project.yaml")
     same = photostrip.compare(result, FOLDER / "baseline.json")
@@ -47,6 +48,7 @@ def test_results_are_compared_as_mappings() -> None:
         photostrip.compare(result, {**baseline, "frame": {**baseline["frame"], "crs": "local"}})
 
 
+@pytest.mark.slow
 def test_a_simulation_needs_no_files(tmp_path: Path) -> None:
     simulation = photostrip.simulate(
         {}, flight={"photos": 6}, gross_errors=[{"kind": "control", "point": "G05", "axis": "z", "size_m": 3.0}]

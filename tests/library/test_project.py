@@ -61,6 +61,7 @@ def test_a_project_says_what_it_holds() -> None:
     assert project.files_read(photostrip.Result({}))[0] == SAMPLE
 
 
+@pytest.mark.slow
 def test_overrides_are_those_of_the_command(simulation: photostrip.Simulation) -> None:
     project = simulation.project
     plain = project.run()
@@ -95,6 +96,7 @@ def test_a_name_with_a_dot_is_one_key(simulation: photostrip.Simulation) -> None
     assert found.loaded.inputs.strips[0].camera.principal_distance == 152.9
 
 
+@pytest.mark.slow
 def test_a_project_in_memory_is_that_of_the_files(simulation: photostrip.Simulation) -> None:
     project, tables = in_memory(simulation)
     found = photostrip.run(project, tables=tables)
@@ -110,6 +112,7 @@ def test_a_project_in_memory_is_that_of_the_files(simulation: photostrip.Simulat
     assert again.document == found.document
 
 
+@pytest.mark.slow
 def test_data_frames_are_tables(simulation: photostrip.Simulation) -> None:
     pandas, pyarrow = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
     project, tables = in_memory(simulation)
@@ -120,6 +123,7 @@ def test_data_frames_are_tables(simulation: photostrip.Simulation) -> None:
         assert found.point_ids == expected.point_ids
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "specification",
     [

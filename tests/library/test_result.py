@@ -237,6 +237,7 @@ def test_reports_are_those_of_the_command(
         result.report(sections=["accuracies"])
 
 
+@pytest.mark.slow
 def test_files_are_those_of_the_command(tmp_path: Path) -> None:
     photostrip.run(SAMPLE).write(tmp_path / "library", html=True)
     assert main(["run", str(SAMPLE), "-o", str(tmp_path / "command"), "--html", "-q"]) == 0
@@ -258,6 +259,7 @@ def test_a_saved_result_is_read_again(result: photostrip.Result, tmp_path: Path)
         photostrip.read_result(tmp_path / "none.json")
 
 
+@pytest.mark.slow
 def test_the_trace_is_that_of_the_command(tmp_path: Path) -> None:
     assert main(["run", str(SAMPLE), "-q", "--trace", str(tmp_path / "trace.md")]) == 0
     assert photostrip.run(SAMPLE).trace("md") == (tmp_path / "trace.md").read_text(encoding="utf-8")

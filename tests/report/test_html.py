@@ -290,6 +290,7 @@ def test_ticks_are_round_and_inside() -> None:
 # ----------------------------------------------------------------------------------------------------- commands
 
 
+@pytest.mark.slow
 def test_run_and_report_write_the_same_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     project = write_project(tmp_path, spec())
     assert main(["run", str(project), "-o", str(tmp_path / "out"), "--html", "--quiet"]) == 0

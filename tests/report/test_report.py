@@ -70,6 +70,7 @@ def paths(value: object, path: str = "") -> Iterator[str]:
         yield path
 
 
+@pytest.mark.slow
 def test_the_saved_result_has_the_keys_of_a_fresh_one() -> None:
     """If not, renew with ``python -m tests.reports result``."""
     assert set(paths(saved())) == set(paths(fresh()))

@@ -561,6 +561,7 @@ def test_natural_order() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_order_of_the_rows_does_not_matter() -> None:
     inputs = case("projected", 2).inputs
     o = inputs.observations

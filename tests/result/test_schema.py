@@ -41,11 +41,13 @@ def results() -> Iterator[dict[str, Any]]:
     yield as_lists(document_of(triangulate(strips, Settings())))
 
 
+@pytest.mark.slow
 def test_every_result_keeps_the_schema() -> None:
     for document in nonempty(list(results())):
         assert faults(document) == []
 
 
+@pytest.mark.slow
 def test_the_schema_is_one() -> None:
     VALIDATOR.check_schema(SCHEMA)
 

@@ -73,6 +73,7 @@ def moved(points: int, metres: float, axis: int = 0, adjustment: str = "polynomi
     return solved(replace(inputs, control=replace(inputs.control, enu=enu)), Settings(adjustment=adjustment)).document
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adjustment", ["polynomial", "covariance", "bundle"])
 def test_check_points_beyond_their_standard_deviations_are_not_good(adjustment: str) -> None:
     sound = moved(0, 0.0, adjustment=adjustment)

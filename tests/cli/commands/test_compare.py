@@ -305,6 +305,7 @@ def test_a_broken_baseline_does_not_hide_the_others(folders: Path, capsys: pytes
     assert "::error file=base/a/baseline.json,line=1,title=photostrip result-json::" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_update_writes_the_baselines_of_a_folder(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folders / "base/b/baseline.json").write_bytes((folders / "other.json").read_bytes())
     assert main(["compare", "all", "new", "--update"]) == 0

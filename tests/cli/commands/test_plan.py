@@ -502,6 +502,7 @@ def test_a_wrong_survey_is_refused(
 # ------------------------------------------------------------------------------------------------------- screening
 
 
+@pytest.mark.slow
 def test_screening_from_options_and_from_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     options = ["--zone-points", "3,3,3,3,3,3", "--sizes-um", "50,100", "--methods", "tau,auto", "--repetitions", "1"]
     from_options = answer(capsys, "plan", "screening", *options, "--format", "json")

@@ -61,6 +61,7 @@ def test_a_bundle_leaves_the_list_out_as_a_whole(shift: tuple[float, float, floa
     assert set(given[screened.problem.control.frame == 0].tolist()) == {3}
 
 
+@pytest.mark.slow
 def test_camera_positions_say_which_list_is_wrong() -> None:
     """The longer one: the shorter went before."""
     simulation = simulate(Spec(seed=3, flight=Flight(photos=10), control=Control(bands=4), gnss=Gnss()))

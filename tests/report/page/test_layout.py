@@ -39,6 +39,7 @@ SECTIONS = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(WORDS, st.lists(SECTIONS, max_size=3), st.integers(0, 300), st.booleans())
 def test_no_line_is_wider_than_the_page_or_ends_in_a_blank(
     title: str, sections: list[Section], width: int, ascii_only: bool
