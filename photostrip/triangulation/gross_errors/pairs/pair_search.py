@@ -66,7 +66,7 @@ def search(
 
     given: pairs oriented by least squares on all points.
     stated: standard deviation of a y parallax, mm; where what is left contradicts it, a larger one is used.
-    doubtful: (p,), pairs whose elements cannot be used as they are; they are searched whatever the test says.
+    doubtful: (p,), pairs whose elements cannot be used as they are, to be searched whatever the test says.
     start: begin with the robust elements.
     sets: look for sets of points that explain the misfit together; without it the worst goes alone.
     spoiled: as in ``ParallaxScatter.of``.
@@ -176,7 +176,10 @@ def _alike(todo: Numbers, count: Numbers) -> list[Numbers]:
 
 
 def _agreeing(part: Orientation, found: RobustElements) -> Orientation:
-    """Give pairs, at their robust elements, the points alone that agree with these."""
+    """Give pairs the points alone that agree with their robust elements.
+
+    Of a fifth of wrong points their scatter becomes 1.1 to 1.2 times as large, with all points 1.4 to 1.5 times.
+    """
     pairs = part.pairs
     with np.errstate(invalid="ignore"):
         inside = np.abs(part.parallax) * np.sqrt(pairs.weight) <= TUNING * found.scale[pairs.pair]

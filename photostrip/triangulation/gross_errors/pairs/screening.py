@@ -107,12 +107,11 @@ def screen_pairs(
         result = result.with_pairs(lost, orientation.take(lost))
     else:
         result, log = _sequential(orientation, settings, sigma, behind)
-    masked = found.test.failing(result)
     return ScreenedPairs(
         orientation=result,
         rejections=_completed(log, result),
         scatter=found.scatter,
-        masked=masked,
+        masked=found.test.failing(result),
         converged=sound,
     )
 
