@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isclose
+from os.path import normpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +69,8 @@ def verify(result: Path, project: Path | None = None) -> Document:
 def _found(folder: Path, certificate: Document) -> Path | None:
     """Return the project file that has the content which the certificate gives."""
     wanted = {each["sha256"]: each["file"] for each in certificate["inputs"]}
-    for place in (folder, folder.parent, Path()):
+    above = [Path(normpath(folder / up)) for up in ("..", "../..")]  # methods side by side have folders of their own
+    for place in (folder, *above, Path()):
         for path in sorted(place.glob("*.yaml")):
             content = path.read_bytes() if path.is_file() else b""
             if "/" not in wanted.get(digest(content), "/") and path.name in wanted.values():

@@ -94,6 +94,16 @@ def test_what_was_overridden_is_overridden_again(copied: Path, adjustment: str) 
     assert (found["status"], found["words"]) == ("same", [])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("working", "result"), [("result", "."), ("result", "result.json"), (".", "result/bundle")])
+def test_the_project_is_found_above_the_result(
+    copied: Path, monkeypatch: pytest.MonkeyPatch, working: str, result: str
+) -> None:
+    shutil.copytree(copied / "result", copied / "result" / "bundle")  # as --compare-methods writes them
+    monkeypatch.chdir(copied / working)
+    assert verify(Path(result))["status"] == "same"
+
+
 def test_a_file_that_has_changed_is_named(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with (copied / "control.csv").open("a", encoding="utf-8") as file:
         file.write("\n")  # changes the content and no number
