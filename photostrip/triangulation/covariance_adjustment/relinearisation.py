@@ -12,6 +12,7 @@ Source: derived; see docs/precision.md, eq. 3 and 7.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,12 +48,13 @@ def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Float
 
     The first model of each row is held fast: dX = sum K(s) u(first + s) + D v (eq. 3).
     """
-    components = np.zeros((errors.models + rows.by_component.shape[1], COMPONENTS))
-    for slot in range(SPAN):
-        model = errors.images.photo - REACH + slot
-        inside = np.flatnonzero((model >= 0) & (model < errors.models))
-        moved = images[inside, None] @ errors.images.components[inside, :, slot]
-        np.add.at(components, model[inside], moved[:, 0])
+    points = errors.images
+    ends = np.searchsorted(points.photo, np.arange(errors.models + 2)).tolist()
+    components = np.zeros((REACH + errors.models + rows.by_component.shape[1], COMPONENTS))  # from model -REACH on
+    for photo, (start, stop) in enumerate(pairwise(ends)):
+        moved = images[start:stop].ravel() @ points.components[start:stop].reshape(-1, SPAN * COMPONENTS)
+        components[photo : photo + SPAN] += moved.reshape(SPAN, COMPONENTS)
+    components = components[REACH:]
     result = np.zeros(rows.by_similarity.shape[:2])
     for slot in range(rows.by_component.shape[1]):
         result += (rows.by_component[:, slot] @ components[rows.first + slot, :, None])[:, :, 0]
