@@ -40,9 +40,7 @@ BEND_POWER = 1.5  # of the number of photos: so does the bend of a strip grow, w
 TRIALS = 3  # of forming a strip anew
 GIVEN_UP_MISFIT = 60.0  # misfit after two of them
 MOST_PHOTOS = 40  # photos: a longer strip would take too long
-MOST_POINTS = (
-    20_000  # image points of all strips formed for trials: of 20 photos with 200 points two starts are followed
-)
+MOST_POINTS = 10_000  # image points of all strips formed for trials: of 20 photos with 100 points one start is followed
 FACTOR_RANGE = (0.05, 5.0)  # of the principal distance given
 FIX = "take it from the certificate"
 FIRST_FACTORS = (1.4, 0.7, 2.0, 0.5, 0.1)  # tried when the pairs cannot be oriented at all
@@ -85,7 +83,7 @@ def find_wrong_distance(
     no_bend = first.misfit > len(formed.strip.photos) ** BEND_POWER
     if not (stretched or no_bend or sigma0 > ASKING_SIGMA0 * stated):
         return []
-    for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(formed.strip, observations)]:
+    for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(observations)]:
         trial = _followed(formed.strip, observations, settings, compare, start)
         if trial is None or trial.misfit > LEFT_SHARE * first.misfit or trial.sigma0 > MOST_SIGMA0_RATIO * sigma0:
             continue
@@ -106,7 +104,7 @@ def find_distance_without_pairs(
     strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare
 ) -> list[Finding]:
     """Try other principal distances on a strip whose pairs cannot be oriented (P105, at most one)."""
-    most = _most_starts(strip, observations) if len(strip.photos) <= MOST_PHOTOS else 0
+    most = _most_starts(observations) if len(strip.photos) <= MOST_PHOTOS else 0
     for start in FIRST_FACTORS[:most]:
         trial = _followed(strip, observations, settings, compare, start)
         if trial is not None and trial.misfit < LEAST_MISFIT:
@@ -115,10 +113,9 @@ def find_distance_without_pairs(
     return []
 
 
-def _most_starts(strip: Strip, observations: PhotoPoints) -> int:
-    """Count the starts that a strip with so many points allows."""
-    points = int((strip.positions(observations) >= 0).sum())
-    return max(MOST_POINTS // (TRIALS * max(points, 1)), 1)
+def _most_starts(observations: PhotoPoints) -> int:
+    """Count the starts that a project with so many points allows each of its strips."""
+    return max(MOST_POINTS // (TRIALS * max(len(observations.point), 1)), 1)
 
 
 def _middle_sigma0(formed: EvidenceStrip) -> float:
