@@ -66,20 +66,18 @@ class Layout(NamedTuple):
     columns: int
     height: float  # of a panel
     number: int
-    top: float = TOP
-    bottom: float = BOTTOM
 
     @property
     def whole(self) -> float:
         """Return the height of the picture."""
         rows = math.ceil(self.number / self.columns)
-        return self.top + rows * self.height + (rows - 1) * (self.bottom + 24.0) + self.bottom
+        return TOP + rows * self.height + (rows - 1) * (BOTTOM + 24.0) + BOTTOM
 
     def panel(self, place: int, x: tuple[float, float], y: tuple[float, float]) -> Panel:
         row, column = divmod(place, self.columns)
         width = (WIDTH - LEFT - RIGHT - (self.columns - 1) * GAP) / self.columns
         left = LEFT + column * (width + GAP)
-        top = self.top + row * (self.height + self.bottom + 24.0)
+        top = TOP + row * (self.height + BOTTOM + 24.0)
         return Panel(
             svg.Axis(low=x[0], high=x[1], start=left, end=left + width),
             svg.Axis(low=y[0], high=y[1], start=top + self.height, end=top),

@@ -34,15 +34,15 @@ class Sheet(NamedTuple):
         ) * self.scale
 
 
-def sheet_of(places: Sequence[Pair], margin: float, width: float = WIDTH, left: float = 0.0) -> Sheet:
+def sheet_of(places: Sequence[Pair], margin: float) -> Sheet:
     """Fit all places on the picture, with a margin around them."""
     along, across = [each[0] for each in places], [each[1] for each in places]
     length, depth = max(along) - min(along), max(across) - min(across)
-    scale = min((width - 2 * margin) / max(length, 1e-9), (HIGHEST - TOP - 2 * margin) / max(depth, 1e-9))
+    scale = min((WIDTH - 2 * margin) / max(length, 1e-9), (HIGHEST - TOP - 2 * margin) / max(depth, 1e-9))
     height = max(TOP + 2 * margin + depth * scale + FOOT, LOWEST)
     return Sheet(
         low=(min(along), min(across)),
-        origin=(left + (width - length * scale) / 2, height - FOOT - margin),
+        origin=((WIDTH - length * scale) / 2, height - FOOT - margin),
         scale=scale,
         height=height,
     )

@@ -10,7 +10,7 @@ from photostrip.notes import counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
 from photostrip.report.pictures.ground.plan_view import middle
-from photostrip.report.pictures.ground.sheet import Sheet, bars, ids, north_arrow, sheet_of
+from photostrip.report.pictures.ground.sheet import bars, ids, north_arrow, sheet_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -75,7 +75,7 @@ def _shared(rows: Iterable[tuple[str, list[str]]]) -> Counter[tuple[str, str]]:
 
 
 def _picture(plan: Plan, nodes: dict[str, Pair], ties: list[Tie], what: str) -> Picture:
-    sheet: Sheet = sheet_of(list(nodes.values()), MARGIN)
+    sheet = sheet_of(list(nodes.values()), MARGIN)
     at = {name: sheet.place(place) for name, place in nodes.items()}
     strongest = max(tie.points for tie in ties)
     radius = 4.0 if len(nodes) <= MOST_PHOTOS / 3 else 2.5
