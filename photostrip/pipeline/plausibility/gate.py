@@ -93,7 +93,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     in_metres = not any(each.is_error for each in findings)
     if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
         checks = inputs.control.check
-        findings += units.find_wrong_sigmas_of_given(predicted.off[checks], predicted.sigma[checks])
+        findings += units.find_wrong_sigmas_of_given(predicted.off[checks], inputs.control.sigma[checks])
     for ties in compared_strips(stages, points.point_ids):
         findings += tied_strips.find_shared_ids_of_strips(ties)
     findings += given_cameras.centers(inputs, points, images.strips, directory)

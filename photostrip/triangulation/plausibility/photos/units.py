@@ -221,7 +221,7 @@ def find_wrong_sigmas(sigma0: Floats, stated: float, strip: str) -> list[Finding
 def find_wrong_sigmas_of_given(off: Floats, sigma: Floats) -> list[Finding]:
     """Look for standard deviations of given coordinates in another unit (P108).
 
-    off, sigma: (c, 3), how far check points are off, and what is expected of that, metres; NaN where not known.
+    off, sigma: (c, 3), how far check points are off, and their own standard deviations, metres; NaN where not known.
     """
     for columns, name in (([0, 1], "plan"), ([2], "height")):
         known = np.isfinite(off[:, columns] / sigma[:, columns]).all(axis=1)
@@ -230,8 +230,8 @@ def find_wrong_sigmas_of_given(off: Floats, sigma: Floats) -> list[Finding]:
         middle, expected = (float(np.median(np.abs(each[known][:, columns]))) for each in (off, sigma))
         if middle < expected / TOO_GOOD:
             message = (
-                f"check points are {middle:.3g} m off in {name}, less than a thirtieth of what their standard "
-                f"deviations let expect ({expected:.3g} m)"
+                f"check points are {middle:.3g} m off in {name}, less than a thirtieth of the standard deviation that "
+                f"is given for them ({expected:.3g} m)"
             )
             evidence = {"off_m": middle, "expected_m": expected, "points": int(known.sum())}
             fix = "give `sigma` of the control in metres"
