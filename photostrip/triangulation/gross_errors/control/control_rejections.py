@@ -81,11 +81,10 @@ def control_rejections(strip: StripAtControl, found: Found, rows: Numbers) -> li
 
 
 def reliability(strip: StripAtControl, found: Found) -> tuple[Floats, Floats]:
-    """Redundancy numbers of all coordinates, and smallest errors found in 80 % of cases, (n, 3) each."""
+    """Redundancy numbers M_ii / (D^-1)_ii [Schaffrin 1997], and smallest errors found in 80 % of cases, (n, 3) each."""
     redundancy, detectable = np.full((2, *strip.control.use.shape), np.nan)
     left, place = found.left, strip.coordinates
-    share = (left.matrix / np.outer(1 / left.size, 1 / left.size))[: left.coordinates, : left.coordinates]
-    redundancy[place.point, place.axis] = np.einsum("ij,ji->i", share, left.covariance)
+    redundancy[place.point, place.axis] = left.matrix.diagonal()[: left.coordinates]
     stay = [column for column in range(left.coordinates) if column not in found.coordinates]
     gone = [
         (found.whole.without([other for other in found.out if other != column]), [column])

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SEEDS = st.integers(0, 2**31)
+DESIGN = [1, 1, 1, 1e3, 1e3, 1e3, 1e2]  # sizes of the columns of a similarity
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,7 @@ def drawn(seed: int, points: int = 8, worse: float = 1.0) -> Drawn:
     rng = np.random.default_rng(seed)
     w = 3 * points
     root = rng.normal(0, 0.15, (w, w)) + 2 * np.eye(w)
-    design = rng.normal(0, 1, (w, 7)) * [1, 1, 1, 1e3, 1e3, 1e3, 1e2]
+    design = rng.normal(0, 1, (w, 7)) * DESIGN
     point, axis = np.repeat(np.arange(points), 3), np.tile(np.arange(3), points)
     nothing = cast("Any", None)
     rows = ErrorRows.without_images(point, np.zeros((w, 1, 7)), np.zeros((w, 0, 1, 0)))
@@ -155,11 +156,29 @@ def test_what_checks_itself_too_little_is_left_alone() -> None:
     assert found.kept.use.all()
 
 
-def test_redundancy_numbers_add_up_and_an_error_found_in_four_of_five_cases_is_as_least_squares_says() -> None:
+@pytest.mark.parametrize("bent", [0.0, 1e4])
+def test_redundancy_numbers_lie_between_0_and_1_however_much_the_points_have_in_common(bent: float) -> None:
+    """Against the definition for correlated observations, and of independent ones they add up to the redundancy."""
+    strip, bend = drawn(3), bent * np.random.default_rng(4).normal(0, 1, (24, 2))
+    covariance = strip.covariance(np.arange(24)) + bend @ bend.T
+    for given_covariance in (covariance, np.diag(covariance.diagonal())):
+        redundancy, _ = reliability(strip, Found(adjust(strip, strip.w, given_covariance), ()))
+        q, _ = np.linalg.qr(
+            solve_triangular(root := cholesky(given_covariance, lower=True), strip.design / DESIGN, lower=True)
+        )
+        back = np.linalg.inv(root)
+        left = back - q @ (q.T @ back)  # of a unit error of each coordinate, in independent ones
+        expected = (left**2).sum(axis=0) / (back**2).sum(axis=0)
+        assert redundancy.ravel() == pytest.approx(expected, abs=1e-6)
+        assert redundancy.min() > 0
+        assert redundancy.max() < 1
+    assert redundancy.sum() == pytest.approx(24 - 7, rel=1e-6)
+
+
+def test_an_error_found_in_four_of_five_cases_is_as_least_squares_says() -> None:
     strip = drawn(3)
     whole = adjusted_jointly(strip)
-    redundancy, detectable = reliability(strip, Found(whole, ()))
-    assert redundancy.sum() == pytest.approx(24 - 7, rel=1e-6)
+    _, detectable = reliability(strip, Found(whole, ()))
     after, _, sigma = squares(strip, (5,))
     limit = np.sqrt(f_distribution.isf(whole.level, 1, 16))
     assert detectable[1, 2] == pytest.approx((limit + norm.ppf(0.8)) * sigma[0] * max(1, after / 16) ** 0.5, rel=1e-5)
