@@ -290,6 +290,19 @@ def test_check_tells_links_that_cannot_be(tmp_path: Path, models: str, code: str
     assert code in {fault.code for fault in check_project(tmp_path / P).faults}
 
 
+def test_check_tells_models_whose_link_no_equation_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows of pure noise may lead there."""
+
+    def singular(*_: object) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr("photostrip.triangulation.independent_models.linking.np.linalg.inv", singular)
+    sample(tmp_path, FILES)
+    (fault,) = check_project(tmp_path / P).faults
+    assert fault.code == "singular"
+    assert "cannot be linked" in fault.message
+
+
 def test_a_check_tells_rows_with_and_without_standard_deviations_of_their_own(tmp_path: Path) -> None:
     rows = MODELS.splitlines()
     own = [f"{row},0.02,0.02,0.03" if number in {1, 4, 5} else f"{row},,," for number, row in enumerate(rows)]

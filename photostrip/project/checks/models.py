@@ -31,6 +31,11 @@ def links_of_models(project: Project, models: MeasuredModels) -> Iterator[Fault]
             form_models(strip, models.points, project.settings)
         except GeometryError as error:
             yield fault_at(project.tree, ("strips", number, "id"), str(error), error.code)
+        except np.linalg.LinAlgError as error:
+            message = (
+                f"neighbouring models of strip {strip.id} cannot be linked: their coordinates contradict each other"
+            )
+            yield fault_at(project.tree, ("strips", number, "id"), f"{message} ({error})", "singular")
         except InputError as error:
             for fault in error.faults:
                 words = {"expected": fault.expected, "fix": fault.fix}
