@@ -54,7 +54,7 @@ def deformation_pictures(document: Document, plan: Plan) -> list[Picture]:
     drawn: list[str] = []
     for row, strip in enumerate(shown):
         for column, axis in enumerate(AXES):
-            drawn += _panel(layout, 3 * row + column, strip, axis, several=len(document["strips"]) > 1)
+            drawn += _panel(layout, 3 * row + column, strip, axis, len(document["strips"]))
     roles = [role for role in ("control", "check") if any(spot.role == role for s in shown for spot, *_ in s.after)]
     entries = [Entry(WORDS[role], f"mark {role}", SHAPES[role]) for role in roles]
     if any(strip.before for strip in shown):
@@ -62,7 +62,8 @@ def deformation_pictures(document: Document, plan: Plan) -> list[Picture]:
     if any(strip.curve for strip in shown):
         entries.append(polynomial_entry(document))
     drawn += legend(entries)
-    caption = "Differences at given points along each strip, along it, across it and in height: adjusted minus given"
+    line = "each strip" if document["strips"] else "the line from the first photo to the last"
+    caption = f"Differences at given points along {line}, along it, across it and in height: adjusted minus given"
     if any(strip.before for strip in shown):
         caption += "; circles: strip minus given after the similarity alone"
     if any(strip.curve for strip in shown):
@@ -75,7 +76,7 @@ def deformation_pictures(document: Document, plan: Plan) -> list[Picture]:
     if sizes:
         largest, name, axis = max(sizes)
         words += f"; the largest difference is {largest:.3f} m at {name}, {axis}"
-    title = "Differences along the strip" + (", before and after" if any(strip.before for strip in shown) else "")
+    title = "Differences at given points" + (", before and after" if any(strip.before for strip in shown) else "")
     texts = svg.Texts(title, f"{caption}.", f"{words}.")
     return [svg.picture("deformation", (WIDTH, layout.whole), texts, drawn)]
 
@@ -153,7 +154,7 @@ def _largest(strip: Strip) -> float:
     return max((abs(part) for *_, parts in strip.after for part in parts if part is not None), default=0.0)
 
 
-def _panel(layout: Layout, place: int, strip: Strip, axis: str, *, several: bool) -> list[str]:
+def _panel(layout: Layout, place: int, strip: Strip, axis: str, strips: int) -> list[str]:
     number = AXES.index(axis)
     before = [(each.id, each.at, each.parts[number]) for each in strip.before]
     after = [(spot, at, parts[number]) for spot, at, parts in strip.after]
@@ -163,8 +164,8 @@ def _panel(layout: Layout, place: int, strip: Strip, axis: str, *, several: bool
     reach = [*(each[1] for each in before), *(each[1] for each in after)]
     hints = len(after) <= MOST_HINTS
     panel = layout.panel(place, span((x / 1000 for x in (*strip.ends, *reach)), zero=False, room=0.02), span(sizes))
-    title = f"strip {strip.id}, {axis}" if several else axis
-    drawn = framed(panel, ("km along the strip", "m"), title)
+    title = f"strip {strip.id}, {axis}" if strips > 1 else axis
+    drawn = framed(panel, ("km along the strip" if strips else "km from the first photo", "m"), title)
     if curve:
         drawn.append(steps(panel, [(x / 1000, size) for x, size in curve], "curve curve-2"))
     drawn += [
