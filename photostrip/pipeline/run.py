@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from photostrip.pipeline.inputs import Inputs, Settings
+    from photostrip.pipeline.results import Bundle
     from photostrip.pipeline.strips.photos import FormedPhotos
     from photostrip.points import PhotoPoints
 
@@ -69,8 +71,8 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     # 2-5 relative orientation, base direction and orientation chain, space intersection, strip formation
     formed = form_strips(inputs, refined.observations, settings)
 
-    def on_the_ground(inputs: Inputs) -> Result:
-        adjusted = _adjusted(inputs, settings, ground, refined.observations, formed)
+    def on_the_ground(inputs: Inputs, before: Bundle | None = None) -> Result:
+        adjusted = _adjusted(inputs, settings, ground, refined.observations, formed, before)
         # 9 residuals, check points
         rows, differences = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
         return Result(
@@ -100,7 +102,9 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
 
     result = on_the_ground(inputs)
     # 10 what the result says of control that it has not seen
-    return replace(result, folds=cross_validate(result, on_the_ground)) if settings.cross_validation else result
+    if not settings.cross_validation:
+        return result
+    return replace(result, folds=cross_validate(result, partial(on_the_ground, before=result.bundle)))
 
 
 def _adjusted(
@@ -109,13 +113,15 @@ def _adjusted(
     ground: GroundFrames,
     observations: PhotoPoints,
     formed: Sequence[StripStage[Any]],
+    before: Bundle | None,
 ) -> AdjustedStrips:
     """Bring formed strips to the ground and adjust them, each by itself or all in a bundle."""
     control = measured_control(inputs.control, observations)
     if settings.adjustment == "bundle" and inputs.models is None:
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
-        return adjust_block(inputs, settings, observations, control, ground, cast("Sequence[FormedPhotos]", formed))
+        stages = cast("Sequence[FormedPhotos]", formed)
+        return adjust_block(inputs, settings, observations, control, ground, stages, before)
     # 6-7 intermediate frame, absolute orientation
     oriented = [orient_on_control(strip, control, ground.control, settings.absolute) for strip in formed]
     screened = [reject_wrong_control(strip, settings) for strip in oriented]

@@ -25,6 +25,7 @@ from photostrip.triangulation.gross_errors.rays import snooping
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from photostrip.arrays import Flags
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
@@ -45,15 +46,19 @@ def adjust_block(
     control: ControlPoints,
     ground: GroundFrames,
     stages: Sequence[FormedPhotos],
+    before: Bundle | None = None,
 ) -> AdjustedStrips:
     """Adjust all strips of a project together.
 
     stages: strips of two photos or more, which give the start.
+    before: the same block with more control; the search for gross errors starts with the rays that it left.
     Raises GeometryError when a strip, a photo or the datum cannot be determined, by name.
     """
     known = known_of(inputs, control, ground)
     start = block_start.start(inputs, settings, stages, observations, known)
     block = block_problem.build(inputs, settings, observations, control, ground, start)
+    if before is not None:
+        block = replace(block, begin=replace(block.begin, images=_rays_left(block, before, len(observations))))
     try:
         block = _refilled(block, control, ground.control)
         screened = snooping.screen_bundle(block.problem, block.begin, settings.bundle, block.kept)
@@ -74,6 +79,14 @@ def adjust_block(
         return replace(adjusted, precision=None)
     checks = check_errors(bundle, adjusted, inputs.control, ground.control)
     return replace(adjusted, precision=replace(adjusted.precision, checks=(checks,)))
+
+
+def _rays_left(block: BlockProblem, before: Bundle, measured: int) -> Flags:
+    """Rays that an adjustment with more control left; those of points that have none now start as if it were not."""
+    inside = np.zeros(measured, bool)
+    inside[before.block.rows[before.screened.selection.images]] = True
+    lost = np.setdiff1d(before.block.problem.control.point, block.problem.control.point)
+    return np.where(np.isin(block.problem.images.point, lost), block.begin.images, inside[block.rows])
 
 
 def _refilled(block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame]) -> BlockProblem:

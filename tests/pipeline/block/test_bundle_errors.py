@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.formats.output.simulation import inputs_of
+from photostrip.formats.output.simulation import inputs_of, settings_of
+from photostrip.pipeline import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
 from photostrip.triangulation.bundle.quality import reliability
@@ -84,6 +85,22 @@ def test_many_errors_at_once(method: str) -> None:
     assert not wrong & used
     assert len(used) > 0.85 * (len(result.inputs.observations) - len(wrong))  # a wrong ray of two takes the other along
     assert np.sqrt((errors(simulation, result) ** 2).mean()) < 0.15
+
+
+@pytest.mark.slow
+def test_control_left_out_in_turn_starts_from_the_rays_that_are_left() -> None:
+    """Fewer adjustments than the run without the point, and the same rays take part."""
+    simulation = simulate(replace(BLOCK, gross_errors=(GrossError("image", count=60, size_um=400.0, axis="y"),)))
+    inputs, settings = inputs_of(simulation), replace(settings_of(simulation), adjustment="bundle")
+    folds = triangulate(inputs, replace(settings, cross_validation=True)).folds
+    for fold in nonempty(folds[:2]):
+        check = inputs.control.check | np.isin(inputs.control.ids, fold.left_out)
+        alone = triangulate(replace(inputs, control=replace(inputs.control, check=check)), settings)
+        assert fold.result is not None
+        assert fold.result.bundle is not None
+        assert alone.bundle is not None
+        assert rays_of(fold.result) == rays_of(alone)
+        assert fold.result.bundle.screened.rounds < alone.bundle.screened.rounds
 
 
 @pytest.mark.slow

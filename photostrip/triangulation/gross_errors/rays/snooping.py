@@ -51,6 +51,7 @@ if TYPE_CHECKING:
 
 
 OUT_TO_ONE_MORE = 8
+RAYS_OUT = 4  # of a photo, to one more point of it that goes at a time
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
@@ -111,8 +112,7 @@ def screen_bundle(
     done = search.clean(chosen)
     while (more := search.fitting(done)) is not None:  # a point comes back once only
         done = search.clean(more)
-    log = tuple(search.log(done))
-    return replace(done, rejections=log, rounds=search.rounds, common=tuple(search.common))
+    return replace(done, rejections=tuple(search.log(done)), rounds=search.rounds, common=tuple(search.common))
 
 
 class _Search:
@@ -265,12 +265,13 @@ class _Search:
         return np.where(self.spared | within, 0.0, worst)
 
     def _worst_nearby(self, selection: Selection, value: Floats) -> Flags:
-        """Doubtful points of which no other on the same photos is worse."""
+        """Doubtful points among the worst on each of their photos: one, and more the more rays of the photo are out."""
         photo, point = self.problem.images.photo[selection.images], self.problem.images.point[selection.images]
-        on_photo, near = np.zeros(self.problem.photos), np.zeros(self.problem.points)
-        np.maximum.at(on_photo, photo, value[point])
-        np.maximum.at(near, point, on_photo[photo])
-        return np.asarray((value > 0.0) & (value >= near), bool)
+        more = np.bincount(self.problem.images.photo[~selection.images], minlength=self.problem.photos) // RAYS_OUT
+        order = np.lexsort((-value[point], photo))
+        worse = np.arange(len(order)) - np.searchsorted(photo[order], photo[order])
+        wait = point[order[worse > more[photo[order]]]]
+        return np.asarray((value > 0.0) & ~np.isin(np.arange(len(value)), wait), bool)
 
     def _wrong_rays(self, done: ScreenedBundle, point: int, limit: Limit) -> list[Rejection]:
         """Return the rays of a point that must go; all where none of them alone does it."""

@@ -103,6 +103,20 @@ def test_a_point_comes_back_once_the_limit_has_risen_above_it(
     assert (more is not None and more.images.all()) == back
 
 
+def test_the_more_rays_of_a_photo_are_out_the_more_go_at_a_time() -> None:
+    """A tenth of the rays wrong: 91 adjustments with one point of a neighbourhood at a time, and the same rays go."""
+    result = adjusted(simulate(Spec(flight=Flight(photos=4, strips=2), points=Points(extra_per_model=60))))
+    assert result.bundle is not None
+    problem, rng = result.bundle.block.problem, np.random.default_rng(5)
+    wrong = rng.random(len(problem.images)) < 0.1
+    xy = problem.images.xy + wrong[:, None] * rng.normal(0.0, 0.3, (len(wrong), 2))
+    spoiled = replace(problem, images=replace(problem.images, xy=xy))
+    done = snooping.screen_bundle(spoiled, Selection.everything(spoiled), BundleSettings())
+    assert done.rounds < 50
+    assert (wrong & done.selection.images).sum() <= 2
+    assert (~wrong & ~done.selection.images).sum() < wrong.sum() / 2  # a wrong ray of two takes the other along
+
+
 def test_a_search_ends_where_eight_adjustments_fail(problem: BundleProblem, monkeypatch: pytest.MonkeyPatch) -> None:
     """A block of exchanged points was adjusted 132 times, 110 times in vain: a point was spared each time."""
     rows = [int(rays_of(problem, point)[0]) for point in range(20)]
