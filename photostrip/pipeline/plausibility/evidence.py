@@ -41,7 +41,6 @@ BREADTH_SHARE = 0.95  # of the image points lie within the half breadth of a str
 LEAST_OF_PLANE = 4
 LEAST_RAYS = 2  # photos that must show a given point
 OBLIQUE_DEG = 20.0  # between the cameras and the normal of the ground: more than a tilt, or a slope
-FLAT_SHARE = 0.3  # third over second extent of the points of a strip whose ground has a normal
 MOSAIC_SIGMA = 0.02  # of the flying height: what relief and tilts leave in a mosaic
 AT_A_TIME = 256  # given points whose nearest photo is looked for together
 
@@ -54,32 +53,22 @@ class EvidenceStrip:
     orientation: Orientation
     formed: FormedStrip
 
-    @cached_property
-    def up(self) -> Floats:
-        """Upwards, of length one: where the cameras look from, or the normal of the ground below an oblique mount."""
-        rotations, inside = self.formed.rotations, np.isfinite(self.formed.xyz).all(axis=1)
-        axis = looking = _mean_direction(rotations[:, :, 2])
-        if len(rotations) > LONG_STRIP:  # its middle: the Earth's curvature bends 500 km more than a strip is broad
-            first = (len(rotations) - STRETCH_PHOTOS) // 2
-            pair = self.orientation.pairs.pair
-            near = self.orientation.point[(pair >= first) & (pair < first + STRETCH_PHOTOS - 1)]
-            inside = inside & np.isin(self.formed.point, near)
-            looking = _mean_direction(rotations[first : first + STRETCH_PHOTOS, :, 2])
-        points = self.formed.xyz[inside]
-        if len(points) < LEAST_OF_PLANE:
-            return axis
-        _, extent, directions = np.linalg.svd(points - np.median(points, axis=0), full_matrices=False)
-        normal = directions[2] * np.sign(directions[2] @ looking)
-        is_oblique = normal @ looking < np.cos(np.radians(OBLIQUE_DEG)) and extent[2] < FLAT_SHARE * extent[1]
-        return np.asarray(normal, float) if is_oblique else axis
-
     @property
+    def up(self) -> Floats:
+        """Where the cameras look from, of length one."""
+        return _mean_direction(self.formed.rotations[:, :, 2])
+
+    @cached_property
     def axes(self) -> Floats:
-        """Third axes of the photos (n, 3); under an oblique mount what is upwards for all."""
+        """Upwards at each photo (n, 3): its third axis, or below an oblique mount the normal of the ground for all."""
         axes = self.formed.rotations[:, :, 2]
-        mean = axes.mean(axis=0)
-        straight = self.up @ mean / max(float(np.linalg.norm(mean)), 1e-12) > np.cos(np.radians(OBLIQUE_DEG))
-        return axes if straight else np.broadcast_to(self.up, axes.shape)
+        points = self.formed.xyz[np.isfinite(self.formed.xyz).all(axis=1)]
+        if len(axes) > LONG_STRIP or len(points) < LEAST_OF_PLANE:  # a long strip bends more than it is broad
+            return axes
+        normal = np.linalg.svd(points - np.median(points, axis=0), full_matrices=False)[2][2]
+        looking = float(normal @ self.up)
+        is_oblique = abs(looking) < np.cos(np.radians(OBLIQUE_DEG))
+        return np.broadcast_to(normal * np.sign(looking), axes.shape) if is_oblique else axes
 
     @property
     def depth(self) -> Floats:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
     from photostrip.triangulation.plausibility.finding import Evidence
 
-SHOWN_SIGMAS = 4.0  # standard deviations from which a shift in plan is one
-
 
 def find_shared_errors(
     strips: Sequence[StripResult], findings: Sequence[Finding], *, joined: bool = False
@@ -53,7 +51,7 @@ def shifted_list(shared: ShiftedList, control: ControlPoints, whose: str, strips
 
     control: control that counts, of all lists.
     """
-    plan = bool((np.abs(shared.shift) > SHOWN_SIGMAS * shared.sigma)[:2].any())
+    plan = GROUND_AXES[int(np.nanargmax(np.abs(shared.shift) / shared.sigma))] != "up"  # what stands out most
     steps = [
         f"{step:+.2f} m {axis} (standard deviation {sigma:.2g} m)"
         for step, sigma, axis in zip(shared.shift, shared.sigma, GROUND_AXES, strict=True)

@@ -28,7 +28,7 @@ def test_the_depth_is_the_height_above_the_mean_of_the_points_of_a_model() -> No
 
 
 @pytest.mark.parametrize(("degrees", "by_ground"), [(10.0, False), (45.0, True)])
-def test_up_is_the_normal_of_the_ground_under_an_oblique_mount(degrees: float, *, by_ground: bool) -> None:
+def test_control_is_laid_on_the_normal_of_the_ground_under_an_oblique_mount(degrees: float, *, by_ground: bool) -> None:
     """Cameras that look aside do not say what is upwards; those that are tilted a little do."""
     side = np.radians(degrees)
     turn = np.array([[1, 0, 0], [0, np.cos(side), -np.sin(side)], [0, np.sin(side), np.cos(side)]])
@@ -36,5 +36,4 @@ def test_up_is_the_normal_of_the_ground_under_an_oblique_mount(degrees: float, *
     formed = SimpleNamespace(rotations=np.tile(turn, (3, 1, 1)), xyz=points)
     strip = EvidenceStrip(cast("Strip", None), cast("Orientation", None), cast("FormedStrip", formed))
     wanted = np.array([0.0, 0.0, 1.0]) if by_ground else turn[:, 2]
-    assert strip.up == pytest.approx(wanted, abs=0.03)
     assert strip.axes == pytest.approx(np.tile(wanted, (3, 1)), abs=0.03)
