@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 CODE = "P406"
 LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)
 LEAST_OTHERS = 3  # given coordinates that tell how well the prediction is known
-BEYOND_MAP = 1e5  # metres, over which a difference on the ground is none of map coordinates; it needs no further test
 LEFT_SHARE = 0.5  # of a slip, that a result leaves at least; of what a strip bends it leaves little
 MOST_SIGMA0 = 2.0  # of a bundle, over what is stated: a principal distance of another lens leaves 4 and more
 
@@ -163,7 +162,7 @@ def _confirmed(finding: Finding, row: int, predicted: Predicted, control: GivenC
     ):
         return
     off = float(predicted.off[row, axis])
-    if not np.isfinite(off * predicted.sigma[row, axis]) or abs(off) > BEYOND_MAP:
+    if not np.isfinite(off * predicted.sigma[row, axis]):
         yield finding
         return
     found = _slip(row, axis, finding.strips[0], predicted, control)
