@@ -81,6 +81,24 @@ def test_a_single_common_point_is_judged_by_the_flying_height(off: float, named:
     assert [each.points for each in find_shared_ids_of_strips(ties)] == [("P7",)] * named
 
 
+@pytest.mark.parametrize(("rays", "off", "named"), [(3, 1.5, 0), (3, 3.0, 1), (2, 8.0, 0), (2, 15.0, 1)])
+def test_a_tie_of_two_rays_may_be_farther_off_than_one_of_three(rays: int, off: float, named: int) -> None:
+    """Of a thousand good ties one is far off; an image coordinate along the base moves a point of two rays."""
+    difference = np.zeros((20, 2))
+    difference[4] = off, 0.0
+    ties = TiesOfStrips(
+        points=np.arange(20),
+        names=tuple(f"P{number}" for number in range(20)),
+        plan=np.column_stack([np.arange(20) * 100.0, np.arange(20) % 3 * 50.0]),
+        difference=difference,
+        rays=np.full(20, rays),
+        sigma=0.1,
+        depth=1000.0,
+        strips=("A", "B"),
+    )
+    assert [each.points for each in find_shared_ids_of_strips(ties)] == [("P4",)] * named
+
+
 @pytest.mark.parametrize("size", [0.0, 150.0, 400.0])
 def test_wrong_image_coordinates_are_no_shared_ids(size: float) -> None:
     """A coordinate along the base that is off moves a point of two rays in one strip only."""
