@@ -54,15 +54,8 @@ def test_the_example_of_a_table_is_right(tmp_path: Path, page: str, rows: int) -
 
 
 SHOWN = [
-    ("project.md", "project.yaml", "[0.012, -0.004]", "[0.012]"),
-    ("project.md", "project.yaml", "unit: mm", "unit: cm"),
-    ("project.md", "observations.csv", "-20.25", '"-20,25"'),
-    ("observations.md", "observations.csv", "-20.25", '"-20,25"'),
-    ("observations.md", "observations.csv", "1001,P2", "1001,P1"),
-    ("observations.md", "observations.csv", "-20.25", "-20,25"),
     ("fiducials.md", "fiducials.csv", "1001,F1", "1001,F7"),
     ("fiducials.md", "fiducials.csv", "2002,F1,106.1,-106\n2002,F2,-105.9,-106\n", ""),
-    ("control.md", "control.csv", "P2", "G1"),
 ]
 
 
