@@ -214,7 +214,6 @@ def control_of(formed: StripShape, control: ControlPoints, point_ids: Sequence[s
     """Control points that have strip coordinates, and their rows there."""
     rows = rows_of_given(control.ids, formed.point, point_ids)
     inside = rows >= 0
-    inside[inside] = formed.model_count[rows[inside]] > 0  # one without a model has no place in the covariance
     return control.take(inside), rows[inside]
 
 

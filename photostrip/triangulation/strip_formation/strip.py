@@ -215,14 +215,15 @@ def without_rows(formed: FormedStrip, orientation: Orientation, left_out: Flags)
 
 
 def without_points(formed: FormedStrip, orientation: Orientation, points: Numbers) -> FormedStrip:
-    """Leave out points that stand in models: nothing places them any more."""
-    stay = ~np.isin(formed.point, points)
+    """Leave out points: nothing places them any more."""
+    stay, gone = ~np.isin(formed.point, points), np.isin(orientation.point, points)
     return replace(
         formed,
-        model_xyz=np.where(np.isin(orientation.point, points)[:, None], np.nan, formed.model_xyz),
+        model_xyz=np.where(gone[:, None], np.nan, formed.model_xyz),
         point=formed.point[stay],
         xyz=formed.xyz[stay],
         model_count=formed.model_count[stay],
+        bridging=np.setdiff1d(formed.bridging, orientation.rows[gone]),
         home=formed.home[stay] if len(formed.home) else formed.home,
     )
 

@@ -297,6 +297,27 @@ def test_a_wrong_image_of_a_control_point_on_two_photos_is_named_instead_of_its_
     assert line["blamed"] == [o.photo_ids[0]]
 
 
+@pytest.mark.parametrize("wrong", ["nothing", "given", "image"])
+def test_a_control_point_whose_middle_ray_is_wrong_counts_and_is_tested(wrong: str) -> None:
+    """It stands in no pair: two photos that are no neighbours place it."""
+    strip = flown()
+    o = strip.observations
+    xy = o.xy.copy()
+    for photo, size in {"107": (0.0, 0.4), "108": (0.4 * (wrong == "image"), 0.0)}.items():
+        xy[(o.photo == o.photo_ids.index(photo)) & (o.point == o.point_ids.index("p6_1"))] += size
+    spoiled = replace(strip, observations=replace(o, xy=xy))
+    result = adjusted(spoiled, strip.bands(0, 3, 6, 9, 12), {"p6_1": (4.0, 0.0, 0.0)} if wrong == "given" else {})
+    told = [(note.code, note.points) for note in result.notes if note.code in {"control-rejected", "control-image"}]
+    codes = {"nothing": [], "given": ["control-rejected"], "image": ["control-image"]}[wrong]
+    assert told == [(code, ("p6_1",)) for code in codes]
+    control, rows = result.strips[0].control, result.strips[0].of_photos.rows
+    rays = {o.photo_ids[photo] for photo in o.photo[rows[o.point[rows] == strip.at["p6_1"]]]}
+    assert rays == (set() if wrong == "image" else {"106", "108"})
+    assert ("p6_1" in control.ids) == (wrong != "image")
+    if wrong != "image":
+        assert control.use[control.ids.index("p6_1")].tolist() == [wrong == "nothing"] * 2 + [True]
+
+
 @pytest.mark.parametrize("wrong", ["image", "height"])
 def test_of_a_height_and_an_image_nothing_tells_which_is_wrong_under_a_steep_ray(wrong: str) -> None:
     """The point lies below the first photo: an error of its image in the second changes its height alone."""
