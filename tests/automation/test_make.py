@@ -16,7 +16,6 @@ import pytest
 
 from photostrip.cli.main import main
 from tests.geodesy.frames import write_gtx
-from tests.pages import blocks
 from tests.results import spec, write_project
 from tests.source_tree import ROOT
 
@@ -208,9 +207,7 @@ def test_make_regress_is_the_example_on_the_samples() -> None:
 
 
 def snakefile() -> str:
-    """Give the Snakefile of the docs."""
-    found = [block for block in blocks(ROOT / "docs/make.md") if block.option("file") == "Snakefile"]
-    return "\n".join(found[0].lines) + "\n"
+    return (ROOT / "configs/Snakefile.example").read_text(encoding="utf-8")
 
 
 def test_the_snakefile_reads_what_the_depfile_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
