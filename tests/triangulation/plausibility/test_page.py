@@ -19,7 +19,5 @@ def test_every_kind_has_a_section_in_order() -> None:
 
 
 @pytest.mark.parametrize("code", sorted(KINDS))
-def test_a_section_says_severity_and_cure(code: str) -> None:
-    text = " ".join(SECTIONS[code].split())
-    assert text.startswith(f"{KINDS[code].severity.capitalize()}: ")
-    assert "**Cure:** " in text
+def test_a_section_says_severity(code: str) -> None:
+    assert SECTIONS[code].lstrip().startswith(f"{KINDS[code].severity.capitalize()}: ")
