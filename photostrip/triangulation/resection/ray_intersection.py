@@ -12,6 +12,7 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
+from photostrip.triangulation.strip_formation.non_neighbours import meeting
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
@@ -78,6 +79,21 @@ def _summed(values: Floats, point: Numbers, count: int) -> Floats:
     flat = values.reshape(len(values), -1)
     sums = np.column_stack([np.bincount(point, column, count) for column in flat.T])
     return np.asarray(sums.reshape(count, *values.shape[1:]), np.float64)
+
+
+def two_that_meet(xy: Floats, sigma: Floats, photo: Numbers, photos: KnownPhotos) -> Floats:
+    """Places where two of the r rays of each of m points meet, those with which most others agree; NaN: nowhere.
+
+    xy, sigma: (m, r, 2), ideal image coordinates and their standard deviations, mm; photo: (m, r), r at least two.
+    """
+    (m, r), two = photo.shape, np.column_stack(np.triu_indices(photo.shape[1], 1))
+    direction = np.concatenate([xy, -photos.focal[photo][..., None]], axis=2)
+    direction = np.einsum("mrij,mrj->mri", photos.rotations[photo], direction)
+    xyz, _ = meeting(photos.centers[photo][:, two].reshape(-1, 2, 3), direction[:, two].reshape(-1, 2, 3))
+    seen = project(np.repeat(xyz, r, axis=0), photos, np.repeat(photo, len(two), axis=0).ravel())
+    off = np.abs(xy[:, None] - seen.reshape(m, len(two), r, 2)) / sigma[:, None]
+    best = np.log1p(np.nan_to_num(off.max(axis=3), nan=np.inf)).sum(axis=2).argmin(axis=1)
+    return np.asarray(xyz.reshape(m, len(two), 3)[np.arange(m), best], float)
 
 
 def _solved(normal: Floats, right: Floats) -> tuple[Floats, Flags]:

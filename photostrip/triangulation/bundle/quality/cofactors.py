@@ -130,16 +130,16 @@ class JointCofactors:
         return cls(_inverse(reduced, band), solution.prepared.structure.rank, solution.rotations)
 
     def of(self, photos: Numbers) -> Floats:
-        """Shifts (m) and rotation vectors (rad) of k photos in the Cartesian frame, shape (6k, 6k)."""
-        order = np.argsort(self.rank[photos])
-        ordered = photos[order]
-        whole = self.inverse.cofactors(self.rank[ordered][None], 0)[0]
-        turn = np.zeros((len(photos), PHOTO, len(photos), PHOTO))
-        for place, photo in zip(order.tolist(), range(len(photos)), strict=True):
-            turn[place, :3, photo, :3] = turn[place, 3:, photo, 3:] = self.rotations[ordered[photo]]
+        """Shifts (m) and rotation vectors (rad) of g sets of k photos in the Cartesian frame, shape (g, 6k, 6k)."""
+        (g, k), order = photos.shape, np.argsort(self.rank[photos], axis=1)
+        ordered = np.take_along_axis(photos, order, axis=1)
+        whole = self.inverse.cofactors(self.rank[ordered], 0)
+        turn = np.zeros((g, k, PHOTO, k, PHOTO))
+        for part in (slice(3), slice(3, PHOTO)):
+            turn[np.arange(g)[:, None], order, part, np.arange(k), part] = self.rotations[ordered]
         turn *= SIGNS
         flat = turn.reshape(whole.shape)
-        return np.asarray(flat @ whole @ flat.T, float)
+        return np.asarray(flat @ whole @ flat.swapaxes(1, 2), float)
 
 
 def _inverse(reduced: Reduced, band: Factor) -> Inverse:

@@ -11,7 +11,6 @@ Source: [Baarda 1968] for the test; deletion derived, as for pairs; see docs/sou
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,15 +18,16 @@ import numpy as np
 from photostrip.frozen import dataclass
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
-from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST
+from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST, subsets
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.bundle.quality.reliability import Limit
 
 
+AT_ONCE = 32  # points that are decided on together: more take more memory and hardly less time
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
 ROUNDING = 1e-9  # keeps a point that holds its photos alone from stopping the others
 WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
@@ -36,14 +36,14 @@ WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
 
 @dataclass(frozen=True, eq=False)
 class PointRays:
-    """A point and its r rays, linearised, in units of their standard deviations; control of the point as more rows."""
+    """Points and r rays of each, linearised, in units of their standard deviations; control of them as more rows."""
 
     rays: int  # the first 2 r rows are theirs, x and y of one ray after the other
-    misfit: Floats  # (n,): measured minus computed
-    by_point: Floats  # (n, 3): derivatives by the point
-    by_photos: Floats  # (n, 6 r): derivatives by shift and rotation of the photos; 0 for control
-    cofactors: Floats  # (6 r, 6 r): joint cofactors of the photos
-    inside: Flags  # (n,): rows that took part in their adjustment
+    misfit: Floats  # (m, n): measured minus computed
+    by_point: Floats  # (m, n, 3): derivatives by the point
+    by_photos: Floats  # (m, n, 6 r): derivatives by shift and rotation of the photos; 0 for control
+    cofactors: Floats  # (m, 6 r, 6 r): joint cofactors of the photos
+    inside: Flags  # (m, n): rows that took part in their adjustment
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,39 +62,47 @@ def undecided(rays: int) -> Decision:
     return Decision(out=np.ones(rays, bool), cause=cause_of_all(rays), value=float("nan"), size=unknown)
 
 
-def decide(point: PointRays, limit: Limit) -> Decision:
-    """Test a point, and find its wrong rays when one of its coordinates is beyond the limit."""
-    gap, weight, basis = _misclosures(point)
-    r, freedom = point.rays, len(gap)
-    pulled, normal = basis @ weight @ gap, basis @ weight @ basis.T
-    share = np.diag(normal)[: 2 * r]
-    tests = np.abs(pulled[: 2 * r]) / np.sqrt(np.maximum(share, UNCONTROLLED))
-    value = float(tests[share > UNCONTROLLED].max(initial=0.0))
-    size = np.full((r, 2), np.nan)
-    if value <= limit.of(r) * limit.unit:
-        return Decision(out=np.zeros(r, bool), cause="", value=value, size=size)
-    total, unit = float(gap @ weight @ gap), limit.unit**2
-    left, sets, errors = _without(total, pulled, normal, [(ray,) for ray in range(r)])
+def alike(sizes: Sequence[tuple[int, int]]) -> Iterator[Numbers]:
+    """Places of points with as many rays and given coordinates, to be decided on together."""
+    for size in dict.fromkeys(sizes):
+        places = np.array([place for place, each in enumerate(sizes) if each == size])
+        yield from np.split(places, range(AT_ONCE, len(places), AT_ONCE))
+
+
+def decide(points: PointRays, limit: Limit) -> list[Decision]:
+    """Test points, and find the wrong rays of those with a coordinate beyond the limit."""
+    gap, weight, basis = _misclosures(points)
+    (m, freedom), r, unit = gap.shape, points.rays, limit.unit**2
+    carried = basis @ weight
+    pulled, normal = (carried @ gap[:, :, None])[:, :, 0], carried @ basis.swapaxes(1, 2)
+    share = np.einsum("mii->mi", normal)[:, : 2 * r]
+    tests = np.abs(pulled[:, : 2 * r]) / np.sqrt(np.maximum(share, UNCONTROLLED))
+    value = np.where(share > UNCONTROLLED, tests, 0.0).max(axis=1)
+    total = np.einsum("mi,mij,mj->m", gap, weight, gap)
+    out = np.repeat((value > limit.of(r) * limit.unit)[:, None], r, axis=1)
+    size, told, left_over = np.full((m, r, 2), np.nan), np.zeros(m, bool), np.flatnonzero(out[:, 0])
     for count in range(1, min(r, LARGEST) + 1):
+        if not len(left_over) or (count > 1 and freedom - 2 * count < 1):
+            break
+        left, sets, errors = _without(total[left_over], pulled[left_over], normal[left_over], subsets(r, count))
+        rows = np.arange(len(left))
+        for likelier in np.argsort(-left, axis=1, kind="stable").T:  # the likeliest set with each ray says its error
+            size[left_over[:, None], sets[likelier]] = errors[rows, likelier]
         if freedom - 2 * count < 1:
             break  # nothing would check the rays that are left
-        if count > 1:
-            left, sets, errors = _without(total, pulled, normal, list(combinations(range(r), count)))
-        best = int(left.argmin())
-        bound = chi2_quantile(1 - limit.alpha, freedom - 2 * count) * unit
-        if left[best] <= bound:
-            others = np.delete(left, best)
-            if (others > np.minimum(bound, left[best] + LIKELIER * unit)).all():
-                size[sets[best]] = errors[best]
-                wrong = np.isin(np.arange(r), sets[best])
-                return Decision(out=wrong, cause=WRONG_RAY, value=value, size=size)
-            break
-    if r == 2 and freedom == 1:
-        size = np.column_stack([np.zeros(2), 0.5 * pulled[1::2] / share[1::2]])  # half of the y parallax each
-    else:
-        for number in np.argsort(-left, kind="stable"):  # the likeliest set with each ray says its error
-            size[sets[number]] = errors[number]
-    return Decision(out=np.ones(r, bool), cause=cause_of_all(r), value=value, size=size)
+        best = left.argmin(axis=1)
+        least, bound = left[rows, best], chi2_quantile(1 - limit.alpha, freedom - 2 * count) * unit
+        rivals = (left <= np.minimum(bound, least + LIKELIER * unit)[:, None]).sum(axis=1)
+        for row in np.flatnonzero((least <= bound) & (rivals == 1)):
+            wrong = np.isin(np.arange(r), sets[best[row]])
+            told[left_over[row]], out[left_over[row]] = True, wrong
+            size[left_over[row], ~wrong] = np.nan
+        left_over = left_over[~(least <= bound)]
+    if r == 2 and freedom == 1:  # half of the y parallax each
+        size[out[:, 0], :, 0], size[out[:, 0], :, 1] = 0.0, (0.5 * pulled[:, 1::2] / share[:, 1::2])[out[:, 0]]
+    cause = np.where(told, WRONG_RAY, np.where(out[:, 0], cause_of_all(r), ""))
+    found = zip(out, cause.tolist(), value.tolist(), size, strict=True)
+    return [Decision(out=each, cause=why, value=most, size=by) for each, why, most, by in found]
 
 
 def cause_of_all(rays: int) -> str:
@@ -103,44 +111,42 @@ def cause_of_all(rays: int) -> str:
 
 
 class _Misclosures(NamedTuple):
-    gap: Floats  # (c,): c = n - 3 conditions
-    weight: Floats  # (c, c): inverse of their covariance
-    basis: Floats  # (n, c): what an observed coordinate puts into them
+    gap: Floats  # (m, c): c = n - 3 conditions
+    weight: Floats  # (m, c, c): inverse of their covariance
+    basis: Floats  # (m, n, c): what an observed coordinate puts into them
 
 
 def _misclosures(point: PointRays) -> _Misclosures:
     """Conditions of the point on photos that are adjusted without it.
 
-    With S the covariance that the photos give to the conditions of the rows that took part, their misclosures grow to
-    (I - S)^-1 times those found, and the cofactors Z of the photos to Z + Z D' (I - S)^-1 D Z.
+    With S the covariance that the photos give to what the rows that took part say beside the point, their misclosures
+    grow to (I - S)^-1 times those found, and the cofactors Z of the photos to Z + Z D' (I - S)^-1 D Z.
     """
-    basis = np.linalg.qr(point.by_point, mode="complete")[0][:, 3:]
-    design, cofactors = basis.T @ point.by_photos, point.cofactors
-    gap = basis.T @ point.misfit
-    variance = np.eye(len(gap)) + design @ cofactors @ design.T
-    rows = point.inside
-    if rows.sum() > 3:
-        part = np.linalg.qr(point.by_point[rows], mode="complete")[0][:, 3:]
-        taken_out = part.T @ point.by_photos[rows]
-        pull = design @ cofactors @ taken_out.T
-        rest = np.eye(len(taken_out)) * (1 + ROUNDING) - taken_out @ cofactors @ taken_out.T
-        lever = pull @ np.linalg.inv(rest)
-        gap = gap + lever @ (part.T @ point.misfit[rows])
-        variance = variance + lever @ pull.T
-    return _Misclosures(gap, np.asarray(np.linalg.inv(variance), float), basis)
+    basis = np.linalg.qr(point.by_point, mode="complete")[0][..., 3:]
+    across, cofactors, misfit = basis.swapaxes(-1, -2), point.cofactors, point.misfit[..., None]
+    design = across @ point.by_photos
+    inside = (point.inside & (point.inside.sum(axis=-1, keepdims=True) > 3))[..., None]
+    place = np.linalg.qr(point.by_point * inside)[0] * inside
+    beside = np.eye(misfit.shape[-2]) * inside - place @ place.swapaxes(-1, -2)
+    part = beside @ point.by_photos
+    pull, own = (each @ cofactors @ part.swapaxes(-1, -2) for each in (design, part))
+    lever = pull @ np.linalg.inv(np.eye(own.shape[-1]) * (1 + ROUNDING) - own)
+    gap = across @ misfit + lever @ (beside @ misfit)
+    variance = np.eye(design.shape[-2]) + design @ cofactors @ design.swapaxes(-1, -2) + lever @ pull.swapaxes(-1, -2)
+    return _Misclosures(gap[..., 0], np.asarray(np.linalg.inv(variance), float), basis)
 
 
 class _Deleted(NamedTuple):
-    left: Floats  # (s,): sums of squares without each set
+    left: Floats  # (m, s): sums of squares without each set
     sets: Numbers  # (s, k): rays of each set
-    errors: Floats  # (s, k, 2): errors of their coordinates
+    errors: Floats  # (m, s, k, 2): errors of their coordinates
 
 
-def _without(total: float, pulled: Floats, normal: Floats, sets: Sequence[tuple[int, ...]]) -> _Deleted:
+def _without(total: Floats, pulled: Floats, normal: Floats, sets: Numbers) -> _Deleted:
     """Take sets of as many rays each out."""
-    rays = np.array(sets, np.intp)
-    rows = (2 * rays[:, :, None] + np.arange(2)).reshape(len(rays), -1)
-    pull = pulled[rows]
-    inverse = np.linalg.pinv(normal[rows[:, :, None], rows[:, None, :]], rcond=1e-6, hermitian=True)
-    error = np.einsum("sij,sj->si", inverse, pull)
-    return _Deleted(total - np.einsum("si,si->s", pull, error), rays, error.reshape(*rays.shape, 2))
+    rows = (2 * sets[:, :, None] + np.arange(2)).reshape(len(sets), -1)
+    pull = pulled[..., rows]
+    inverse = np.linalg.pinv(normal[..., rows[:, :, None], rows[:, None, :]], rcond=1e-6, hermitian=True)
+    error = np.einsum("...ij,...j->...i", inverse, pull)
+    left = total[..., None] - np.einsum("...i,...i->...", pull, error)
+    return _Deleted(left, sets, error.reshape(*error.shape[:-1], -1, 2))

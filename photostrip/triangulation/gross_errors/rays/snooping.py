@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property, partial
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,12 +32,13 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import (
     SEVERAL_RAYS,
     Decision,
     PointRays,
+    alike,
     cause_of_all,
     decide,
     undecided,
 )
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
-from photostrip.triangulation.strip_formation.non_neighbours import meeting
+from photostrip.triangulation.resection.ray_intersection import two_that_meet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -251,8 +251,7 @@ class _Search:
         given.sort(key=lambda each: -each.value)
         if given and given[0].value >= rays.max(initial=0.0):
             return given[: 1 + self._given_out() // OUT_TO_ONE_MORE]
-        points = np.flatnonzero(self._worst_nearby(done.selection, rays))
-        return [each for point in points.tolist() for each in self._wrong_rays(done, point, limit)]
+        return self._wrong_rays(done, np.flatnonzero(self._worst_nearby(done.selection, rays)), limit)
 
     def _given_out(self) -> int:
         return sum(kind != IMAGE for kind, _, _ in self.out)
@@ -273,14 +272,13 @@ class _Search:
         wait = point[order[worse > more[photo[order]]]]
         return np.asarray((value > 0.0) & ~np.isin(np.arange(len(value)), wait), bool)
 
-    def _wrong_rays(self, done: ScreenedBundle, point: int, limit: Limit) -> list[Rejection]:
-        """Return the rays of a point that must go; all where none of them alone does it."""
-        rows = self.rays_of(point)
-        rows = rows[done.selection.images[rows]]
-        decision = self._decided(done, rows, limit, done.solution.points[point])
-        if not decision.out.any():  # within rounding of the limit
-            decision = replace(decision, out=np.ones(len(rows), bool), cause=cause_of_all(len(rows)))
-        return self._rejected(rows, decision, limit)
+    def _wrong_rays(self, done: ScreenedBundle, points: Numbers, limit: Limit) -> list[Rejection]:
+        """Return the rays of points that must go; all of a point where none of them alone does it."""
+        rows, found = [each[done.selection.images[each]] for each in map(self.rays_of, points.tolist())], []
+        for each, decision in zip(rows, self._decided(done, rows, limit, done.solution.points[points]), strict=True):
+            all_go = replace(decision, out=np.ones(len(each), bool), cause=cause_of_all(len(each)))
+            found += self._rejected(each, decision if decision.out.any() else all_go, limit)  # within rounding of it
+        return found
 
     def _rejected(self, rows: Numbers, decision: Decision, limit: Limit) -> list[Rejection]:
         size = decision.size * self.problem.images.sigma[rows]
@@ -299,35 +297,50 @@ class _Search:
             for place in np.flatnonzero(decision.out).tolist()
         ]
 
-    def _decided(self, done: ScreenedBundle, rows: Numbers, limit: Limit, xyz: Floats) -> Decision:
-        """Decide on rays of a point, linearised at a place near it."""
-        images, solution, control = self.problem.images, done.solution, self.problem.control
-        photo, sigma, r = images.photo[rows], images.sigma[rows], len(rows)
-        photos, place = KnownPhotos(solution.centers, solution.rotations, self._focal), np.broadcast_to(xyz, (r, 3))
-        by_photo, by_point = derivatives(place, photos, photo)
-        misfit = (self._measured(solution, rows) - project(place, photos, photo)) / sigma
-        if not (np.isfinite(misfit).all() and np.isfinite(by_photo).all()):
-            return undecided(r)
-        by_photos = np.zeros((r, 2, r, PHOTO))
-        by_photos[np.arange(r), :, np.arange(r)] = by_photo / sigma[:, :, None]
-        at = np.flatnonzero(control.point == images.point[rows[0]])
-        given, axis = np.nonzero(self.control[at] & np.isfinite(control.sigma[at]))
-        spread, axes = control.sigma[at[given], axis], control.axes[at[given], axis]
-        inside = done.selection.images[rows]
+    def _decided(self, done: ScreenedBundle, rows: list[Numbers], limit: Limit, xyz: Floats) -> list[Decision]:
+        """Decide on the rays of points, linearised at places near them; what is NaN becomes where they meet."""
+        given, axis = np.nonzero(self.control & np.isfinite(self.problem.control.sigma))
+        owner, point = self.problem.control.point[given], self.problem.images.point
+        known = [np.flatnonzero(owner == point[each[0]]) for each in rows]
+        found = [undecided(0)] * len(rows)
+        for some in alike(list(zip(map(len, rows), map(len, known), strict=True))):
+            rays, at = np.array([rows[each] for each in some]), np.array([known[each] for each in some], np.intp)
+            place = xyz[some]
+            for number, each in zip(some, self._alike(done, rays, (given[at], axis[at]), place, limit), strict=True):
+                found[number] = each
+            xyz[some] = place
+        return found
+
+    def _alike(
+        self, done: ScreenedBundle, rows: Numbers, given: tuple[Numbers, Numbers], xyz: Floats, limit: Limit
+    ) -> list[Decision]:
+        """Decide on the r rays of each of m points with as many given coordinates."""
+        images, control, cameras = self.problem.images, self.problem.control, self.problem.cameras
+        photos = KnownPhotos(done.solution.centers, done.solution.rotations, cameras.focal[cameras.of_photo])
+        (m, r), photo, sigma = rows.shape, images.photo[rows], images.sigma[rows][..., None]
+        flat, own = images.xy[rows].reshape(-1, 2), photo.ravel()
+        xy = (flat + image_shift(self.problem, done.solution.common, flat, own)).reshape(m, r, 2)
+        if r >= LEAST_RAYS and (nowhere := np.isnan(xyz[:, 0])).any():
+            xyz[nowhere] = two_that_meet(xy[nowhere], sigma[nowhere, :, :, 0], photo[nowhere], photos)
+        place = np.repeat(xyz, r, axis=0)
+        by_photo, by_point = (each.reshape(m, r, 2, -1) for each in derivatives(place, photos, own))
+        off = xy - project(place, photos, own).reshape(m, r, 2)
+        sound = np.isfinite(np.concatenate([off[..., None], by_photo], axis=3)).all(axis=(1, 2, 3))
+        for each in (off, by_photo, by_point):
+            each[~sound] = 0.0
+        of_photos = np.zeros((m, r, 2, r, PHOTO))
+        of_photos[:, np.arange(r), :, np.arange(r)] = (by_photo / sigma).swapaxes(0, 1)
+        spread, axes = control.sigma[given], control.axes[given]
+        to_given = np.einsum("mci,mci->mc", axes, control.xyz[given[0]] - xyz[:, None]) / spread
         rays = PointRays(
             rays=r,
-            misfit=np.append(misfit, np.einsum("ci,ci->c", axes, control.xyz[at[given]] - xyz) / spread),
-            by_point=np.concatenate([(by_point / sigma[:, :, None]).reshape(-1, 3), axes / spread[:, None]]),
-            by_photos=np.concatenate([by_photos.reshape(2 * r, -1), np.zeros((len(given), PHOTO * r))]),
+            misfit=np.hstack([(off / sigma[..., 0]).reshape(m, -1), np.where(sound[:, None], to_given, 0.0)]),
+            by_point=np.hstack([(by_point / sigma).reshape(m, -1, 3), axes / spread[..., None]]),
+            by_photos=np.hstack([of_photos.reshape(m, 2 * r, -1), np.zeros((*spread.shape, PHOTO * r))]),
             cofactors=done.joint.of(photo),
-            inside=np.append(np.repeat(inside, 2), done.selection.control[at[given], axis]),
+            inside=np.hstack([np.repeat(done.selection.images[rows], 2, axis=1), done.selection.control[given]]),
         )
-        return decide(rays, limit)
-
-    def _measured(self, solution: BundleSolution, rows: Numbers) -> Floats:
-        """Image coordinates with the calibration found."""
-        xy, photo = self.problem.images.xy[rows], self.problem.images.photo[rows]
-        return xy + image_shift(self.problem, solution.common, xy, photo)
+        return [each if meets else undecided(r) for each, meets in zip(decide(rays, limit), sound, strict=True)]
 
     def fitting(self, done: ScreenedBundle) -> Selection | None:
         """Put back what fits the adjustment without it; None when there is nothing new."""
@@ -337,44 +350,24 @@ class _Search:
         changed[self.problem.images.photo[images != self.decided.images]] = True
         self.decided = done.selection
         within = self.beyond <= limit.of(np.diff(self.first))  # the limit rises where less is established
-        for number in np.unique(point[~images & (changed[self.problem.images.photo] | within[point])]).tolist():
-            rows = self.rays_of(number)
-            placed = images[rows].sum() > 1
-            place = done.solution.points[number] if placed else self._meeting(done.solution, rows)
-            decision = self._decided(done, rows, limit, place)
-            self.latest |= {each.row: each for each in self._rejected(rows, decision, limit)}
+        numbers = np.unique(point[~images & (changed[self.problem.images.photo] | within[point])])
+        rows, single = list(map(self.rays_of, numbers.tolist())), np.diff(self.first)[numbers, None] < LEAST_RAYS
+        placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] > 1
+        place = np.where(single, xyz[numbers], np.where(placed, done.solution.points[numbers], np.nan))
+        decisions = self._decided(done, rows, limit, place)
+        for number, rays, decision, at in zip(numbers.tolist(), rows, decisions, place, strict=True):
+            self.latest |= {each.row: each for each in self._rejected(rays, decision, limit)}
             self.beyond[number] = decision.value / limit.unit
-            if number not in self.back and (~decision.out & ~images[rows]).any():
+            if number not in self.back and (~decision.out & ~images[rays]).any():
                 self.back.add(number)
-                xyz[number] = place
-                images[rows] = ~decision.out | (images[rows] & self.spared[number])
+                xyz[number] = at
+                images[rays] = ~decision.out | (images[rays] & self.spared[number])
         fits = self._given(done, limit.value * limit.unit)
         self.control, self.waiting = self.control | fits, self.waiting & ~fits
         self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))
         chosen = supported(self.problem, replace(done.selection, images=images, control=self.control))
         same = (chosen.images == done.selection.images).all() and (chosen.control == done.selection.control).all()
         return None if same else chosen
-
-    def _meeting(self, solution: BundleSolution, rows: Numbers) -> Floats:
-        """Place where two rays of a point meet, those with which most others agree; NaN where none meet.
-
-        A point with one ray is where its control is, which places it.
-        """
-        if len(rows) < LEAST_RAYS:
-            return np.asarray(self.problem.start.points[self.problem.images.point[rows[0]]])
-        photo, xy = self.problem.images.photo[rows], self._measured(solution, rows)
-        ray = np.einsum("nij,nj->ni", solution.rotations[photo], np.column_stack([xy, -self._focal[photo]]))
-        two = np.array(list(combinations(range(len(rows)), 2)), np.intp)
-        place, _ = meeting(solution.centers[photo][two], ray[two])
-        photos = KnownPhotos(solution.centers, solution.rotations, self._focal)
-        off = [xy - project(np.broadcast_to(each, (len(rows), 3)), photos, photo) for each in place]
-        size = np.abs(np.array(off) / self.problem.images.sigma[rows]).max(axis=2)
-        best = np.log1p(np.nan_to_num(size, nan=np.inf)).sum(axis=1).argmin()
-        return np.asarray(place[best], float)
-
-    @property
-    def _focal(self) -> Floats:
-        return self.problem.cameras.focal[self.problem.cameras.of_photo]
 
     def _given(self, done: ScreenedBundle, limit: float) -> Flags:
         """Control coordinates that were left out from the start and fit."""

@@ -19,8 +19,8 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import (
     SEVERAL_RAYS,
     TWO_RAYS,
     WRONG_RAY,
+    Decision,
     PointRays,
-    decide,
 )
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives
 from tests.loops import nonempty
@@ -51,6 +51,22 @@ def a_point(seed: int, rays: int = 3) -> PointRays:
         by_photos=wide.reshape(2 * rays, -1),
         cofactors=np.zeros((6 * rays, 6 * rays)),
         inside=np.zeros(2 * rays, bool),
+    )
+
+
+def decide(point: PointRays, limit: Limit) -> Decision:
+    """Decide on one point."""
+    return point_decisions.decide(together(point), limit)[0]
+
+
+def together(*points: PointRays) -> PointRays:
+    return PointRays(
+        rays=points[0].rays,
+        misfit=np.array([each.misfit for each in points]),
+        by_point=np.array([each.by_point for each in points]),
+        by_photos=np.array([each.by_photos for each in points]),
+        cofactors=np.array([each.cofactors for each in points]),
+        inside=np.array([each.inside for each in points]),
     )
 
 
@@ -93,7 +109,7 @@ def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() ->
     gap, weight, basis = point_decisions._misclosures(point)
     sets = [(0,), (3,), (4,)]
     left, _, errors = point_decisions._without(
-        float(gap @ weight @ gap), basis @ weight @ gap, basis @ weight @ basis.T, sets
+        np.array(gap @ weight @ gap), basis @ weight @ gap, basis @ weight @ basis.T, np.array(sets)
     )
     for value, (ray,), ((error,),) in nonempty(zip(left, sets, [each[None] for each in errors], strict=True)):
         rows = np.arange(10) // 2 != ray
@@ -189,14 +205,39 @@ def test_a_ray_is_blamed_when_it_is_so_much_likelier_than_any_other(times: float
 
     def next_best(size: float) -> float:
         gap, weight, basis = point_decisions._misclosures(spoiled(point, {(0, 1): size}, 0.0))
-        total, normal = float(gap @ weight @ gap), basis @ weight @ basis.T
-        left = point_decisions._without(total, basis @ weight @ gap, normal, [(0,), (1,), (2,)]).left
+        total, normal = np.array(gap @ weight @ gap), basis @ weight @ basis.T
+        left = point_decisions._without(total, basis @ weight @ gap, normal, np.arange(3)[:, None]).left
         return float(np.partition(left, 1)[1] - left.min())
 
     size = np.sqrt(times * LIKELIER / next_best(1.0))
     assert next_best(size) == pytest.approx(times * 9.0)
     assert next_best(size) < chi2_quantile(1 - level.alpha, 1)
     assert decide(spoiled(point, {(0, 1): size}, 0.0), level).cause == cause
+
+
+def test_points_are_decided_on_together_as_one_by_one() -> None:
+    """Good points and points with one, two and too many wrong rays, that took part and that did not, in one batch."""
+    errors = [{}, {(0, 1): 60.0}, {(1, 1): 60.0, (3, 1): -90.0}, {(ray, 1): 50.0 * 2**ray for ray in range(4)}]
+    points = [spoiled(a_point(seed, 5), each, 1.0) for seed, each in enumerate(errors * 2)]
+    root = np.random.default_rng(1).normal(0, 1e-6, (30, 30))
+    points = [
+        replace(each, cofactors=root @ root.T, inside=np.arange(10) < size) for size, each in enumerate(points, 2)
+    ]
+    decided = point_decisions.decide(together(*points), limit())
+    for found, point in nonempty(zip(decided, points, strict=True)):
+        alone = decide(point, limit())
+        assert (found.out.tolist(), found.cause) == (alone.out.tolist(), alone.cause)
+        assert found.value == pytest.approx(alone.value)
+        assert found.size == pytest.approx(alone.size, nan_ok=True)
+    assert {each.cause for each in decided} == {"", WRONG_RAY, SEVERAL_RAYS}
+
+
+def test_points_with_as_many_rays_are_taken_some_at_a_time() -> None:
+    sizes = [(2, 0), (3, 0), (2, 3), (3, 0)] * point_decisions.AT_ONCE
+    found = [each.tolist() for each in point_decisions.alike(sizes)]
+    assert [len(each) for each in found] == [32, 32, 32, 32]
+    assert sorted(place for each in found for place in each) == list(range(len(sizes)))
+    assert all(len({sizes[place] for place in each}) == 1 for each in nonempty(found))
 
 
 def test_rays_that_meet_nowhere_are_left_out() -> None:

@@ -117,8 +117,9 @@ def test_an_error_along_the_base_takes_the_place_and_leaves_the_parallaxes() -> 
 def test_a_point_within_rounding_of_the_limit_goes_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test of the whole adjustment and that of the point alone may differ in the last digit."""
 
-    def never(point: PointRays, limit: Limit) -> Decision:
-        return replace(point_decisions.decide(point, limit), out=np.zeros(point.rays, bool), cause="")
+    def never(points: PointRays, limit: Limit) -> list[Decision]:
+        decided = point_decisions.decide(points, limit)
+        return [replace(each, out=np.zeros(points.rays, bool), cause="") for each in decided]
 
     monkeypatch.setattr(snooping, "decide", never)
     strip = spoiled(flown(), {("105", "p4_1"): (0.0, 0.4)})
