@@ -146,8 +146,3 @@ def test_every_section_has_a_name_and_keeps_its_place() -> None:
         "findings", "fiducials", "links", "models", "covariance", "bundle", "deformations", "cross-validation",
         "certificate",
     ]  # fmt: skip
-
-
-def test_the_manual_names_every_section() -> None:
-    page = (ROOT / "docs/commands/report.md").read_text(encoding="utf-8")
-    assert [name for name in SectionName if f"`{name}`" not in page] == []
