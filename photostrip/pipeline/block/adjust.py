@@ -14,18 +14,18 @@ from photostrip.pipeline.block import start as block_start
 from photostrip.pipeline.block.check_points import check_errors
 from photostrip.pipeline.block.datum import known_of
 from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart, Bundle, SinglePhoto
+from photostrip.points import locate
 from photostrip.triangulation.bundle.common_errors import taken_up
 from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.correlations import Correlation, correlations
-from photostrip.triangulation.bundle.selection import restarted, selected, supported
+from photostrip.triangulation.bundle.selection import LEAST_RAYS, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.rays import snooping
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Flags
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
@@ -51,14 +51,17 @@ def adjust_block(
     """Adjust all strips of a project together.
 
     stages: strips of two photos or more, which give the start.
-    before: the same block with more control; the search for gross errors starts with the rays that it left.
+    before: the same block with more control: this one starts from it, without the rays that it rejected.
     Raises GeometryError when a strip, a photo or the datum cannot be determined, by name.
     """
     known = known_of(inputs, control, ground)
-    start = block_start.start(inputs, settings, stages, observations, known)
+    if before is None:
+        start = block_start.start(inputs, settings, stages, observations, known)
+    else:
+        start = _start_from(before, observations, known.control)
     block = block_problem.build(inputs, settings, observations, control, ground, start)
     if before is not None:
-        block = replace(block, begin=replace(block.begin, images=_rays_left(block, before, len(observations))))
+        block = _with_rays_of(before, block, len(observations))
     try:
         block = _refilled(block, control, ground.control)
         screened = snooping.screen_bundle(block.problem, block.begin, settings.bundle, block.kept)
@@ -81,12 +84,25 @@ def adjust_block(
     return replace(adjusted, precision=replace(adjusted.precision, checks=(checks,)))
 
 
-def _rays_left(block: BlockProblem, before: Bundle, measured: int) -> Flags:
-    """Rays that an adjustment with more control left; those of points that have none now start as if it were not."""
+def _start_from(before: Bundle, observations: PhotoPoints, control: ControlPoints) -> BlockStart:
+    """Start where an adjustment with more control ended; a point on one photo that has lost its control is nowhere."""
+    solution, origin = before.screened.solution, before.block.origin
+    nowhere = np.bincount(observations.point, minlength=len(observations.point_ids)) < LEAST_RAYS
+    nowhere[locate(control.ids, observations.point_ids)] = False
+    points = np.where(nowhere[:, None] | np.isnan(before.start.points), np.nan, solution.points + origin)
+    return replace(before.start, centers=solution.centers + origin, rotations=solution.rotations, points=points)
+
+
+def _with_rays_of(before: Bundle, block: BlockProblem, measured: int) -> BlockProblem:
+    """Leave out the rays that an adjustment with more control rejected, but those of points that have none now."""
     inside = np.zeros(measured, bool)
     inside[before.block.rows[before.screened.selection.images]] = True
     lost = np.setdiff1d(before.block.problem.control.point, block.problem.control.point)
-    return np.where(np.isin(block.problem.images.point, lost), block.begin.images, inside[block.rows])
+    left, again = inside[block.rows], np.isin(block.problem.images.point, lost)
+    rows = left | again
+    begin = replace(block.begin, images=np.where(again, block.begin.images, left)[rows])
+    problem = replace(block.problem, images=block.problem.images.take(rows))
+    return replace(block, problem=problem, begin=begin, kept=block.kept[rows], rows=block.rows[rows])
 
 
 def _refilled(block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame]) -> BlockProblem:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import dataclass
-from photostrip.triangulation.bundle.observations.problem import BundleProblem, ImageObservations, StartValues
+from photostrip.triangulation.bundle.observations.problem import BundleProblem, StartValues
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags
@@ -71,14 +71,10 @@ def supported(problem: BundleProblem, selection: Selection) -> Selection:
 
 def selected(problem: BundleProblem, selection: Selection) -> BundleProblem:
     """Leave the observations that take part: other rays go, other coordinates get infinite standard deviations."""
-    images, rows = problem.images, selection.images
-    chosen = ImageObservations(
-        photo=images.photo[rows], point=images.point[rows], xy=images.xy[rows], sigma=images.sigma[rows]
-    )
     control, positions, attitudes = problem.control, problem.positions, problem.attitudes
     return replace(
         problem,
-        images=chosen,
+        images=problem.images.take(selection.images),
         start=replace(problem.start, points=np.nan_to_num(problem.start.points)),
         control=replace(control, sigma=np.where(selection.control, control.sigma, np.inf)),
         positions=replace(positions, sigma=np.where(selection.positions, positions.sigma, np.inf)),

@@ -19,7 +19,7 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.triangulation.bundle.settings import CALIBRATION
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Flags, Floats, Numbers
 
 
 def _no_rows(*shape: int) -> Floats:
@@ -43,6 +43,11 @@ class ImageObservations:
 
     def __len__(self) -> int:
         return len(self.photo)
+
+    def take(self, rows: Flags) -> ImageObservations:
+        return ImageObservations(
+            photo=self.photo[rows], point=self.point[rows], xy=self.xy[rows], sigma=self.sigma[rows]
+        )
 
 
 @dataclass(frozen=True, eq=False)
