@@ -123,6 +123,16 @@ def test_a_strip_without_gross_errors_is_run_without_the_bundle_and_scipy() -> N
     assert not {"photostrip.triangulation.bundle.solution", "scipy"} & set(names)
 
 
+@pytest.mark.slow
+def test_a_strip_with_gross_errors_is_run_without_the_whole_of_scipy() -> None:
+    names = python(
+        "import sys\nfrom photostrip.cli.main import main\n"
+        "assert main(['run', 'sample_data/simulated-20/project.yaml', '--quiet']) == 0\nprint(*sys.modules)"
+    ).split()
+    assert "photostrip.triangulation.bundle.normal_equations.band" in names
+    assert not {"scipy", "scipy.linalg"} & set(names)
+
+
 DROP = "--set=processing.relative.drop=[1007/1007-1, 1015/1015-7]"  # the gross errors of the sample
 
 

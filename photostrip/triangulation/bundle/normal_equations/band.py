@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
+from photostrip.triangulation.bundle.normal_equations.lapack import lapack
+
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
@@ -50,18 +52,14 @@ class Band:
 
     def factor(self) -> bool:
         """Replace the matrix by its factor; False when it is not positive definite."""
-        from scipy.linalg.lapack import dpbtrf
-
-        factor, info = dpbtrf(self.columns, lower=1, overwrite_ab=1)
+        factor, info = lapack().dpbtrf(self.columns, lower=1, overwrite_ab=1)
         if factor.base is not self.flat and not np.shares_memory(factor, self.flat):
             self.columns[...] = factor
         return bool(info == 0)
 
     def solve(self, right: Floats) -> Floats:
         """Solve for columns (size, c) with the factor."""
-        from scipy.linalg.lapack import dpbtrs
-
-        solution, _ = dpbtrs(self.columns, right, lower=1)
+        solution, _ = lapack().dpbtrs(self.columns, right, lower=1)
         return np.asarray(solution)
 
     def inverse(self) -> Band:
@@ -70,14 +68,12 @@ class Band:
         With columns i and the rows J below them, and L the factor: Z_Ji = -Z_JJ L_Ji L_ii^-1 and
         Z_ii = (L_ii L_ii')^-1 - (L_Ji L_ii^-1)' Z_Ji, from the last columns to the first. Source: [Takahashi 1973].
         """
-        from scipy.linalg.lapack import dtrtri
-
         inverse = Band(self.size, self.width)
         window = np.zeros((self.width, self.width))
         for first in range((self.size - 1) // STEP * STEP, -1, -STEP):
             count = min(STEP, self.size - first)
             below = min(self.width, self.size - first - count)
-            diagonal, _ = dtrtri(np.tril(np.triu(self.look(first, first, count, count), -self.width)), lower=1)
+            diagonal, _ = lapack().dtrtri(np.tril(np.triu(self.look(first, first, count, count), -self.width)), lower=1)
             # Below the diagonal blocks, what is within the band: first + count + row - (first + column) <= width.
             coupling = np.triu(self.look(first + count, first, below, count), count - self.width) @ diagonal
             under = -window[:below, :below] @ coupling
