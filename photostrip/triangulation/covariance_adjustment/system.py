@@ -48,7 +48,7 @@ class PaddedRows:
         at = rank[:, None] * size + np.arange(size)
         with_components = NearImages.of(errors, rows).with_components
         by_component[first[:, None], at, :have] = rows.by_component.transpose(0, 2, 1, 3)
-        images[first[:, None], at, : have + 2 * REACH] = with_components.transpose(0, 2, 1, 3)
+        images[first[:, None], at, : have + 2 * REACH] = with_components
         whole = images + _with_components(errors.component_covariances, by_component, models)
         return cls(begin=models.start, by_component=by_component, images=images, whole=whole)
 

@@ -17,7 +17,7 @@ import numpy as np
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows, add_rows
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
@@ -58,10 +58,15 @@ class ParameterCovariances:
     """Covariances of the t parameters fitted to the control."""
 
     similarities: Floats  # (p + 1, 7, t): with the similarities of the models
-    components: Floats  # (p, 6, t): with the error components
-    images: Floats  # (n, 2, t): with the image coordinates
+    sums: Sums  # what the parameters are made of
     parameters: Floats  # (t, t): among themselves
     along: SimilarityCovariances  # of the formed strip
+
+
+def none_along(errors: StripErrors) -> SimilarityCovariances:
+    """Take the similarities of the models as known."""
+    zero = np.zeros((errors.models + 1, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
+    return SimilarityCovariances(zero, np.zeros((errors.models + 1, REACH, SIMILARITY_PARAMETERS, COMPONENTS)))
 
 
 def along_strip(errors: StripErrors) -> SimilarityCovariances:
@@ -91,15 +96,12 @@ def of_parameters(
     factor: variance factor of the image coordinates; that of the control is 1.
     """
     sums = _sums(errors, found.rows, operator)
-    with_images = _by_photo(errors, sums.by_component)
-    with_images[sums.image] += sums.by_image
     similarities = np.zeros((errors.models + 1, SIMILARITY_PARAMETERS, len(operator)))
     similarities[1:] = np.cumsum(errors.steps @ sums.with_components, axis=0)
-    parameters = sums.products(with_images[sums.image]) + (operator * (found.variance / factor)) @ operator.T
+    parameters = sums.products() + (operator * (found.variance / factor)) @ operator.T
     return ParameterCovariances(
         similarities=similarities,
-        components=sums.with_components,
-        images=with_images,
+        sums=sums,
         parameters=(parameters + parameters.T) / 2,
         along=along_strip(errors),
     )
@@ -109,54 +111,59 @@ def by_images(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
     """Coefficients (k, 2) of all image coordinates in a weighted sum of rows with d = 1."""
     by_component = _summed_components(errors, rows, weights[:, None])
     result = _by_photo(errors, by_component)[:, :, 0]
-    np.add.at(result, rows.image, rows.by_image[:, 0] * weights[rows.item][:, None])
+    add_rows(result, rows.image, rows.by_image[:, 0] * weights[rows.item][:, None])
     return result
 
 
-class _Sums(NamedTuple):
+class Sums(NamedTuple):
     """Sums of rows with d = 1."""
 
     by_component: Floats  # (p, 6, t)
-    with_components: Floats  # (p, 6, t): covariances with the components
     image: Numbers  # (e,): image points that enter directly
     by_image: Floats  # (e, 2, t)
+    images: Floats  # (p, 6, t): covariances of these with the components
+    with_components: Floats  # (p, 6, t): covariances of the whole with the components
 
-    def products(self, with_images: Floats) -> Floats:
-        """Covariances (t, t) of the sums, given those with the image coordinates (e, 2, t) that enter directly."""
-        found = np.einsum("kit,kis->ts", self.by_component, self.with_components)
-        return np.asarray(found + np.einsum("nit,nis->ts", self.by_image, with_images), float)
+    def products(self) -> Floats:
+        """Covariances (t, t) of the sums."""
+        mixed = np.tensordot(self.by_component, self.images, ((0, 1), (0, 1)))
+        of_components = np.tensordot(self.by_component, self.with_components - self.images, ((0, 1), (0, 1)))
+        direct = np.tensordot(self.by_image, self.by_image, ((0, 1), (0, 1)))
+        return np.asarray(of_components + mixed + mixed.T + direct, float)
 
 
-def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> _Sums:
+def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Sums:
     images = errors.images
     by_component = _summed_components(errors, rows, operator.T)
     image, entry = np.unique(rows.image, return_inverse=True)
     by_image = np.zeros((len(image), 2, len(operator)))
-    np.add.at(by_image, entry, rows.by_image[:, 0, :, None] * operator.T[rows.item][:, None, :])
-    with_components = _times_covariances(errors, by_component)
+    add_rows(by_image, entry, rows.by_image[:, 0, :, None] * operator.T[rows.item][:, None, :])
+    of_images = np.zeros_like(by_component)
     for slot in range(SPAN):
         model = images.photo[image] - REACH + slot
-        inside = (model >= 0) & (model < errors.models)
-        np.add.at(
-            with_components,
-            model[inside],
-            images.components[image[inside], :, slot].transpose(0, 2, 1) @ by_image[inside],
-        )
-    return _Sums(by_component=by_component, with_components=with_components, image=image, by_image=by_image)
+        inside = np.flatnonzero((model >= 0) & (model < errors.models))
+        values = images.components[image[inside], :, slot].transpose(0, 2, 1) @ by_image[inside]
+        add_rows(of_images, model[inside], values)
+    return Sums(
+        by_component=by_component,
+        image=image,
+        by_image=by_image,
+        images=of_images,
+        with_components=_times_covariances(errors, by_component) + of_images,
+    )
 
 
 def _summed_components(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
     """Coefficients of the components in weighted sums of rows with d = 1, shape (p, 6, t)."""
     models, count = errors.models, weights.shape[1]
     by_first = np.zeros((models + 1, SIMILARITY_PARAMETERS, count))
-    np.add.at(by_first, rows.first, rows.by_similarity[:, 0, :, None] * weights[:, None, :])
+    add_rows(by_first, rows.first, rows.by_similarity[:, 0, :, None] * weights[:, None, :])
     after = np.cumsum(by_first[::-1], axis=0)[::-1][1:]  # rows whose first model comes after each model
     result: Floats = errors.steps.transpose(0, 2, 1) @ after
     for slot in range(rows.by_component.shape[1]):
         model = rows.first + slot
-        inside = model < models
-        values = rows.by_component[inside, slot, 0, :, None] * weights[inside, None, :]
-        np.add.at(result, model[inside], values)
+        inside = np.flatnonzero(model < models)
+        add_rows(result, model[inside], rows.by_component[inside, slot, 0, :, None] * weights[inside, None, :])
     return result
 
 
@@ -192,12 +199,16 @@ def covariances(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances,
     """
     size = rows.by_similarity.shape[1]
     result = np.empty((len(rows.first), size, size))
-    for start, stop in _slices(rows):
-        part, phi = rows.part(start, stop), influence[start:stop]
+    order = np.argsort(rows.first, kind="stable")
+    ordered = rows.take(order)
+    for start, stop in _slices(ordered):
+        part, phi = ordered.part(start, stop), influence[order[start:stop]]
         near = NearImages.of(errors, part)
-        formed = _formed(errors, part, near, fit.along)
-        mixed = with_parameters(part, near, fit) @ phi.transpose(0, 2, 1)
-        result[start:stop] = formed - mixed - mixed.transpose(0, 2, 1) + phi @ fit.parameters @ phi.transpose(0, 2, 1)
+        by, half = _halves(errors, part, near, fit.along)
+        mixed = phi @ (fit.parameters / 2) - with_parameters(part, near, fit)
+        found = np.concatenate([half, mixed], axis=2) @ np.concatenate([by, phi], axis=2).transpose(0, 2, 1)
+        found += near.by_image @ near.by_image.transpose(0, 2, 1) / 2
+        result[order[start:stop]] = found + found.transpose(0, 2, 1)
     return result
 
 
@@ -208,31 +219,11 @@ def _slices(rows: ErrorRows) -> list[tuple[int, int]]:
     return [(start, min(start + size, count)) for start in range(0, count, size)]
 
 
-def _formed(errors: StripErrors, rows: ErrorRows, near: NearImages, along: SimilarityCovariances) -> Floats:
-    """S = F P F^T + m + m^T + local, m = F times the covariances of y(first) with components and image coordinates."""
-    local = local_covariances(errors, rows, near)
-    first, ahead = rows.first, along.with_components[rows.first]
-    shared = ahead[:, 0] @ rows.by_component[:, 0].transpose(0, 2, 1)
-    if rows.by_component.shape[1] > 1:
-        shared += ahead[:, 1] @ rows.by_component[:, 1].transpose(0, 2, 1)
-    for back in range(1, SPAN):
-        inside = np.flatnonzero(first >= back)
-        steps = errors.steps[first[inside] - back]
-        shared[inside] += steps @ near.with_components[inside, REACH - back].transpose(0, 2, 1)
-    moved = rows.by_similarity @ shared
-    of_similarity = rows.by_similarity @ along.similarities[first] @ rows.by_similarity.transpose(0, 2, 1)
-    return np.asarray(of_similarity + moved + moved.transpose(0, 2, 1) + local, float)
-
-
 class NearImages(NamedTuple):
-    """Image points of the photos ``first`` to ``first + s`` that enter rows directly, side by side.
+    """Image points of the photos ``first`` to ``first + s`` that enter rows directly, side by side."""
 
-    Rows with fewer than m of them have any others, with coefficients of zero.
-    """
-
-    image: Numbers  # (n, m)
-    by_image: Floats  # (n, d, 2 m)
-    with_components: Floats  # (n, s + 4, d, 6): covariances with components of the models from ``first - 2`` on
+    by_image: Floats  # (n, d, 2 m): rows with fewer than m of them have coefficients of zero
+    with_components: Floats  # (n, d, s + 4, 6): covariances with components of the models from ``first - 2`` on
 
     @classmethod
     def of(cls, errors: StripErrors, rows: ErrorRows) -> Self:
@@ -243,40 +234,121 @@ class NearImages(NamedTuple):
         counts = np.bincount(cell, minlength=n * photos)
         order = np.argsort(cell, kind="stable")
         place = np.empty(len(cell), np.intp)
-        place[order] = np.arange(len(cell)) - (np.cumsum(counts) - counts)[cell[order]]
+        place[order] = np.arange(len(cell)) - np.repeat(np.cumsum(counts) - counts, counts)
         most = int(counts.max(initial=0))
-        image = np.zeros((n, photos, most), np.intp)
+        image = np.zeros((n, photos, most), np.intp)  # empty places have any image, with coefficients of zero
         image[rows.item, photo, place] = rows.image
-        by_image = np.zeros((n, size, photos, most, 2))
-        by_image[rows.item, :, photo, place] = rows.by_image
-        components = errors.images.components[image].reshape(n, photos, 2 * most, SPAN * COMPONENTS)
-        products = by_image.reshape(n, size, photos, 2 * most).transpose(0, 2, 1, 3) @ components
-        with_components = np.zeros((n, photos + REACH + 1, size, COMPONENTS))
-        for slot in range(SPAN):
-            of_slot = products[..., slot * COMPONENTS : (slot + 1) * COMPONENTS]
-            with_components[:, slot : slot + photos] += of_slot
-        return cls(image.reshape(n, photos * most), by_image.reshape(n, size, 2 * photos * most), with_components)
+        by_image = np.zeros((n, photos, most, 2, size))
+        by_image[rows.item, photo, place] = rows.by_image.transpose(0, 2, 1)
+        with_components = np.zeros((n, size, (photos + REACH + 1) * COMPONENTS))
+        for slot in range(photos):
+            components = errors.images.components[image[:, slot]].reshape(n, 2 * most, SPAN * COMPONENTS)
+            products = by_image[:, slot].reshape(n, 2 * most, size).transpose(0, 2, 1) @ components
+            with_components[:, :, slot * COMPONENTS : (slot + SPAN) * COMPONENTS] += products
+        return cls(
+            by_image.reshape(n, 2 * photos * most, size).transpose(0, 2, 1),
+            with_components.reshape(n, size, -1, COMPONENTS),
+        )
 
 
 def local_covariances(errors: StripErrors, rows: ErrorRows, near: NearImages) -> Floats:
-    """Covariances of the rows without the similarity of their first model, shape (n, d, d)."""
-    by = rows.by_component
-    result: Floats = near.by_image @ near.by_image.transpose(0, 2, 1)
-    for slot in range(by.shape[1]):
-        mixed = near.with_components[:, slot + REACH] @ by[:, slot].transpose(0, 2, 1)
-        model = np.minimum(rows.first + slot, errors.models - 1)
-        for apart in range(min(SPAN, by.shape[1] - slot)):
-            term = by[:, slot] @ errors.component_covariances[model, apart] @ by[:, slot + apart].transpose(0, 2, 1)
-            mixed += term / 2 if apart == 0 else term
-        result += mixed + mixed.transpose(0, 2, 1)
+    """Covariances (n, d, d) of rows, ordered by their first models, without the similarities of these."""
+    by, half = _halves(errors, rows.without_similarity(), near, none_along(errors))
+    found = half @ by.transpose(0, 2, 1) + near.by_image @ near.by_image.transpose(0, 2, 1) / 2
+    return np.asarray(found + found.transpose(0, 2, 1), float)
+
+
+def _halves(
+    errors: StripErrors, rows: ErrorRows, near: NearImages, along: SimilarityCovariances
+) -> tuple[Floats, Floats]:
+    """Write S of rows that are ordered by their first models as G H^T + H G^T, products of image points left out.
+
+    G (n, d, 7 + 6 s) are the coefficients of y(first) and of the components from there on, H = G K / 2 + X with K the
+    covariances of these, and X those of the image points with them.
+    """
+    n, slots, size, _ = rows.by_component.shape
+    models = np.unique(rows.first)
+    by = by_model(rows)
+    half = _by_model(by, rows.first, covariances_of_models(errors, along, models, slots) / 2)
+    before = near.with_components[:, :, :REACH].reshape(n, size, -1)
+    half[:, :, :SIMILARITY_PARAMETERS] += _by_model(before, rows.first, _stacked(steps_before(errors, models)))
+    half[:, :, SIMILARITY_PARAMETERS:] += near.with_components[:, :, REACH : REACH + slots].reshape(n, size, -1)
+    return by, half
+
+
+def by_model(rows: ErrorRows) -> Floats:
+    """Put the coefficients of y(first) and of the components from there on side by side, (n, d, 7 + 6 s)."""
+    n, slots, size, _ = rows.by_component.shape
+    by_component = rows.by_component.transpose(0, 2, 1, 3).reshape(n, size, slots * COMPONENTS)
+    return np.concatenate([rows.by_similarity, by_component], axis=2)
+
+
+def covariances_of_models(
+    errors: StripErrors, along: SimilarityCovariances, models: Numbers, slots: int, ahead: int = 0
+) -> Floats:
+    """Covariances (m, 7 + 6 s, 7 + 6 (s + ahead)) of y(model) and the components from there on among each other."""
+    parts = [slice(start, start + COMPONENTS) for start in range(0, (slots + ahead) * COMPONENTS, COMPONENTS)]
+    result = np.zeros((len(models), SIMILARITY_PARAMETERS + slots * COMPONENTS, SIMILARITY_PARAMETERS + parts[-1].stop))
+    result[:, :SIMILARITY_PARAMETERS, :SIMILARITY_PARAMETERS] = along.similarities[models]
+    of_similarity = result[:, :SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS:]
+    with_similarity = result[:, SIMILARITY_PARAMETERS:, :SIMILARITY_PARAMETERS]
+    among = result[:, SIMILARITY_PARAMETERS:, SIMILARITY_PARAMETERS:]
+    for slot, part in enumerate(parts[:REACH]):
+        of_similarity[:, :, part] = along.with_components[models, slot]
+    for slot, part in enumerate(parts[: min(REACH, slots)]):
+        with_similarity[:, part] = along.with_components[models, slot].transpose(0, 2, 1)
+    around = around_models(errors.component_covariances, models, 0, slots + ahead)
+    for slot, part in enumerate(parts):
+        for apart, other in enumerate(parts[slot : slot + SPAN]):
+            if slot < slots:
+                among[:, part, other] = around[:, slot, apart]
+            if apart and slot + apart < slots:
+                among[:, other, part] = around[:, slot, apart].transpose(0, 2, 1)
     return result
 
 
+def steps_before(errors: StripErrors, models: Numbers) -> Floats:
+    """Give the steps (m, 2, 6, 7), transposed, of the two models before each."""
+    return around_models(errors.steps.transpose(0, 2, 1), models, REACH, 0)
+
+
+def around_models(of_models: Floats, models: Numbers, before: int, after: int) -> Floats:
+    """Give what belongs to the models around each, (m, before + after, ...), 0 beyond the ends."""
+    number = models[:, None] + np.arange(-before, after)
+    found = of_models[np.clip(number, 0, len(of_models) - 1)]
+    found[(number < 0) | (number >= len(of_models))] = 0.0
+    return np.asarray(found, float)
+
+
 def with_parameters(rows: ErrorRows, near: NearImages, fit: ParameterCovariances) -> Floats:
-    """C: covariances of the rows with the fitted parameters, shape (n, d, t)."""
-    result: Floats = rows.by_similarity @ fit.similarities[rows.first]
-    for slot in range(rows.by_component.shape[1]):
-        model = rows.first + slot
-        inside = np.flatnonzero(model < len(fit.components))
-        result[inside] += rows.by_component[inside, slot] @ fit.components[model[inside]]
-    return result + near.by_image @ fit.images[near.image].reshape(len(result), near.by_image.shape[2], result.shape[2])
+    """C: covariances (n, d, t) of rows that are ordered by their first models with the fitted parameters."""
+    n, slots, size, _ = rows.by_component.shape
+    models, sums = np.unique(rows.first), fit.sums
+    matrices = np.concatenate(
+        [fit.similarities[models], _stacked(around_models(sums.with_components, models, 0, slots))], axis=1
+    )
+    result = _by_model(by_model(rows), rows.first, matrices)
+    around = _stacked(around_models(sums.by_component, models, REACH, slots + REACH))
+    result += _by_model(near.with_components.reshape(n, size, -1), rows.first, around)
+    of_fit = np.searchsorted(sums.image, rows.image)
+    entry = np.flatnonzero(sums.image[np.minimum(of_fit, len(sums.image) - 1)] == rows.image)
+    add_rows(result, rows.item[entry], rows.by_image[entry] @ sums.by_image[of_fit[entry]])
+    return result
+
+
+def _stacked(around: Floats) -> Floats:
+    """Stack the matrices of the models around each, (m, w, k, t), to (m, w k, t)."""
+    models, width, height, count = around.shape
+    return around.reshape(models, width * height, count)
+
+
+def _by_model(coefficients: Floats, model: Numbers, matrices: Floats) -> Floats:
+    """Multiply rows (n, d, k) by a matrix (k, t) for each model, the models ascending: one product for each."""
+    n, size, _ = coefficients.shape
+    result = np.empty((n * size, matrices.shape[2]))
+    flat = coefficients.reshape(n * size, -1)
+    starts = np.flatnonzero(np.diff(model, prepend=-1))
+    ends = [*(starts * size).tolist(), n * size]
+    for matrix, (start, stop) in zip(matrices, pairwise(ends), strict=True):
+        np.matmul(flat[start:stop], matrix, out=result[start:stop])
+    return result.reshape(n, size, -1)

@@ -147,3 +147,13 @@ def ranges(start: Numbers, stop: Numbers) -> tuple[Numbers, Numbers]:
     counts = stop - start
     number = np.repeat(np.arange(len(counts)), counts)
     return number, np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts) + start[number]
+
+
+def add_rows(result: Floats, place: Numbers, values: Floats) -> None:
+    """Add values (n, ...) to rows of the result, several to one perhaps; in a tenth of the time of ``np.add.at``."""
+    if (place[1:] < place[:-1]).any():
+        order = np.argsort(place, kind="stable")
+        place, values = place[order], values[order]
+    starts = np.flatnonzero(np.diff(place, prepend=-1))
+    if len(starts):
+        result[place[starts]] += np.add.reduceat(values, starts, axis=0)

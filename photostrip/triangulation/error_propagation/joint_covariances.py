@@ -1,7 +1,8 @@
 """Joint covariances of single coordinates of a formed strip: each with every other.
 
-What two rows have in common are the steps along the strip up to the nearer of them, and image coordinates near by. The
-models are gone through in parts, so that a longer strip takes more time but no more memory.
+What two rows have in common are the similarity of the earlier one's first model, the steps from there on, and image
+coordinates near by. Beyond a few models a row's covariance with the similarity of a later model no longer changes: of
+rows further apart it is a product of seven numbers each.
 
 Source: derived; see docs/precision.md, eq. 3 and 4.
 """
@@ -12,15 +13,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.error_propagation.covariances import NearImages, with_parameters
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
+from photostrip.triangulation.error_propagation.covariances import (
+    NearImages,
+    around_models,
+    by_model,
+    covariances_of_models,
+    steps_before,
+    with_parameters,
+)
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, ErrorRows
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Floats
     from photostrip.triangulation.error_propagation.covariances import ParameterCovariances, SimilarityCovariances
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-
-MODELS = 64  # models gone through at a time: what 300 rows need of them fits into the processor's cache
 
 
 def joint_covariance(errors: StripErrors, rows: ErrorRows, along: SimilarityCovariances) -> Floats:
@@ -30,31 +37,36 @@ def joint_covariance(errors: StripErrors, rows: ErrorRows, along: SimilarityCova
     """
     order = np.argsort(rows.first, kind="stable")
     rows = rows.take(order)
-    first, slots, similar = rows.first, rows.by_component.shape[1], rows.by_similarity[:, 0]
-    low = max(int(first[0]) - REACH, 0)  # no image coordinate of the rows lies before the third photo from here
-    high = min(int(first[-1]) + slots + REACH, errors.models)
-    half = similar @ (along.similarities[low] / 2) @ similar.T + _same_images(rows) / 2
-    direct = NearImages.of(errors, rows).with_components[:, :, 0]
-    beyond = np.zeros((REACH, COMPONENTS, len(first)))  # components of the models after a part
-    for stop in range(high, low, -MODELS):
-        models = np.arange(max(stop - MODELS, low), stop)
-        reached = int(np.searchsorted(first, models[0] - slots - REACH, side="right"))  # rows that come so far
-        part = rows.part(reached, len(first))
-        by = _components(errors, part, models)
-        around = np.concatenate([by, beyond[:, :, reached:]])
-        beyond[:, :, reached:] = around[:REACH]
-        covariances, count = errors.component_covariances[models], len(models)
-        mixed = covariances[:, 0] / 2 @ by
-        for apart in range(1, REACH + 1):
-            mixed += covariances[:, apart] @ around[apart : apart + count]
-        for place in range(direct.shape[1]):
-            row, model = _inside(part.first + place - REACH, models)
-            mixed[model, :, row] += direct[reached + row, place]
-        half[reached:, reached:] += by.reshape(-1, by.shape[2]).T @ mixed.reshape(-1, by.shape[2])
-    if low < high:
-        half += similar @ np.einsum("sij,sjn->in", along.with_components[low], beyond)
-    result: Floats = np.empty_like(half)
-    result[np.ix_(order, order)] = half + half.T
+    count, slots, _, _ = rows.by_component.shape
+    similar, by_component, reach = rows.by_similarity[:, 0], rows.by_component[:, :, 0], slots + REACH
+    images = NearImages.of(errors, rows).with_components[:, 0]
+    models, place = np.unique(rows.first, return_inverse=True)
+    before = steps_before(errors, models)[place]
+    # of each row, the components from two models before its first on: its coefficients, and its covariances from that
+    # model on with them
+    coefficients = np.concatenate([np.einsum("nkci,ni->nkc", before, similar), by_component], axis=1)
+    mixed = by_model(rows) @ covariances_of_models(errors, along, models, slots, REACH)[place]
+    ahead = mixed[:, 0, SIMILARITY_PARAMETERS:].reshape(count, reach, COMPONENTS) + images[:, REACH:]
+    # its covariances with the similarities of its first model and of those that follow, until nothing changes
+    with_similarity = np.empty((count, reach + 1, SIMILARITY_PARAMETERS))
+    of_first = np.einsum("nkci,nkc->ni", before, images[:, :REACH])
+    with_similarity[:, 0] = mixed[:, 0, :SIMILARITY_PARAMETERS] + of_first
+    with_similarity[:, 1:] = np.einsum("nkic,nkc->nki", around_models(errors.steps, models, 0, reach)[place], ahead)
+    with_similarity = np.cumsum(with_similarity, axis=1)
+
+    upper = np.triu(with_similarity[:, -1] @ similar.T)
+    apart = np.where(np.triu(np.ones((count, count), bool)), rows.first - rows.first[:, None], reach)
+    for distance in range(reach):
+        i, j = np.nonzero(apart == distance)
+        beyond = min(slots, reach - distance)
+        upper[i, j] = (
+            np.einsum("ni,ni->n", with_similarity[i, distance], similar[j])
+            + np.einsum("nkc,nkc->n", ahead[i, distance : distance + beyond], by_component[j, :beyond])
+            + np.einsum("nkc,nkc->n", coefficients[i, distance:], images[j, : reach - distance])
+        )
+    whole = upper + np.triu(upper, 1).T + _same_images(rows)
+    result: Floats = np.empty_like(whole)
+    result[np.ix_(order, order)] = whole
     return result
 
 
@@ -63,25 +75,11 @@ def after_fit(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, i
 
     ``influence``: (n, t), what each fitted parameter subtracts.
     """
-    mixed = with_parameters(rows, NearImages.of(errors, rows), fit)[:, 0] @ influence.T
+    order = np.argsort(rows.first, kind="stable")
+    ordered = rows.take(order)
+    mixed = np.empty((len(order), len(order)))
+    mixed[order] = with_parameters(ordered, NearImages.of(errors, ordered), fit)[:, 0] @ influence.T
     return joint_covariance(errors, rows, fit.along) - mixed - mixed.T + influence @ fit.parameters @ influence.T
-
-
-def _components(errors: StripErrors, rows: ErrorRows, models: Numbers) -> Floats:
-    """Coefficients (m, 6, n) of the error components of consecutive models in each row."""
-    result: Floats = errors.steps[models].transpose(0, 2, 1) @ rows.by_similarity[:, 0].T
-    result *= (rows.first > models[:, None])[:, None]
-    for slot in range(rows.by_component.shape[1]):
-        row, model = _inside(rows.first + slot, models)
-        result[model, :, row] += rows.by_component[row, slot, 0]
-    return result
-
-
-def _inside(model: Numbers, models: Numbers) -> tuple[Numbers, Numbers]:
-    """Rows whose model is one of consecutive models, and its place there."""
-    place = model - models[0]
-    row = np.flatnonzero((place >= 0) & (place < len(models)))
-    return row, place[row]
 
 
 def _same_images(rows: ErrorRows) -> Floats:

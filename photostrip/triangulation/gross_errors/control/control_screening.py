@@ -58,7 +58,7 @@ def screen_control(strip: StripAtControl) -> ScreenedControl:
     for rows, section in strip.sections():
         try:
             found = _searched(section)
-        except PhotostripError:
+        except (PhotostripError, np.linalg.LinAlgError):
             # the control of the section leaves it free, or would without what is suspected: nothing is said against it
             continue
         if found is not None:

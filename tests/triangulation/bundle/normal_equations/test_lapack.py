@@ -29,9 +29,12 @@ def test_the_compiled_module_loads_alone_and_serves_scipy_afterwards() -> None:
 def test_where_it_does_not_load_alone_scipy_gives_it(monkeypatch: pytest.MonkeyPatch) -> None:
     from scipy.linalg import lapack as whole
 
+    def refused() -> None:
+        raise ImportError
+
     module.lapack.cache_clear()
     monkeypatch.delitem(sys.modules, module.MODULE)
-    monkeypatch.setattr(module.PathFinder, "find_spec", lambda *_: None)
+    monkeypatch.setattr(module, "_alone", refused)
     try:
         assert module.lapack() is whole
     finally:
