@@ -51,7 +51,6 @@ if TYPE_CHECKING:
 
 
 OUT_TO_ONE_MORE = 8
-RAYS_OUT = 4  # of a photo, to one more point of it that goes at a time
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
@@ -128,6 +127,7 @@ class _Search:
         self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
         self.spared[images.point[[] if kept is None else kept]] = True
         self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates not put in yet
+        self.begin = begin.images
         self.control = begin.control.copy()  # those that were put in, and that nothing has rejected
         self.out: dict[tuple[str, int, int], Rejection] = {}
         nothing = partial(Rejection, test="start", value=float("nan"), limit=float("nan"))
@@ -264,9 +264,9 @@ class _Search:
         return np.where(self.spared | within, 0.0, worst)
 
     def _worst_nearby(self, selection: Selection, value: Floats) -> Flags:
-        """Doubtful points among the worst on each of their photos: one, and more the more rays of the photo are out."""
+        """Doubtful points among the worst on each of their photos: one, and as many more as tests have taken from it."""
         photo, point = self.problem.images.photo[selection.images], self.problem.images.point[selection.images]
-        more = np.bincount(self.problem.images.photo[~selection.images], minlength=self.problem.photos) // RAYS_OUT
+        more = np.bincount(self.problem.images.photo[self.begin & ~selection.images], minlength=self.problem.photos)
         order = np.lexsort((-value[point], photo))
         worse = np.arange(len(order)) - np.searchsorted(photo[order], photo[order])
         wait = point[order[worse > more[photo[order]]]]
