@@ -264,7 +264,7 @@ class _Search:
         return np.where(self.spared | within, 0.0, worst)
 
     def _worst_nearby(self, selection: Selection, value: Floats) -> Flags:
-        """Doubtful points among the worst on each of their photos: one, and as many more as tests have taken from it."""
+        """Doubtful points among the worst on each of their photos: one, and as many more as tests took from it."""
         photo, point = self.problem.images.photo[selection.images], self.problem.images.point[selection.images]
         more = np.bincount(self.problem.images.photo[self.begin & ~selection.images], minlength=self.problem.photos)
         order = np.lexsort((-value[point], photo))
