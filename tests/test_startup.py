@@ -150,6 +150,7 @@ def test_modules_are_a_budget(arguments: tuple[str, ...], most: int) -> None:
     ).splitlines()[-1]
     loaded = names.split()
     assert sum(name.startswith("photostrip") for name in loaded) <= most
+    assert "numpy.ma" not in loaded
     assert not {"rich", "scipy", "jinja2", "matplotlib", "pydantic"} & {name.partition(".")[0] for name in loaded}
 
 

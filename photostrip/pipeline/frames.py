@@ -16,6 +16,7 @@ from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
 from photostrip.pipeline.refusals import refuse_curvature_twice
+from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -120,7 +121,7 @@ def datum_notes(inputs: Inputs, ground: GroundFrames) -> Iterator[Note]:
         yield Note("datum-change", text, severity="note", key=f"{key}.crs")
         sigma = sigma_of[key][(sigma_of[key] > 0) & np.isfinite(sigma_of[key])]
         moved = shift.moved_per_year
-        if epoch is None and len(sigma) and EPOCH_UNKNOWN * moved > float(np.median(sigma)):
+        if epoch is None and len(sigma) and EPOCH_UNKNOWN * moved > median(sigma):
             text = (
                 f"{key}: {title}: coordinates move by {100 * moved:.1f} cm a year between them, and no `epoch` is "
                 f"given: that of the operation, {reference:.1f}, is taken"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import dataclass
+from photostrip.statistics import median
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
@@ -50,7 +51,7 @@ class Strip:
 
     def median_sigma(self, observations: PhotoPoints) -> float:
         """Median standard deviation of the image coordinates of its photos, mm."""
-        return float(np.median(observations.sigma[self.positions(observations) >= 0]))
+        return median(observations.sigma[self.positions(observations) >= 0])
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.notes import Note
+from photostrip.statistics import median
 from photostrip.triangulation.bundle.quality import reliability
 
 if TYPE_CHECKING:
@@ -58,8 +59,8 @@ def _note_of(
     parts = []
     for name, part in PARTS:
         known = np.isfinite(sigma[:, part]) & ~np.isnan(size[:, part])
-        if known.any() and np.median(size[:, part][known]) > HARDLY:
-            middle = float(np.median(detectable[:, part][known]))
+        if known.any() and median(size[:, part][known]) > HARDLY:
+            middle = median(detectable[:, part][known])
             parts.append(f"{middle:.2g} m in {name}" if np.isfinite(middle) else f"any size in {name}")
     if parts:
         text = (

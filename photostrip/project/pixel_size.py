@@ -9,6 +9,7 @@ import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Note, counted
+from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -50,7 +51,7 @@ def with_pixel_sizes(
             message = "the fiducial marks do not tell the size of a pixel"
             faults.append(Fault(message, "missing-key", key=".".join(path), expected="the size of a pixel in mm"))
             continue
-        size = float(f"{np.median(sizes):.6g}")
+        size = float(f"{median(sizes):.6g}")
         found[name] = replace(camera, pixel_size=size)
         message = (
             f"camera {name} has no pixel_size: a pixel is {size * 1000:.4g} µm by the calibrated fiducial marks of "

@@ -23,6 +23,7 @@ from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
 from photostrip.geometry.similarity import Similarity, collinearity, similarity_derivatives
 from photostrip.notes import listed
+from photostrip.statistics import column_medians, median
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -212,7 +213,7 @@ def lay(
         given = targets.of(similarity(strip))
         if collinearity(given) < WEAK_LIMIT**2:
             raise _on_line(given, targets.control)  # a line fits upside down as well as upright
-        off = float(np.median(np.linalg.norm(targets.misclosures(similarity(strip)), axis=1)))
+        off = median(np.linalg.norm(targets.misclosures(similarity(strip)), axis=1))
         if off > MOST_OFF * half:
             message = (
                 f"the strip does not fit its control: half of the points are more than {off:.4g} m off, and the strip "
@@ -275,7 +276,7 @@ def _refuse_given_on_line(strip: Floats, given: Floats, control: ControlPoints) 
 
 def _on_line(given: Floats, control: ControlPoints) -> GeometryError:
     """Say that control lies on a line, or which point lies so far off that all others are one place beside it."""
-    away = np.linalg.norm(given - np.median(given, axis=0), axis=1)
+    away = np.linalg.norm(given - column_medians(given), axis=1)
     far, others = int(away.argmax()), float(np.delete(away, away.argmax()).max(initial=0.0))
     if len(away) > LEAST_WITH_ONE_FAR and away[far] > FAR_OFF * others:
         times = away[far] / max(others, 1e-6)

@@ -15,6 +15,7 @@ from photostrip.formats.measured.columns import POINT, numbers, sigmas
 from photostrip.formats.text.tables import Column, Table
 from photostrip.notes import counted
 from photostrip.points import locate
+from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet
@@ -130,7 +131,7 @@ def _exchanged(read: Measurements, inside: Flags) -> bool:
     given, then = (_apart(read, photo, np.repeat(inside, 2)) for photo in (read.photo, swapped.reshape(-1)))
     if min(len(given), len(then)) < LEAST_AGAIN:
         return False
-    return bool(np.median(then) < EXCHANGED_SHARE * np.median(given))
+    return bool(median(then) < EXCHANGED_SHARE * median(given))
 
 
 def _apart(read: Measurements, photo: Numbers, inside: Flags) -> Floats:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.notes import Note, counted
+from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
@@ -95,7 +96,7 @@ def _refuse_all(
     names = len(np.unique(group[several]))
     if names < LEAST_TOGETHER or far.sum() <= MOST_SHARE * several.sum():
         return False
-    scatter = float(np.median(np.abs(off[several]).max(axis=1)))
+    scatter = median(np.abs(off[several]).max(axis=1))
     reach = float(np.quantile(np.abs(read.xy), REACH_SHARE))
     head = (
         f"{names} {target}s are measured several times on a photo, and {len(np.unique(group[far]))} of them lie more "

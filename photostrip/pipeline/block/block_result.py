@@ -9,6 +9,7 @@ import numpy as np
 
 from photostrip.pipeline.block import block_notes
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, Bundle, Precision, StripResult, Ties
+from photostrip.statistics import median
 from photostrip.triangulation.bundle.quality import self_calibration
 from photostrip.triangulation.resection.resection import with_residuals
 
@@ -38,7 +39,7 @@ def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFra
         _strip(strip, begin, calibrated, used, points, bundle)
         for strip, (_, begin) in zip(start.strips, places, strict=True)
     )
-    sigma = float(np.median(block.problem.images.sigma)) * bundle.unit
+    sigma = median(block.problem.images.sigma) * bundle.unit
     covariances = bundle.screened.precision.points[number] * bundle.unit**2
     photos = tuple(bundle.photo_covariances[begin : begin + count[n]] for n, begin in places)
     basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"

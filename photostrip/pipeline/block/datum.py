@@ -13,6 +13,7 @@ from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.pipeline.given_points import cartesian_of
 from photostrip.pipeline.strips.absolute import middle_frame
 from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.statistics import median
 from photostrip.triangulation import absolute_orientation
 
 if TYPE_CHECKING:
@@ -202,7 +203,7 @@ def _by_cameras(
 def _depth(stages: Sequence[FormedPhotos], group: JoinedStrips) -> float:
     """Distance from a camera to the ground, in the unit of the block."""
     formed = stages[group.members[0]].formed
-    return float(np.median(np.linalg.norm(formed.xyz - formed.xyz.mean(axis=0), axis=1)))
+    return median(np.linalg.norm(formed.xyz - formed.xyz.mean(axis=0), axis=1))
 
 
 def _of_its_own(stages: Sequence[FormedPhotos], group: JoinedStrips) -> Similarity:

@@ -12,6 +12,7 @@ from photostrip.geometry.rotation import angle_rates, from_angles
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import BlockProblem, BlockStart
 from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.statistics import median
 from photostrip.triangulation.bundle.observations.problem import (
     AttitudeObservations,
     BundleCameras,
@@ -280,10 +281,10 @@ def _begin(
         computed = project(problem.start.points[images.point], photos, images.photo)
         miss = (np.abs(images.xy - computed) / images.sigma).max(axis=1)
     known = miss[np.isfinite(miss)]
-    far = np.full(len(miss), max(LEAST_FAR, FAR * float(np.median(known)) if len(known) else 0.0))
+    far = np.full(len(miss), max(LEAST_FAR, FAR * median(known) if len(known) else 0.0))
     loose = np.isin(images.point, images.point[start.rough[images.photo]]) & np.isfinite(miss)
     if loose.any():  # what an orientation that is only given approximately misses says nothing of the rays
-        far[loose] = np.maximum(far[loose], FAR * np.median(miss[loose]))
+        far[loose] = np.maximum(far[loose], FAR * median(miss[loose]))
     for strip in start.strips:
         if strangers := start.strangers.get(strip.strip.id):
             of_strip = np.isin(images.photo, start.rows_of(strip.strip.photos))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.pipeline.plausibility import evidence
+from photostrip.statistics import median
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control import control_heights
 
@@ -122,7 +123,7 @@ def _middle_sigma0(formed: EvidenceStrip) -> float:
     """Middle sigma0 of the pairs, mm."""
     sigma0 = formed.orientation.sigma0
     known = sigma0[np.isfinite(sigma0)]
-    return float(np.median(known)) if len(known) else 0.0
+    return median(known) if len(known) else 0.0
 
 
 def _followed(

@@ -15,6 +15,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.points import locate
+from photostrip.statistics import column_medians, median
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.triangulation.plausibility.control.control_strip import Rays, StripPoints
@@ -65,7 +66,7 @@ class EvidenceStrip:
         points = self.formed.xyz[np.isfinite(self.formed.xyz).all(axis=1)]
         if len(axes) > LONG_STRIP or len(points) < LEAST_OF_PLANE:  # a long strip bends more than it is broad
             return axes
-        normal = np.linalg.svd(points - np.median(points, axis=0), full_matrices=False)[2][2]
+        normal = np.linalg.svd(points - column_medians(points), full_matrices=False)[2][2]
         looking = float(normal @ self.up)
         is_oblique = abs(looking) < np.cos(np.radians(OBLIQUE_DEG))
         return np.broadcast_to(normal * np.sign(looking), axes.shape) if is_oblique else axes
@@ -151,10 +152,10 @@ def strip_points(
     formed: EvidenceStrip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
 ) -> tuple[Numbers, StripPoints]:
     """Rows of the given points that a formed strip holds, and the same points in the strip."""
-    strip, depth = formed.formed, float(np.median(formed.depth))
+    strip, depth = formed.formed, median(formed.depth)
     row = rows_of_given(control.ids, strip.point, observations.point_ids)
     rows = np.flatnonzero(row >= 0)
-    base = float(np.median(np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)))
+    base = median(np.linalg.norm(np.diff(strip.centers, axis=0), axis=1))
     share = formed.strip.median_sigma(observations) / formed.strip.camera.principal_distance
     return rows, StripPoints(
         formed.strip.id,
@@ -244,7 +245,7 @@ def mosaic_points(
     numbers = locate(control.ids, observations.point_ids)
     given = np.flatnonzero((numbers >= 0) & (total[numbers] > 0))
     held = numbers[given]
-    depth = strip.camera.principal_distance * float(np.median(np.abs(plane.factor)))
+    depth = strip.camera.principal_distance * median(np.abs(plane.factor))
     return given, StripPoints(
         strip.id,
         xyz=np.column_stack([x[held], y[held], np.full(len(held), np.nan)]),
@@ -297,7 +298,7 @@ def places_in_photos(strip: Strip, observations: PhotoPoints, steps: Mapping[str
     rows = np.flatnonzero(position >= 0)
     step = np.array([steps.get(photo, complex("nan")) for photo in strip.photos])
     known = np.isfinite(step) & (step != 0)
-    usual = complex(np.median(step[known].real), np.median(step[known].imag)) if known.any() else 1.0
+    usual = complex(median(step[known].real), median(step[known].imag)) if known.any() else 1.0
     step = np.where(known, step, usual)[position[rows]]
     along = (observations.xy[rows] * np.column_stack([step.real, step.imag])).sum(axis=1) / np.abs(step) ** 2
     return rows, position[rows] + (along if known.any() else 0.0)
@@ -331,8 +332,8 @@ def half_breadth(
     ground = np.linalg.norm(plan[given[one]] - plan[given[other]], axis=1)
     if not (image > 0).any():
         order = np.argsort(place, kind="stable")
-        base = np.median([abs(step) for photo in strip.photos if (step := steps.get(photo, 0.0))] or [np.nan])
+        base = median([abs(step) for photo in strip.photos if (step := steps.get(photo, 0.0))] or [np.nan])
         image = np.diff(place[order]) * float(base)
         ground = np.linalg.norm(np.diff(plan[order], axis=0), axis=1)
     good = image > 0
-    return half * float(np.median(ground[good] / image[good])) if good.any() else 0.0
+    return half * median(ground[good] / image[good]) if good.any() else 0.0

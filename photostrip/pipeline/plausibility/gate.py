@@ -26,6 +26,7 @@ from photostrip.pipeline.plausibility import (
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images
 from photostrip.points import locate
+from photostrip.statistics import median
 from photostrip.triangulation.plausibility import accepted
 from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
 from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, tied_strips, units
@@ -242,7 +243,7 @@ def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     """Look at a formed strip: its perspective centres, and the ids of its points."""
     strip, formed = each.strip, each.formed
     whole = each.whole.formed  # rays that contradict each other may be those of two points
-    sigma = float(np.median(observations.sigma))
+    sigma = median(observations.sigma)
     findings = units.find_wrong_sigmas(each.orientation.sigma0, sigma, strip.id)
     findings += flight.find_odd_centers(formed.centers, each.depth, each.up, strip.photos, strip.id)
     names = observations.point_ids

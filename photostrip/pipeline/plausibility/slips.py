@@ -16,7 +16,7 @@ from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.pipeline.given_points import rejected_control, rows_of_given
 from photostrip.points import locate
-from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
+from photostrip.statistics import SIGMA_FROM_MEDIAN, median, normal_quantile
 from photostrip.triangulation.plausibility.control import control_slips, given_points
 from photostrip.triangulation.plausibility.control.control_fit import ODD_PROBABILITY
 
@@ -56,7 +56,7 @@ class Predicted:
         columns = [2] if axis == control_slips.HEIGHT else [0, 1]
         ratio = np.abs(np.delete(self.off, row, axis=0) / np.delete(self.sigma, row, axis=0))[:, columns]
         known = ratio[np.isfinite(ratio)]
-        excess = max(SIGMA_FROM_MEDIAN * float(np.median(known)), 1.0) if len(known) >= LEAST_OTHERS else 1.0
+        excess = max(SIGMA_FROM_MEDIAN * median(known), 1.0) if len(known) >= LEAST_OTHERS else 1.0
         return float(self.sigma[row, axis]) * excess
 
     def stands_out(self, row: int, axis: int) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.pipeline.precision.check_points import CheckPoints, check_points
 from photostrip.pipeline.precision.strip_precision import StripPrecision
-from photostrip.statistics import chi2_quantile
+from photostrip.statistics import chi2_quantile, median
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
@@ -58,7 +58,7 @@ def of_models(
     nodes = (nodes + influence @ spread @ influence.transpose(0, 2, 1)) * factor
     nodes = axes @ nodes @ axes.T
     points = len(formed.point)
-    sigma = float(np.sqrt(np.median(formed.models.sigma**2) * factor))
+    sigma = float(np.sqrt(median(formed.models.sigma**2) * factor))
     return StripPrecision(
         points=nodes[:points],
         photos=_of_photos(formed, nodes),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.notes import Note
+from photostrip.statistics import median
 from photostrip.triangulation.independent_models.link_screening import LEFT
 from photostrip.triangulation.independent_models.model_errors import far_ends
 
@@ -77,7 +78,7 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
 
 def _unit_notes(strip: ModelStrip, formed: FormedModels) -> Iterator[Note]:
     """Say where a model, or the standard deviations, seem to stand in another unit than they should."""
-    scale = formed.places.scale / np.median(formed.places.scale)
+    scale = formed.places.scale / median(formed.places.scale)
     for number in np.flatnonzero(np.abs(np.log(scale)) > np.log(ODD_SCALE)).tolist():
         times = f"{1 / scale[number]:.3g} times smaller" if scale[number] < 1 else f"{scale[number]:.3g} times larger"
         text = (

@@ -14,6 +14,7 @@ from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.model_notes import link_notes
 from photostrip.points import ModelPoints, locate, take_rows
+from photostrip.statistics import median
 from photostrip.triangulation.independent_models import (
     link_screening,
     linking,
@@ -63,7 +64,7 @@ class LinkedModels:
         turn = (scale * places.scale)[:, None, None] * places.rotation
         variance = np.einsum("nij,nj->ni", turn[models.model] ** 2, models.sigma**2) * self.formed.links.factor
         point = models.node < models.points
-        plan, height = np.median(variance[point, :2].mean(axis=1)), np.median(variance[point, 2])
+        plan, height = median(variance[point, :2].mean(axis=1)), median(variance[point, 2])
         return float(np.sqrt(plan)), float(np.sqrt(height))
 
     def extent(self, similarity: Similarity) -> tuple[float, float]:

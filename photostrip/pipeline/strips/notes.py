@@ -8,6 +8,7 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted
+from photostrip.statistics import column_medians
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING, Orientation
@@ -185,7 +186,7 @@ def precision_beyond_control(strip: Strip, rows: Numbers, adjusted: CovarianceAd
         return
     variance = np.diagonal(adjusted.points, axis1=1, axis2=2)
     sigma = np.sqrt(np.column_stack([variance[:, :2].mean(axis=1), variance[:, 2]]))
-    inside, largest = np.median(sigma[beyond <= 0], axis=0), sigma[beyond > 0].max(axis=0)
+    inside, largest = column_medians(sigma[beyond <= 0]), sigma[beyond > 0].max(axis=0)
     if (largest > WORSE_BEYOND * inside).any():
         count = int((beyond > 0).sum())
         text = (

@@ -13,6 +13,7 @@ from photostrip.pipeline import overruling
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.screened_formation import form_screened, with_readmitted
+from photostrip.statistics import median
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.error_propagation.joint_covariances import joint_covariance
 from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
@@ -94,7 +95,7 @@ class FormedPhotos:
 
     def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
         # image coordinates are taken as good as stated, or as bad as the pairs have proved
-        factor = max(1.0, float(np.median(self.screened.scatter.by_pair)) ** 2 / (2 * self.sigma**2))
+        factor = max(1.0, median(self.screened.scatter.by_pair) ** 2 / (2 * self.sigma**2))
         errors = oriented.errors.with_doubt(self.formed.junctions.doubt / np.sqrt(factor))
         along = covariances.along_strip(errors)
 

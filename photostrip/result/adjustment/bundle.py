@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.result.numbers import PER_RADIAN, Document, rms
 from photostrip.result.quantities import record
+from photostrip.statistics import median
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.units import MICROMETRES
 
@@ -203,10 +204,10 @@ def _group(group: reliability.Group, shift: float, kind: Kind) -> Document:
         "mean": share.mean(),
         "smallest": share.min(),
         "uncontrolled": int((~controlled).sum()),
-        "detectable": np.median(detectable),
+        "detectable": median(detectable),
         "detectable_largest": detectable.max(),
         "unit": kind.unit,
-        "external": np.median(external),
+        "external": median(external),
         "external_largest": external.max(),
     }
 

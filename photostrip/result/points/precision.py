@@ -12,7 +12,7 @@ from photostrip.result.numbers import PER_RADIAN, Document, rms
 from photostrip.result.points.own_precision import chances, turned
 from photostrip.result.quantities import record, records
 from photostrip.result.records import Records
-from photostrip.statistics import binomial_p_value, chi2_quantile, normal_quantile
+from photostrip.statistics import binomial_p_value, chi2_quantile, median, normal_quantile
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
@@ -144,7 +144,7 @@ def _basis_of_singles(result: Result) -> list[Document]:
     if result.bundle is None:
         return []
     bundle = result.bundle
-    sigma_um = 1000.0 * float(np.median(bundle.block.problem.images.sigma)) * bundle.unit
+    sigma_um = 1000.0 * median(bundle.block.problem.images.sigma) * bundle.unit
     basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"
     return [{"strip": each.strip.id, "sigma_um": sigma_um, "basis": basis} for each in bundle.singles]
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.statistics import median
 from photostrip.triangulation.bundle.selection import restarted
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.robust import falling_weights
@@ -36,6 +37,6 @@ def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
         solution = solve(replace(problem, images=replace(problem.images, sigma=spread)))
         problem = restarted(problem, solution)
         size = np.linalg.norm(solution.image_residuals / sigma, axis=1)
-        unit = max(float(np.median(size)) / NORMAL_MEDIAN, 1e-12)
+        unit = max(median(size) / NORMAL_MEDIAN, 1e-12)
         weight = falling_weights(size / unit)
     return solution, weight

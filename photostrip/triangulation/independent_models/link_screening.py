@@ -16,7 +16,7 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.rejection import Rejection
-from photostrip.statistics import chi2_quantile
+from photostrip.statistics import chi2_quantile, median
 from photostrip.triangulation.independent_models import linking
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def _scatter(tests: PointTests, solved: SolvedLinks) -> float:
     independent = solved.redundancy.sum() / 3
     if len(known) < LEFT or independent < LEFT:
         return 1.0
-    ratio = float(np.median(known)) / MEDIAN
+    ratio = median(known) / MEDIAN
     return ratio if ratio > 1 + SURE * MEDIAN_SPREAD / np.sqrt(independent) else 1.0
 
 

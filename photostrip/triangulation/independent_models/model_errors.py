@@ -18,6 +18,7 @@ import numpy as np
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
+from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
@@ -243,6 +244,6 @@ def far_ends(formed: FormedModels) -> Floats:
     scale = solved.similarities.scale
     found = np.zeros(len(scale))
     np.maximum.at(found, link, variance)
-    stated = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
+    stated = np.array([median(models.sigma[rows[link == number]]) for number in range(len(scale))])
     ratio: Floats = np.sqrt(found) / np.maximum(scale * stated, 1e-300)
     return ratio

@@ -15,6 +15,7 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.points import PhotoPoints, take_rows
+from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -90,7 +91,7 @@ def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float
         pair=pair,
         left=observations.xy[rows[:, 0]],
         right=observations.xy[rows[:, 1]],
-        weight=2 * np.median(variance[inside]) / variance[rows].sum(axis=1),
+        weight=2 * median(variance[inside]) / variance[rows].sum(axis=1),
         focal=focal,
         point=observations.point[rows[:, 0]],
         rows=rows,

@@ -16,7 +16,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
-from photostrip.statistics import normal_quantile
+from photostrip.statistics import median, normal_quantile
 from photostrip.triangulation.robust import medians, scales
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ def depths(vectors: Floats, base: Floats) -> Floats:
 def _scatter(orientation: Orientation) -> Floats:
     """Estimate the standard deviation of a y parallax from all pairs together."""
     known = orientation.sigma0[np.isfinite(orientation.sigma0)]
-    value = np.sqrt(2.0) * float(np.median(known)) if len(known) else 0.0
+    value = np.sqrt(2.0) * median(known) if len(known) else 0.0
     return np.full(orientation.pairs.size, max(value, SMALLEST_SIGMA))
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from photostrip.frozen import dataclass
-from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, normal_quantile
+from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, median, normal_quantile
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.robust import MEDIAN_SPREAD
@@ -92,7 +92,7 @@ class ParallaxScatter:
         found = np.nan
         if tested.any():
             sizes = np.abs(orientation.parallax[tested]) * np.sqrt(pairs.weight[tested] / share[tested])
-            scale = SIGMA_FROM_MEDIAN * float(np.median(sizes))
+            scale = SIGMA_FROM_MEDIAN * median(sizes)
             proof = 1.0 + normal_quantile(1.0 - ALPHA) * MEDIAN_SPREAD / np.sqrt(float(share[tested].sum()))
             found = scale if scale > spoiled * proof * stated else np.nan
         return cls(found, np.full(pairs.size, max(stated, np.nan_to_num(found))))

@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import EARTH_RADIUS
-from photostrip.statistics import t_quantile
+from photostrip.statistics import median, t_quantile
 from photostrip.triangulation.plausibility.control.control_fit import (
     KEPT_SIGMAS,
     LEAST_POINTS,
@@ -152,7 +152,7 @@ class HeightStretch:
         """Rms of what a fit leaves; what is far off counts less."""
         size = np.abs(residual[self.heights.in_fit])
         freedom = max(len(size) - unknowns, 1)
-        rms = float(np.sqrt((np.minimum(size, KEPT_SIGMAS * np.median(size)) ** 2).sum() / freedom))
+        rms = float(np.sqrt((np.minimum(size, KEPT_SIGMAS * median(size)) ** 2).sum() / freedom))
         return max(rms / self.heights.floor, 1.0)
 
 

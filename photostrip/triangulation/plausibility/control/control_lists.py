@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.statistics import median
 from photostrip.triangulation.plausibility.control.control_fit import PlanSimilarity, fit_similarity
 from photostrip.triangulation.plausibility.control.control_strip import (
     FEET_TOLERANCE,
@@ -63,7 +64,7 @@ def find_foreign_lists(
             continue
         wrong.append(number)
         scale = None if (of_list := alone[number]) is None else abs(of_list.turn) / abs(reference.turn)
-        shift = complex(np.median(off.real), np.median(off.imag))
+        shift = complex(median(off.real), median(off.imag))
         names = tuple(given.ids[row] for row in np.flatnonzero(rows))
         findings.append(_other_frame(on_strip, names, number, first, shift, scale))
     return wrong, findings

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.statistics import column_medians, median
 from photostrip.triangulation.plausibility.control.control_strip import FOOT, KINDS_OF_FEET
 from photostrip.triangulation.plausibility.finding import found
 
@@ -87,8 +88,8 @@ def _together(enu: Floats) -> Floats:
     """Return points without those that lie so far from the others that no map reaches there."""
     if not len(enu):
         return enu
-    far = np.abs(enu[:, :2] - np.median(enu[:, :2], axis=0)).max(axis=1)
-    return np.asarray(enu[far <= FAR * np.median(far)], float)
+    far = np.abs(enu[:, :2] - column_medians(enu[:, :2])).max(axis=1)
+    return np.asarray(enu[far <= FAR * median(far)], float)
 
 
 def _readings(level: Floats) -> Iterator[tuple[str, Floats, str, str]]:
@@ -154,7 +155,7 @@ def _degrees(frame: GroundFrame, enu: Floats) -> Floats | None:
 def _where(frame: GroundFrame, level: Floats, known: Floats) -> str:
     degrees = _degrees(frame, level)
     if degrees is None:
-        east, north = (float(np.median(known[:, axis])) for axis in (0, 1))
+        east, north = (median(known[:, axis]) for axis in (0, 1))
         return f"lies nowhere on the Earth (east about {east:.6g}, north about {north:.6g})"
-    lon, lat = (float(np.median(degrees[:, axis])) for axis in (0, 1))
+    lon, lat = (median(degrees[:, axis]) for axis in (0, 1))
     return f"lies about {abs(lon):.1f} {'E' if lon >= 0 else 'W'}, {abs(lat):.1f} {'N' if lat >= 0 else 'S'}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.statistics import column_medians, median
 from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, WrittenAxes
 
 if TYPE_CHECKING:
@@ -39,9 +40,8 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
     xyz, written_axes = decoded or _plain(filled, control, frames, plan)
     known = np.column_stack([plan, plan, height])
     sigma = np.where(known & (control.sigma > 0), control.sigma, np.nan)
-    usual = [
-        float(np.nanmedian(part)) if np.isfinite(part).any() else USUAL_SIGMA for part in (sigma[:, :2], sigma[:, 2])
-    ]
+    stated = (part[np.isfinite(part)] for part in (sigma[:, :2], sigma[:, 2]))
+    usual = [median(part) if len(part) else USUAL_SIGMA for part in stated]
     return GivenPoints(
         ids=control.ids,
         xyz=np.where(known, xyz, np.nan),
@@ -74,8 +74,8 @@ def _moved(written: Floats, lists: Numbers) -> Floats:
         rows = np.flatnonzero((lists == number) & np.isfinite(written[:, :2]).all(axis=1))
         if len(rows) < LEAST_OF_LIST:
             continue
-        off = written[rows, :2] - np.median(written[rows, :2], axis=0)
-        far = np.abs(off) > FAR * np.median(np.abs(off), axis=0).max()
+        off = written[rows, :2] - column_medians(written[rows, :2])
+        far = np.abs(off) > FAR * column_medians(np.abs(off)).max()
         moved[rows, :2] = np.where(far, off, 0.0)
     return moved
 
@@ -89,7 +89,7 @@ def _filled(written: Floats, lists: Numbers) -> Floats:
             values = written[rows, axis]
             if not np.isfinite(values).any():
                 values = written[:, axis]
-            mean = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
+            mean = median(values[np.isfinite(values)]) if np.isfinite(values).any() else 0.0
             part = filled[rows, axis]
             filled[rows, axis] = np.where(np.isfinite(part), part, mean)
     return filled
@@ -102,7 +102,7 @@ def _decoded(filled: Floats, control: ControlPoints, frames: Sequence[GroundFram
         for number in np.unique(control.frame).tolist():
             rows = control.frame == number
             cartesian[rows] = frames[number].cartesian_from_ground(filled[rows])
-        middle = np.median(cartesian[plan], axis=0)
+        middle = column_medians(cartesian[plan])
         first = frames[int(control.frame[int(np.argmax(plan))])]
         turn = first.level_axes_at(middle[None, :])[0]
     except (GeometryError, InputError):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.notes import listed
+from photostrip.statistics import column_medians, median
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def find_odd_centers(
         yield _below([photos[number] for number in below.tolist()], depth, below, names)
     if len(photos) < LEAST_PHOTOS:
         return
-    flying = float(np.median(np.abs(depth)))
+    flying = median(np.abs(depth))
     yield from _heights(centers @ up, flying, photos, names)
     bases = np.diff(centers, axis=0)
     bases = bases - (bases @ up)[:, None] * up
@@ -59,7 +60,7 @@ def _below(photos: Sequence[str], depth: Floats, below: Numbers, names: tuple[st
         else f"the perspective centres of photos {listed(photos)} lie below the points that they show"
     )
     fix = "are x and y of the image coordinates or the axes of the control exchanged?"
-    evidence = {"lowest_over_usual": float(depth[below].min() / np.median(np.abs(depth)))}
+    evidence = {"lowest_over_usual": float(depth[below].min() / median(np.abs(depth)))}
     return found("P204", message, fix, evidence, photos=photos, strips=names)
 
 
@@ -97,14 +98,14 @@ def _beside(number: int, count: int) -> list[int]:
 def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
     """Line whose slope is the median of those of all pairs of points."""
     i, j = np.triu_indices(len(x), 1)
-    slope = float(np.median((y[j] - y[i]) / (x[j] - x[i])))
-    return float(np.median(y - slope * x)), slope
+    slope = median((y[j] - y[i]) / (x[j] - x[i]))
+    return median(y - slope * x), slope
 
 
 def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
     step = np.abs(np.diff(np.log(np.maximum(length, 1e-12))))
     for number in _worth_a_look(np.append(step, 0.0) > STEP_SHARE * np.log(LONG_BASE)):
-        usual = float(np.median(length[_beside(number, len(length))]))
+        usual = median(length[_beside(number, len(length))])
         ratio = float(length[number]) / max(usual, 1e-12)
         if SHORT_BASE < ratio < LONG_BASE:
             continue
@@ -118,7 +119,7 @@ def _directions(bases: Floats, up: Floats, photos: Sequence[str], names: tuple[s
     unit = bases / np.maximum(np.linalg.norm(bases, axis=1, keepdims=True), 1e-12)
     cosine = (unit[1:] * unit[:-1]).sum(axis=1)
     for number in _worth_a_look(np.append(cosine, 1.0) < np.cos(np.radians(STEP_SHARE * TURNED_DEG))):
-        usual = np.median(unit[_beside(number, len(bases))], axis=0)
+        usual = column_medians(unit[_beside(number, len(bases))])
         turn = np.degrees(np.arctan2(np.cross(usual, bases[number]) @ up, usual @ bases[number]))
         if abs(turn) <= TURNED_DEG:
             continue

@@ -12,6 +12,7 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.notes import MOST_NAMED, listed
+from photostrip.statistics import median
 from photostrip.triangulation.plausibility.finding import found
 from photostrip.triangulation.plausibility.photos import mosaic
 from photostrip.triangulation.plausibility.photos.units import reading_of
@@ -199,7 +200,7 @@ def _twice(links: mosaic.PhotoLinks) -> list[tuple[int, int]]:
     base = np.abs(links.bases[1])
     if not len(base):
         return []
-    usual = float(np.median(base))
+    usual = median(base)
     like = np.abs(np.log(np.maximum(np.abs(links.turn), mosaic.TINY))) < np.log(mosaic.SCALE_JUMP)
     same = (
         like
@@ -213,7 +214,7 @@ def _twice(links: mosaic.PhotoLinks) -> list[tuple[int, int]]:
 def _twin(links: mosaic.PhotoLinks, pair: tuple[int, int], strip: str, photos: Sequence[str]) -> Finding:
     row = links.index[pair]
     one, other = photos[pair[0]], photos[pair[1]]
-    usual = float(np.median(np.abs(links.bases[1])))
+    usual = median(np.abs(links.bases[1]))
     message = (
         f"photos {one} and {other} show their {links.count[row]} common points at the same places, within "
         f"{100 * float(links.misfit[row]) / usual:.2g} % of a base: the same photo twice"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.frozen import dataclass
+from photostrip.statistics import median
 from photostrip.triangulation.plausibility.control.control_strip import LEAST_REDUNDANCY, fit_simplest
 from photostrip.triangulation.plausibility.finding import found
 
@@ -58,7 +59,7 @@ def odd_ties(ties: TiesOfStrips) -> OddTies | None:
         return _of_few(ties)
     place, off = ties.plan[:, 0] + 1j * ties.plan[:, 1], ties.difference[:, 0] + 1j * ties.difference[:, 1]
     least = np.where(ties.rays > TWO_RAYS, MANY_RAYS_SHARE, ONE_RAY_SHARE) * ties.depth
-    middle = complex(np.median(off.real), np.median(off.imag))
+    middle = complex(median(off.real), median(off.imag))
     if (np.abs(off - middle) <= least).all():
         return None  # none is far from the others even if the strips share no bend
     local = (place - place.mean()) / max(float(np.abs(place - place.mean()).max()), 1e-9)
@@ -92,4 +93,4 @@ def find_shared_ids_of_strips(ties: TiesOfStrips) -> Iterator[Finding]:
 
 
 def _others(far: Floats) -> str:
-    return f"; half of the other common points agree within {np.median(far):.2g} m" if len(far) else ""
+    return f"; half of the other common points agree within {median(far):.2g} m" if len(far) else ""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.notes import listed
+from photostrip.statistics import median
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -150,8 +151,8 @@ def _unit_of_reach(camera: Camera) -> str:
 
 def _odd_photos(camera: Camera, photos: Sequence[str], reach: _Reach) -> Finding:
     """Say that some photos of a camera reach too far, or not far enough."""
-    own = float(np.median([reach.of_photo[photo] for photo in photos]))
-    others = float(np.median([each for photo, each in reach.of_photo.items() if photo not in photos]))
+    own = median([reach.of_photo[photo] for photo in photos])
+    others = median([each for photo, each in reach.of_photo.items() if photo not in photos])
     message = (
         f"image coordinates on {listed(photos)} reach to {own:.3g} times {_unit_of_reach(camera)}, on the other photos "
         f"of camera {camera.name} to {others:.2g}"
@@ -179,7 +180,7 @@ def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding
     odd = (scales < MARKS_RATIO[0]) | (scales > MARKS_RATIO[1])
     if not odd.any():
         return []
-    scale = float(np.median(scales[odd]))
+    scale = median(scales[odd])
     names = tuple(photo for photo, each in zip(photos, odd, strict=True) if each)
     reading = reading_of(1.0 / scale, MARKS_RATIO)
     message = (
@@ -196,7 +197,7 @@ def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding
 def is_measured(sigma0: Floats) -> bool:
     """Whether pairs of photos have noise, by their standard deviations of an image coordinate (p,), mm."""
     known = sigma0[np.isfinite(sigma0)]
-    return bool(len(known) and np.median(known) > LEAST_MEASURED)
+    return bool(len(known) and median(known) > LEAST_MEASURED)
 
 
 def find_wrong_sigmas(sigma0: Floats, stated: float, strip: str) -> list[Finding]:
@@ -206,7 +207,7 @@ def find_wrong_sigmas(sigma0: Floats, stated: float, strip: str) -> list[Finding
     """
     if not is_measured(sigma0):
         return []
-    middle = float(np.nanmedian(sigma0))
+    middle = median(sigma0[np.isfinite(sigma0)])
     if middle > stated / TOO_GOOD:
         return []
     message = (
@@ -227,7 +228,7 @@ def find_wrong_sigmas_of_given(off: Floats, sigma: Floats) -> list[Finding]:
         known = np.isfinite(off[:, columns] / sigma[:, columns]).all(axis=1)
         if known.sum() < LEAST_CHECKED:
             continue
-        middle, expected = (float(np.median(np.abs(each[known][:, columns]))) for each in (off, sigma))
+        middle, expected = (median(np.abs(each[known][:, columns])) for each in (off, sigma))
         if middle < expected / TOO_GOOD:
             message = (
                 f"check points are {middle:.3g} m off in {name}, less than a thirtieth of the standard deviation that "
