@@ -1,19 +1,21 @@
-"""Frozen dataclasses, made without compiling code.
+"""Frozen dataclasses and named tuples, made without compiling code.
 
-The decorator of the standard library writes and compiles four functions for each class, 0.5 ms; a run loads 150. Here
-all classes share theirs, and the standard library sees a class when it is asked for its fields. For type checkers,
-``fields``, ``replace`` and ``asdict`` they are dataclasses.
+The standard library writes and compiles four functions for each dataclass, 0.5 ms, and for each named tuple one and
+every annotation, 0.2 ms; a run loads 150 and 50. Here all classes share theirs, and the standard library sees a
+dataclass when it is asked for its fields. For type checkers, ``fields`` and ``asdict`` they are what it makes.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Never, TypeVar
+from functools import cache
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any, Never, Self, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
-__all__ = ["dataclass"]
+__all__ = ["NamedTuple", "dataclass", "replace"]
 
 T = TypeVar("T")
 FIELDS = "__dataclass_fields__"  # where the standard library keeps them
@@ -60,6 +62,7 @@ def _declared(cls: type) -> dict[str, Any]:
     return found
 
 
+@cache
 def _values_left_out(cls: type) -> tuple[dict[str, None], dict[str, Any], dict[str, Callable[[], object]]]:
     """Names of all fields, defaults, and functions that make one."""
     names: dict[str, None] = {}
@@ -77,26 +80,33 @@ def _values_left_out(cls: type) -> tuple[dict[str, None], dict[str, Any], dict[s
 
 def _builder(cls: type) -> Callable[..., None]:
     """Make the ``__init__`` of a class."""
-    known: list[tuple[dict[str, None], dict[str, Any], dict[str, Callable[[], object]]]] = []
     finish = getattr(cls, "__post_init__", None)
 
     def build(self: object, *values: object, **named: object) -> None:
-        if not known:
-            known.append(_values_left_out(cls))
-        names, defaults, factories = known[0]
+        names, defaults, factories = _values_left_out(cls)
         given = dict(zip(names, values, strict=False))
         state = {**defaults, **given, **named}
         for name, factory in factories.items():
             if name not in state:
                 state[name] = factory()
         if len(values) > len(given) or given.keys() & named or state.keys() != names.keys():
-            message = f"{cls.__qualname__} has {', '.join(names)}, not {len(values)} values and {', '.join(named)}"
-            raise TypeError(message)
+            _refuse_arguments(cls, names, values, named)
         self.__dict__.update(state)
         if finish is not None:
             finish(self)
 
     return build
+
+
+def _refuse_arguments(cls: type, names: Iterable[str], values: Sequence[object], named: Iterable[str]) -> Never:
+    message = f"{cls.__qualname__} has {', '.join(names)}, not {len(values)} values and {', '.join(named)}"
+    raise TypeError(message)
+
+
+def _replace(value: Any, /, **changes: object) -> Any:  # noqa: ANN401 (any dataclass)
+    made: Any = type(value)
+    names, _, _ = _values_left_out(made)
+    return made(**{name: getattr(value, name) for name in names} | changes)
 
 
 def _values(value: Any) -> tuple[object, ...]:  # noqa: ANN401 (any dataclass)
@@ -121,7 +131,47 @@ def _refuse(self: object, name: str, *_: object) -> Never:
     raise dataclasses.FrozenInstanceError(message)
 
 
+class _NamedTuple(tuple):  # type: ignore[type-arg]
+    """What a class of named values is derived from."""
+
+    __slots__ = ()
+
+    _fields: tuple[str, ...] = ()
+    _field_defaults: Mapping[str, object] = {}
+
+    def __init_subclass__(cls) -> None:
+        own = vars(cls)
+        cls._fields = tuple(own["__annotations__"])
+        cls._field_defaults = {name: own[name] for name in cls._fields if name in own}
+        for place, name in enumerate(cls._fields):
+            setattr(cls, name, property(itemgetter(place)))
+
+    def __new__(cls, *values: object, **named: object) -> Self:
+        names = cls._fields
+        if named or len(values) != len(names):
+            given = dict(zip(names, values, strict=False))
+            state = {**cls._field_defaults, **given, **named}
+            if len(values) > len(given) or given.keys() & named or state.keys() != set(names):
+                _refuse_arguments(cls, names, values, named)
+            values = tuple(state[name] for name in names)
+        return tuple.__new__(cls, values)
+
+    def __getnewargs__(self) -> tuple[object, ...]:
+        return tuple(self)
+
+    def __repr__(self) -> str:
+        shown = (f"{name}={value!r}" for name, value in self._asdict().items())
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+    def _asdict(self) -> dict[str, object]:
+        return dict(zip(self._fields, self, strict=True))
+
+    def _replace(self, **changes: object) -> Self:
+        return type(self)(**self._asdict() | changes)
+
+
 if TYPE_CHECKING:
-    from dataclasses import dataclass
+    from dataclasses import dataclass, replace
+    from typing import NamedTuple
 else:
-    dataclass = _dataclass
+    dataclass, replace, NamedTuple = _dataclass, _replace, _NamedTuple

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import field, fields, replace
+from dataclasses import field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

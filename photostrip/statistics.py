@@ -1,4 +1,4 @@
-"""Medians; distribution functions in plain Python, quantiles and critical values of the tests.
+"""Distribution functions in plain Python, quantiles and critical values of the tests.
 
 scipy.special has the distributions, and the tests compare every function here with it; but importing it takes 0.18 s, a
 third of the whole run of a small project, for a dozen numbers. Continued fractions after Lentz; relative errors are
@@ -12,14 +12,8 @@ from math import exp, fabs, inf, lgamma, log, sqrt
 from statistics import NormalDist
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 # A sound result calls for a second look with this probability at the most, for whatever reason: sigma0, pairs, points
 # that the adjustment has not seen, given points that stand out, deformed models, control against a strip's covariance.
@@ -32,21 +26,6 @@ TINY = 1e-300
 PRECISION = 1e-16
 TERMS = 100_000
 STEPS = 200
-
-
-def median(values: ArrayLike) -> float:
-    """As ``np.median`` has it, which loads ``numpy.ma`` at its first call: a sixteenth of the other imports."""
-    return float(column_medians(np.ravel(np.asarray(values, float))))
-
-
-def column_medians(values: ArrayLike) -> Floats:
-    """Median of each column; NaN where one is, or where there are no rows."""
-    rows = np.asarray(values, float)
-    if not len(rows):
-        return np.full(rows.shape[1:], np.nan)
-    low, high = (len(rows) - 1) // 2, len(rows) // 2
-    parted = np.partition(rows, (low, high, -1), axis=0)  # NaN come last
-    return np.where(np.isnan(parted[-1]), np.nan, (parted[low] + parted[high]) / 2)
 
 
 def _continued_fraction(terms: Iterator[tuple[float, float]]) -> float:

@@ -14,10 +14,8 @@ from scipy.stats import ncx2
 
 from photostrip.statistics import (
     chi2_quantile,
-    column_medians,
     f_p_value,
     grubbs_limit,
-    median,
     noncentrality,
     normal_quantile,
     t_p_value,
@@ -231,16 +229,3 @@ def test_the_noncentrality_has_the_power_asked_for(significance: float, power: f
 
 def test_the_noncentrality_of_one_error_is_that_of_geodesy() -> None:
     assert noncentrality(0.001, 0.8, 1) ** 0.5 == pytest.approx(4.13, abs=0.003)
-
-
-@given(st.lists(st.floats() | st.integers(-3, 3), min_size=1, max_size=12))
-def test_medians_are_those_of_numpy(values: list[float]) -> None:
-    with np.errstate(all="ignore"):
-        np.testing.assert_array_equal(median(values), np.median(values))
-        both = np.column_stack([values, values[::-1]])
-        np.testing.assert_array_equal(column_medians(both), np.median(both, axis=0))
-
-
-def test_the_median_of_nothing_is_unknown() -> None:
-    assert np.isnan(median([]))
-    assert np.isnan(column_medians(np.zeros((0, 3)))).all()

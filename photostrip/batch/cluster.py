@@ -14,7 +14,6 @@ import socket
 import threading
 import time
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -28,6 +27,7 @@ from photostrip.batch.result_folder import program
 from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.batch.worker_process import WORK
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import replace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

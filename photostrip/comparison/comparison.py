@@ -6,7 +6,7 @@ import math
 import re
 import sys
 from collections import Counter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from photostrip.comparison.members import members_of, missing_and_new
 from photostrip.comparison.quantities import Quantity, quantities_of
 from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError, incomplete
+from photostrip.frozen import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

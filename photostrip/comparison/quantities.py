@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, TypeGuard
+from typing import TYPE_CHECKING, TypeGuard
 
+from photostrip.frozen import NamedTuple
 from photostrip.result.description import quantity_at
 
 if TYPE_CHECKING:

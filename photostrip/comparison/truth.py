@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from photostrip.comparison.ground import east_north_up, level, plan_and_height
 from photostrip.errors import Fault, InputError, incomplete
+from photostrip.frozen import replace
 from photostrip.result.description import Quantity, Table
 from photostrip.result.reading import MOST_FAULTS, faults_of
 from photostrip.statistics import chi2_quantile

@@ -9,14 +9,13 @@ Source: [001] eq. 152, 153; directions of grid axes are derived.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError, PhotostripError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import Ellipsoid, curvature_correction, meridian_radius, prime_vertical_radius
 from photostrip.geodesy.domain import finite_rows, named_rows, require_reached, require_rows
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import replace
 from photostrip.library.result import Result
 from photostrip.notes import counted
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple
 from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
 from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips

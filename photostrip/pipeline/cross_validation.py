@@ -6,12 +6,12 @@ control, polynomials, covariance or bundle adjustment, precision.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.frozen import replace
 from photostrip.pipeline.given_points import rejected_control
 from photostrip.pipeline.results import Fold
 

@@ -5,18 +5,17 @@ Source: [001] eq. 153 for Earth curvature in the frames; see docs/frames.md.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import median
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.curvature import curvature_correction
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
 from photostrip.pipeline.refusals import refuse_curvature_twice
-from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -5,12 +5,11 @@ Source: [001] for interior orientation and corrections, see docs/image-coordinat
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.common_points import mean_points
 from photostrip.pipeline.given_points import measured_control
 from photostrip.pipeline.strips.adjusting import adjust_formed

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.frozen import dataclass
-from photostrip.statistics import median
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import replace
 from photostrip.notes import Note
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_again
 
@@ -111,7 +112,7 @@ def restored(screened: ScreenedPairs, weight: Floats, kept: Flags) -> ScreenedPa
     if not back.any():
         return screened
     restored_weight = np.where(back, weight, oriented.pairs.weight)
-    oriented = orient_again(oriented, restored_weight, np.unique(oriented.pairs.pair[back]))
+    oriented = orient_again(oriented, restored_weight, distinct(oriented.pairs.pair[back]))
     log = tuple(replace(each, readmitted=each.readmitted or bool(back[each.row])) for each in screened.rejections)
     return replace(screened, orientation=oriented, rejections=log)
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.frozen import replace
 from photostrip.pipeline.common_points import join_strips
 from photostrip.pipeline.cross_validation import cross_validate
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.notes import Note
-from photostrip.statistics import median
 from photostrip.triangulation.bundle.quality import reliability
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ Source: [004b] eq. 1-8, with the corrections that ``photostrip sources`` lists.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.triangulation.image_coordinates.lens_distortion import ideal_from_image
 from photostrip.units import MILLIMETRES
 

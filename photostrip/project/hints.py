@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import replace
 from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
 from photostrip.project.conversion import certificate_of

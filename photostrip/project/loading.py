@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.source import current, seen_from
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings

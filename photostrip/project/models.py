@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.formats.measured.models import ModelTable, read_models
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import listed
 from photostrip.pipeline import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate

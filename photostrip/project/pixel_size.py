@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import replace
 from photostrip.notes import Note, counted
-from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

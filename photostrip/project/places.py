@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import replace
 from photostrip.project.yaml.document import Node, steps
 
 if TYPE_CHECKING:

@@ -6,13 +6,12 @@ here, values there.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from photostrip import camera, simulation
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.ground import CRS, UNDULATION, Ellipsoid

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +16,7 @@ from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.zones import FEWEST, join_zones
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, listed

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from photostrip.frozen import NamedTuple, replace
 from photostrip.result.description import Quantity, table_at
 from photostrip.result.quantities import angle_decimals, coordinate_decimals
 

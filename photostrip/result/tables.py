@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from photostrip.frozen import NamedTuple, replace
 from photostrip.result import columns
 from photostrip.result.description import Quantity, Table, table_at
 

@@ -6,13 +6,13 @@ brought into the system of the instrument, with errors that do not depend on eac
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import distinct
+from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_vector
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.simulation.draws import Draws, Purpose
@@ -51,7 +51,7 @@ def plotted(
     wanted, place = spec.models, {name: k for k, name in enumerate(truth.photo_ids)}
     pairs = [(place[a], place[b]) for _, photos in strips for a, b in pairwise(photos)]
     systems = Draws(spec.seed, Purpose.MODELS).normal(len(pairs), 7)
-    shows = [np.unique(observations.point[observations.photo == k]) for k in range(len(observations.photo_ids))]
+    shows = [distinct(observations.point[observations.photo == k]) for k in range(len(observations.photo_ids))]
     number = {name: k for k, name in enumerate(observations.photo_ids)}
     points = len(observations.point_ids)
     model, node, xyz = [], [], []

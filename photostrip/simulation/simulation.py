@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted

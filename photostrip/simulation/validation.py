@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault
+from photostrip.frozen import replace
 from photostrip.notes import counted
 from photostrip.simulation.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES, Spec
 from photostrip.triangulation.image_coordinates import lens_distortion

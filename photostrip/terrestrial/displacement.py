@@ -5,10 +5,11 @@ A pseudo-parallax is the difference of a coordinate on two photos taken from the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple
 from photostrip.statistics import chi2_quantile
 
 if TYPE_CHECKING:

@@ -7,13 +7,12 @@ covariance.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.terrestrial.camera_motion import ANGLES, ImagePair, Motion, find_motion
 from photostrip.terrestrial.displacement import displacements, limit
 from photostrip.terrestrial.frame import small_turn

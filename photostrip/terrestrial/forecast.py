@@ -7,11 +7,11 @@ distances of the points are known, and what is seen is the displacement across t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.statistics import noncentrality
 from photostrip.terrestrial.displacement import SPACE
 from photostrip.terrestrial.epochs import monitor

@@ -10,13 +10,13 @@ computed from coordinates have no refraction in them, and the photo has: beta of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.notes import listed
 from photostrip.rejection import Rejection
@@ -61,7 +61,7 @@ class Sightings:
         return np.asarray(~np.isnan(self.directions), bool)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class OrientationSettings:
     """How a photo is oriented."""
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.notes import Note, named
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.monitoring import MEASURED, REASONS, Monitoring
@@ -107,7 +108,7 @@ def _misorientation(result: Monitoring) -> Iterator[Note]:
 def _missing(result: Monitoring) -> Iterator[Note]:
     """Name points without displacements, by epoch and reason."""
     for number, epoch in enumerate(result.series.epochs):
-        for code in np.unique(result.reason[number]):
+        for code in distinct(result.reason[number]):
             if code == MEASURED:
                 continue
             names = [result.series.points[row] for row in np.flatnonzero(result.reason[number] == code)]

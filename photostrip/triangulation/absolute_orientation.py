@@ -10,20 +10,19 @@ Source: [001] eq. 142-149; mixed control and its weights are derived.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import column_medians, median
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
 from photostrip.geometry.similarity import Similarity, collinearity, similarity_derivatives
 from photostrip.notes import listed
-from photostrip.statistics import column_medians, median
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

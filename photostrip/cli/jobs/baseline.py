@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import typer
@@ -12,6 +11,7 @@ from photostrip.comparison import Tolerances, baseline_of, compare_results
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.formats.text.writing import write_text
+from photostrip.frozen import replace
 from photostrip.library.comparison import BASELINE, place_of, results_below
 from photostrip.report.commands.compare import headline
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from photostrip.formats.measured.columns import AXES, POINT, SIGMAS, numbers, sigmas
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
+from photostrip.frozen import dataclass
 from photostrip.notes import listed
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ CONTROL = (
 )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class GivenTable:
     """Given coordinates as the table has them: columns in the order of the list's axes."""
 
@@ -48,7 +48,7 @@ class GivenTable:
         return np.asarray(self.use.any(axis=1), bool)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class ControlTable(GivenTable):
     """Given coordinates of points on the ground."""
 

@@ -6,7 +6,6 @@ another system, and their standard deviations in ``s_alpha`` and so on; ``photos
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +22,7 @@ from photostrip.formats.measured.columns import (
 from photostrip.formats.measured.control import USE, GivenTable, given_columns, refuse_empty
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
+from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,7 +41,7 @@ POSITIONS = (
 )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class PositionTable(GivenTable):
     """Measured positions of cameras."""
 

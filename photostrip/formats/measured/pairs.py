@@ -6,16 +6,16 @@ right photo x - p, y - q: p and q are the parallaxes. Every row becomes one row 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.formats.measured.columns import POINT, numbers, sigmas
 from photostrip.formats.text.tables import Column, Table
+from photostrip.frozen import replace
 from photostrip.notes import counted
 from photostrip.points import locate
-from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct, median, quantile
+from photostrip.frozen import replace
 from photostrip.notes import Note, counted
-from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
@@ -93,13 +93,13 @@ def _refuse_all(
     """
     several = np.bincount(group)[group] > 1
     far = several & (np.nan_to_num(ratio.max(axis=1)) > FARTHEST)
-    names = len(np.unique(group[several]))
+    names = len(distinct(group[several]))
     if names < LEAST_TOGETHER or far.sum() <= MOST_SHARE * several.sum():
         return False
     scatter = median(np.abs(off[several]).max(axis=1))
-    reach = float(np.quantile(np.abs(read.xy), REACH_SHARE))
+    reach = quantile(np.abs(read.xy), REACH_SHARE)
     head = (
-        f"{names} {target}s are measured several times on a photo, and {len(np.unique(group[far]))} of them lie more "
+        f"{names} {target}s are measured several times on a photo, and {len(distinct(group[far]))} of them lie more "
         f"than {FARTHEST:g} standard deviations from their mean"
     )
     if scatter < AGREEING_SHARE * reach:

@@ -6,12 +6,13 @@ which they were placed.
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from photostrip.formats.output import simulation_tables as tables
 from photostrip.formats.output.simulation_tables import on_one_line
 from photostrip.formats.output.simulation_truth import truth_text
+from photostrip.frozen import replace
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, Strip

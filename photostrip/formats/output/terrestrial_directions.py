@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.formats.output.csv_text import to_csv
+from photostrip.frozen import NamedTuple
 from photostrip.result.numbers import EXACT, Document, rounded, significant
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.frame import Phototheodolite, directions_from_photo, photo_from_directions

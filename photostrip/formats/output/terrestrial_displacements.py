@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, Attitude, head
+from photostrip.frozen import NamedTuple
 from photostrip.result.numbers import Document, natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.displacement import ellipses

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import re
-from dataclasses import replace
 from itertools import islice
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -21,6 +20,7 @@ from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import LARGEST, SMALLEST, NotANumber, number, shown
 from photostrip.formats.text.table_text import TableText, content
 from photostrip.formats.text.tables import CONTROL_CHARACTER, Column, Table
+from photostrip.frozen import replace
 from photostrip.notes import Note, counted, listed
 
 if TYPE_CHECKING:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.frozen import NamedTuple, replace
 from photostrip.pipeline.block import block_result
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start

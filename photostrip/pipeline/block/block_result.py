@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
+from photostrip.frozen import replace
 from photostrip.pipeline.block import block_notes
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, Bundle, Precision, StripResult, Ties
-from photostrip.statistics import median
 from photostrip.triangulation.bundle.quality import self_calibration
 from photostrip.triangulation.resection.resection import with_residuals
 

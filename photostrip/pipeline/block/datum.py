@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import from_angles
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.pipeline.given_points import cartesian_of
 from photostrip.pipeline.strips.absolute import middle_frame
 from photostrip.points import ControlPoints, PhotoPoints, locate
-from photostrip.statistics import median
 from photostrip.triangulation import absolute_orientation
 
 if TYPE_CHECKING:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct, median
+from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import angle_rates, from_angles
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import BlockProblem, BlockStart
 from photostrip.points import ControlPoints, PhotoPoints, locate
-from photostrip.statistics import median
 from photostrip.triangulation.bundle.observations.problem import (
     AttitudeObservations,
     BundleCameras,
@@ -271,7 +271,7 @@ def _begin(
     paired = np.zeros(len(used), bool)
     for strip in start.strips:
         used[strip.of_photos.rows[strip.of_photos.rows < len(used)]] = True
-        in_pairs = np.unique(strip.of_photos.orientation.rows)
+        in_pairs = distinct(strip.of_photos.orientation.rows)
         paired[in_pairs[in_pairs < len(used)]] = True
     inside = used[rows]
     free = ~paired[rows]

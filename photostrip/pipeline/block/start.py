@@ -8,12 +8,13 @@ strip gives frame and scale. Single photos are resected on what is known by then
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import GeometryError
+from photostrip.frozen import NamedTuple, replace
 from photostrip.geometry.similarity import collinearity
 from photostrip.pipeline.block.datum import (
     LEAST_TIES,
@@ -122,7 +123,7 @@ class _Block:
     def _on(self, stage: FormedPhotos, numbers: Numbers, cartesian: Floats) -> StripResult:
         """Adjust a strip on points with Cartesian coordinates, beside its own control."""
         known = self.known
-        chosen = np.unique(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_TIES)).astype(np.intp))
+        chosen = distinct(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_TIES)).astype(np.intp))
         ids = tuple(self.observations.point_ids[n] for n in numbers[chosen])
         ground = known.output.ground_from_cartesian(cartesian[chosen], ids=ids)
         given = set(ids)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.frozen import NamedTuple
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.plausibility import evidence
 from photostrip.points import ControlPoints

@@ -7,13 +7,13 @@ it then fits much better, and the pairs no worse, that is reported.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
+from photostrip.frozen import NamedTuple, replace
 from photostrip.pipeline.plausibility import evidence
-from photostrip.statistics import median
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control import control_heights
 

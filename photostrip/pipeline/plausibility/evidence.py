@@ -5,17 +5,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import column_medians, distinct, median, quantile
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.points import locate
-from photostrip.statistics import column_medians, median
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.triangulation.plausibility.control.control_strip import Rays, StripPoints
@@ -205,7 +204,7 @@ def stretches(
     points, centers = (each - np.outer(each @ up, up) for each in (on_strip.xyz, on_strip.centers))
     near = _nearest(points, centers)
     count = min(most, length // photos)
-    for start in np.unique(np.linspace(0, length - photos, count).astype(np.intp)).tolist():
+    for start in distinct(np.linspace(0, length - photos, count).astype(np.intp)).tolist():
         part = slice(start, start + photos)
         inside = (near >= part.start) & (near < part.stop)
         axes, centers = on_strip.axes[part], on_strip.centers[part]
@@ -321,7 +320,7 @@ def half_breadth(
     inside = strip.positions(observations) >= 0
     angle = _base_angle(strip.photos, steps)
     across = observations.xy[inside] @ [-np.sin(angle), np.cos(angle)]
-    half = float(np.quantile(np.abs(across), BREADTH_SHARE))
+    half = quantile(np.abs(across), BREADTH_SHARE)
     given = locate(observations.point_ids, ids)[observations.point]
     rows = np.flatnonzero(inside & (given >= 0))
     rows = rows[np.argsort(observations.photo[rows], kind="stable")]

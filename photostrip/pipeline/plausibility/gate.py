@@ -6,12 +6,13 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.errors import GeometryError, InputError
+from photostrip.frozen import replace
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.common_points import compared_strips
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
@@ -26,7 +27,6 @@ from photostrip.pipeline.plausibility import (
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images
 from photostrip.points import locate
-from photostrip.statistics import median
 from photostrip.triangulation.plausibility import accepted
 from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
 from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, tied_strips, units

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import column_medians, median
 from photostrip.errors import GeometryError, InputError
+from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.pipeline.given_points import cartesian_of, rows_of_given
 from photostrip.points import locate
-from photostrip.statistics import column_medians, median
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.photos import flight
 from photostrip.triangulation.plausibility.photos import rotations as given_angles

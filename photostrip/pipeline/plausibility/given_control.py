@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Self
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.crs import area_of_use
 from photostrip.pipeline.plausibility import distance_trial, evidence
 from photostrip.triangulation.plausibility.control import (

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.plausibility.base_directions import closer_look
 from photostrip.triangulation.plausibility.photos import flight_order, units
 

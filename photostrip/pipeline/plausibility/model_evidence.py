@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median, quantile
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.strips.models import form_models
-from photostrip.statistics import median
 from photostrip.triangulation.plausibility.control.control_strip import StripPoints
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def _evidence(
     on_strip = StripPoints(strip.id, xyz, axes=axes, centers=centers, floor=floor, depth=abs(middle))
     along = np.interp(xyz[:, 0], centers[:, 0], known.astype(float))
     length = max(float(np.ptp(centers[:, 0])), 1e-9)
-    breadth = float(np.quantile(np.abs(formed.xyz[:, 1] - median(formed.xyz[:, 1])), 0.95)) / length
+    breadth = quantile(np.abs(formed.xyz[:, 1] - median(formed.xyz[:, 1])), 0.95) / length
     return ModelStripEvidence(
         strip=strip,
         centers=centers,

@@ -7,16 +7,16 @@ nothing wrong with the given points of a strip has compared them better than the
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import median
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.pipeline.given_points import rejected_control, rows_of_given
 from photostrip.points import locate
-from photostrip.statistics import SIGMA_FROM_MEDIAN, median, normal_quantile
+from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
 from photostrip.triangulation.plausibility.control import control_slips, given_points
 from photostrip.triangulation.plausibility.control.control_fit import ODD_PROBABILITY
 

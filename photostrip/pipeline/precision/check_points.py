@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.pipeline.precision.check_points import CheckPoints, check_points
 from photostrip.pipeline.precision.strip_precision import StripPrecision
-from photostrip.statistics import chi2_quantile, median
+from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.pipeline.choice import POLYNOMIAL, Choice, Witness, method_of
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
 from photostrip.triangulation.error_propagation import control_errors, covariances
@@ -43,7 +44,7 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
     groups, by = _groups(oriented, polynomial)
     left_out, excess = _left_out(oriented, polynomial, covariance, groups)
     taken = method_of(predicted.ratio)
-    believed = excess <= MOST_EXCESS or len(np.unique(_bands(oriented))) < TELLING
+    believed = excess <= MOST_EXCESS or len(distinct(_bands(oriented))) < TELLING
     if left_out is not None and not believed and left_out.ratio > 1 / BETTER:
         taken = POLYNOMIAL
     return Choice(taken=taken, predicted=predicted, left_out=left_out, left_out_by=by, excess=excess)
@@ -52,7 +53,7 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
 def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Witness:
     """Compare the standard deviations of new points; of control where there are no others."""
     errors, found = oriented.errors, oriented.misclosures
-    new = np.setdiff1d(np.arange(len(oriented.xyz)), oriented.control_rows[found.point])
+    new = np.delete(np.arange(len(oriented.xyz)), oriented.control_rows[found.point])
     points = _spread(new if len(new) else np.arange(len(oriented.xyz)), MOST_POINTS)
     fit = _fit(oriented, polynomial, np.arange(len(found.point)))
     parameters = covariances.of_parameters(errors, found, fit.operator, covariance.factor)
@@ -126,7 +127,7 @@ def _mean(values: Floats) -> float:
 def _by_polynomial(oriented: Oriented, polynomial: Polynomial, rows: Numbers) -> Floats:
     """Predict control coordinates by similarity and polynomial of all others: strip minus given, metres."""
     found = oriented.misclosures
-    others = np.setdiff1d(np.arange(len(found.point)), rows)
+    others = np.delete(np.arange(len(found.point)), rows)
     misclosures = oriented.absolute.misclosures[found.point, found.axis]
     try:
         fit = _fit(oriented, polynomial, others)

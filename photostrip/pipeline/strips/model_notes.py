@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct, median
 from photostrip.notes import Note
-from photostrip.statistics import median
 from photostrip.triangulation.independent_models.link_screening import LEFT
 from photostrip.triangulation.independent_models.model_errors import far_ends
 
@@ -65,7 +65,7 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
         )
         yield Note("contradicting-link", text, strip=strip.id, points=tuple(points))
     left = np.bincount(shared.link, links.used, shared.count)
-    for link in np.unique(shared.link[[each.row for each in links.rejections]]).tolist():
+    for link in distinct(shared.link[[each.row for each in links.rejections]]).tolist():
         if left[link] < LEFT:  # two conditions check nine coordinates
             names, out = strip.models[link : link + 2], shared.before[(shared.link == link) & ~links.used]
             points = [measured.name(node) for node in models.node[out].tolist()]

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median, quantile
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.overruling import CENTER
 from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.model_notes import link_notes
 from photostrip.points import ModelPoints, locate, take_rows
-from photostrip.statistics import median
 from photostrip.triangulation.independent_models import (
     link_screening,
     linking,
@@ -72,7 +71,7 @@ class LinkedModels:
         base = np.linalg.norm(np.diff(similarity(self.formed.centers), axis=0), axis=1)
         length = np.ptp(xyz[:, 0]) / self.formed.models.count
         spacing = float(base[np.isfinite(base)].mean()) if np.isfinite(base).any() else float(length)
-        return spacing, max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
+        return spacing, max(quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
 
     def differentiate(self, similarity: Similarity) -> model_errors.ModelErrors:
         return model_errors.differentiate_models(self.formed, similarity)

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import column_medians
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted
-from photostrip.statistics import column_medians
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING, Orientation

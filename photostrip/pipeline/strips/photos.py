@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct, median, quantile
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.screened_formation import form_screened, with_readmitted
-from photostrip.statistics import median
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.error_propagation.joint_covariances import joint_covariance
 from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
@@ -80,7 +79,7 @@ class FormedPhotos:
     def extent(self, similarity: Similarity) -> tuple[float, float]:
         centers, xyz = similarity(self.formed.centers), similarity(self.formed.xyz)
         spacing = float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean())
-        return spacing, max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
+        return spacing, max(quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
 
     def differentiate(self, similarity: Similarity) -> strip_errors.StripErrors:
         position = self.strip.positions(self.observations)
@@ -220,7 +219,7 @@ class FormedPhotos:
         """Image points that are used in a model or place a point without one, in the order of the photos."""
         oriented, formed = self.orientation, self.formed
         in_models = oriented.rows[oriented.used & np.isfinite(formed.model_xyz).all(axis=1)]
-        rows = np.union1d(in_models, formed.bridging)
+        rows = distinct(np.append(in_models, formed.bridging))
         photo = self.strip.positions(self.observations)[rows]
         order = np.argsort(photo, kind="stable")
         return _Rays(rows[order], photo[order])

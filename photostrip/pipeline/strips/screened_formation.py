@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import GeometryError
+from photostrip.frozen import NamedTuple, replace
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS
 from photostrip.triangulation.relative_orientation.orientation import orient_again
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
@@ -60,7 +61,7 @@ def form_screened(
     if found is None:
         return ScreenedStrip(of_pairs, formed, (), tested=False)
     used, aside = _uses(of_pairs, found, readmit=readmit)
-    changed = np.unique(of_pairs.pairs.pair[used != of_pairs.used])
+    changed = distinct(of_pairs.pairs.pair[used != of_pairs.used])
     oriented = orient_again(of_pairs, np.where(used, rays.weight, 0.0), changed) if len(changed) else of_pairs
     try:
         formed = form_from_pairs(
@@ -76,8 +77,8 @@ def _bridged(
     formed: FormedStrip, oriented: Orientation, rays: StripRays, photos: Sequence[str], found: Sequence[Rejection]
 ) -> FormedStrip:
     """Add the points whose good rays come from photos that are no neighbours."""
-    missing = ~np.isin(oriented.point, formed.point)
-    good = np.setdiff1d(oriented.rows[missing], [each.row for each in found])
+    rows = oriented.rows[~np.isin(oriented.point, formed.point)]
+    good = distinct(rows[~np.isin(rows, [each.row for each in found])])
     if not len(good):
         return formed
     return non_neighbours.bridge(formed, rays.observations, photos, oriented.pairs.focal, good)

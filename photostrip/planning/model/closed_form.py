@@ -8,9 +8,11 @@ With ``printed`` the functions compute what stands in print.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from photostrip.frozen import NamedTuple
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

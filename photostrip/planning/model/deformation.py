@@ -9,12 +9,12 @@ Source: [003] eq. 10.7-10.12, with results of Lobanov and of Skiridov.
 from __future__ import annotations
 
 from math import erfc, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.planning.model.element_errors import influence, measured_covariance
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
 from photostrip.triangulation.relative_orientation import six_points

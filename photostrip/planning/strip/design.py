@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, spots_of
 from photostrip.planning.strip.ideal_strip import IdealStrip, StripGeometry, ideal_strip
 from photostrip.planning.strip.methods import BUNDLE, COVARIANCE, DEGREES, METHODS, SIMILARITY, Accuracy, accuracy

@@ -5,13 +5,12 @@ It is simulated and taken through the operations of the strip method, so that wh
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
 from photostrip.notes import counted
 from photostrip.simulation import Control, Flight, Ground, Image, Points, Simulation, Spec, Terrain, simulate

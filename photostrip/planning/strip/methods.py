@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import quantile
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import FrameSpec
@@ -63,7 +64,7 @@ class Accuracy:
     @property
     def new(self) -> Numbers:
         """Points that are not control."""
-        return np.setdiff1d(np.arange(len(self.covariance)), self.control)
+        return np.delete(np.arange(len(self.covariance)), self.control)
 
 
 def control_of(strip: IdealStrip, spots: tuple[Spot, ...], sigma: Triple) -> ControlPoints:
@@ -127,7 +128,7 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     numbers, targets, weight, xyz = ground.numbers, ground.targets, ground.weight, ground.xyz
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
-        breadth = max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
+        breadth = max(quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
         problem = correction.FitProblem(
             xyz=xyz[numbers], targets=targets, weight=weight, spacing=strip.geometry.base, breadth=breadth
         )

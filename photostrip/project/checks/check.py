@@ -7,7 +7,6 @@ coordinate gets and from where, and what became of every row of every table.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.findings import Findings
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.project.yaml.document import fault_at, key_path
 from photostrip.units import MICROMETRES
@@ -81,7 +82,7 @@ def points_of_strip(models: MeasuredModels, number: int) -> Numbers:
     points = models.points
     known = set(models.strips[number].models)
     inside = np.array([name in known for name in points.model_ids], bool)[points.model]
-    return np.unique(points.node[inside & (points.node < len(points.point_ids))])
+    return distinct(points.node[inside & (points.node < len(points.point_ids))])
 
 
 def photos_of_points(models: MeasuredModels) -> dict[str, set[str]]:

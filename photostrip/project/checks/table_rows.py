@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable
+from photostrip.frozen import NamedTuple
 from photostrip.project.tables import Tables, rays
 
 if TYPE_CHECKING:

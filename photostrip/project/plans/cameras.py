@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from photostrip.errors import InputError
+from photostrip.frozen import NamedTuple, replace
 from photostrip.planning import camera_efficiency
 from photostrip.project.conversion import distortion_of
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Percent, SigmaUm, read_plan

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple, replace
 from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
 from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
 from photostrip.project.schema.values import Fraction, Number, Range, Words, bounded, one_of

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import NamedTuple
 from photostrip.planning.model.plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong

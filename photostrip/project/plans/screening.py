@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
+from photostrip.frozen import NamedTuple
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
 from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
 from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 from photostrip.formats.text.findings import suggestion
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.planning.strip.control_layout import LAYOUTS, USES, ControlLayout, Spot
 from photostrip.planning.strip.design import Design, DesignReport, plan_strip
 from photostrip.planning.strip.ideal_strip import LEAST_PHOTOS, StripGeometry

@@ -5,12 +5,13 @@ Values arrive as texts (see ``yaml.document``) and get their type here. ``wrong`
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import SMALLEST, NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.tables import CONTROL_CHARACTER
+from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.project.schema.sections import Read, wrong
 

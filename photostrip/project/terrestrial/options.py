@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POIN
 from photostrip.formats.output.terrestrial_directions import Attitude, Theodolite
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber, number, shown
+from photostrip.frozen import NamedTuple, replace
 from photostrip.project.terrestrial import ranges
 from photostrip.project.terrestrial.cameras import preset, read_presets
 from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo, photo_from_directions

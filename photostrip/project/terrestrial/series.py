@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault
 from photostrip.formats.measured import terrestrial
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
 from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLIMETRES, refuse_outside

@@ -7,10 +7,11 @@ what each of them is.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from photostrip.errors import Fault
 from photostrip.formats.text.numbers import shown
+from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Note
 
 COMMAND_LINE = "--set"  # the place of values that the command line sets
@@ -24,8 +25,7 @@ Path = tuple[str | int, ...]  # keys and numbers that lead to a value
 type_names = {str: "a single value", list: "a list", dict: "a mapping (lines `key: value`)"}
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(NamedTuple):
     """Where something stands: file as the user knows it, line and column counted from 1 (0: nowhere in a file)."""
 
     file: str

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import shown
+from photostrip.frozen import replace
 from photostrip.project.yaml.document import NO_FILES, OVERRIDE, Node, Path, Place, at_key, fault_at, place_of, steps
 from photostrip.project.yaml.parsing import parse, read_document
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings
+from photostrip.frozen import replace
 from photostrip.project.schema.sections import Section
 from photostrip.project.yaml.document import Node, Path, at_own_key, fault_at
 from photostrip.project.yaml.merging import override, path_of, read_tree, where_named

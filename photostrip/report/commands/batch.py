@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from photostrip.frozen import replace
 from photostrip.notes import counted
 from photostrip.report.page.junit import Case, to_junit
 from photostrip.report.page.numbers import metres

@@ -6,8 +6,9 @@ photos.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from photostrip.frozen import NamedTuple
 from photostrip.report.page.numbers import Number, fixed
 
 if TYPE_CHECKING:

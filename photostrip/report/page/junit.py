@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape, quoteattr
 
+from photostrip.frozen import NamedTuple
 from photostrip.visible import visible
 
 if TYPE_CHECKING:

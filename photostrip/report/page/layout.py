@@ -5,8 +5,9 @@ from __future__ import annotations
 import unicodedata
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from photostrip.frozen import NamedTuple
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
 from photostrip.visible import visible
 

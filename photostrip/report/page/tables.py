@@ -6,8 +6,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from photostrip.frozen import NamedTuple
 from photostrip.report.page.numbers import fixed
 from photostrip.report.page.parts import Column, Table
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from photostrip.frozen import NamedTuple
 from photostrip.notes import counted, listed
 from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
 from photostrip.report.page.parts import Document, Part, Section, Table, Words

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
+from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.result.numbers import PER_RADIAN, Document, rms
 from photostrip.result.quantities import record
-from photostrip.statistics import median
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.units import MICROMETRES
 

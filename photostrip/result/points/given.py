@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import erfc, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.pipeline.given_points import rejected_control
 from photostrip.points import locate

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
 from photostrip.result.numbers import PER_RADIAN, Document, rms
 from photostrip.result.points.own_precision import chances, turned
 from photostrip.result.quantities import record, records
 from photostrip.result.records import Records
-from photostrip.statistics import binomial_p_value, chi2_quantile, median, normal_quantile
+from photostrip.statistics import binomial_p_value, chi2_quantile, normal_quantile
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats

@@ -6,12 +6,12 @@ step; that they end where the run ended is tested.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import distinct
+from photostrip.frozen import dataclass, replace
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, solve_elements, start_values
@@ -53,7 +53,7 @@ def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
     final = strip.of_photos.orientation
     given = _with_all_points(result, strip)
     rounds = [[first] for first in first_rounds(given, final.elements)]
-    changed = np.unique(given.pair[given.weight != final.pairs.weight])
+    changed = distinct(given.pair[given.weight != final.pairs.weight])
     ends = np.array([each[-1].end for each in rounds])
     for number, second in zip(changed.tolist(), _round(ends[changed], final.pairs.take(changed)), strict=True):
         rounds[number].append(second)

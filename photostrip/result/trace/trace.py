@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import replace
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.geometry.similarity import pair_scales
 from photostrip.result.numbers import EXACT, PER_RADIAN, Document, rounded, significant

@@ -11,13 +11,13 @@ Source: derived, see docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.observations.calibration import PRINCIPAL_DISTANCE
 from photostrip.triangulation.bundle.quality.joint_points import sum_cofactors
@@ -207,7 +207,7 @@ def _solved(problem: BundleProblem, selection: Selection) -> BundleSolution | No
 def _conceivable(problem: BundleProblem) -> Iterator[CommonError]:
     """Errors that may be shared, those of fewest unknowns first."""
     positions = problem.positions
-    several = len(np.unique(positions.group[positions.group >= 0])) > 1
+    several = len(distinct(positions.group[positions.group >= 0])) > 1
     if (positions.group >= 0).any() and not positions.drift_sigma.any():
         if not positions.offset_sigma.any():
             if several:

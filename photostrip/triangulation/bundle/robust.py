@@ -5,12 +5,12 @@ The weights are those of ``triangulation.robust``: many gross errors at once, al
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.statistics import median
+from photostrip.arrays import median
+from photostrip.frozen import replace
 from photostrip.triangulation.bundle.selection import restarted
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.robust import falling_weights

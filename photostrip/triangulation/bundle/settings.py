@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import NamedTuple
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 
 SCREENINGS = ("snooping", "robust", "none")
 TESTS = ("tau", "baarda")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import distinct
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.triangulation.bundle.observations.ray_batches import Batch, SortedRays, arrange, sort_rays
 
 if TYPE_CHECKING:
@@ -116,11 +116,11 @@ def _pairs(rays: SortedRays, photos: int) -> tuple[Numbers, Numbers]:
         same = rays.point[lag:] == rays.point[:-lag]
         keys = (rays.photo[lag:] * photos + rays.photo[:-lag])[same]
         if table is None:
-            found.append(np.unique(keys))
+            found.append(distinct(keys))
         else:
             table[keys] = True
     if table is None:
-        keys = np.unique(np.concatenate(found))
+        keys = distinct(np.concatenate(found))
     else:
         table[alone] = True
         keys = np.flatnonzero(table)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.covariance_adjustment import conditions as strip_conditions

@@ -5,11 +5,11 @@ Source: derived; block elimination from the first block on, and the backward rec
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,9 +7,11 @@ their correlates, everything else predicts the group with the error Pi^-1 lambda
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from photostrip.frozen import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,11 +6,11 @@ Source: derived; see docs/precision.md, eq. 7.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import gamma_cdf, normal_quantile
 from photostrip.triangulation.covariance_adjustment import system

@@ -11,12 +11,12 @@ Source: derived; see docs/precision.md, eq. 3 and 7.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import replace
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.error_propagation.covariances import by_images
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows

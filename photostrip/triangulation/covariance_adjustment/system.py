@@ -8,12 +8,11 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
 from photostrip.triangulation.error_propagation.covariances import NearImages

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import distinct
+from photostrip.frozen import dataclass, replace
 from photostrip.statistics import gamma_cdf
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class CheckErrors:
 
     @property
     def points(self) -> int:
-        return len(np.unique(self.point))
+        return len(distinct(self.point))
 
     @property
     def coordinates(self) -> int:

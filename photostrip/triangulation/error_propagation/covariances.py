@@ -10,11 +10,11 @@ Source: derived; see docs/precision.md, eq. 4-6.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows, add_rows

@@ -5,12 +5,11 @@ Source: derived; see docs/precision.md, eq. 1-4.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

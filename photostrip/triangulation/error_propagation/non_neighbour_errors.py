@@ -5,10 +5,11 @@ Source: derived; see docs/precision.md, eq. 3.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, PlacedStrip

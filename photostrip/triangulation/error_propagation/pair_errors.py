@@ -5,11 +5,11 @@ Source: derived, docs/precision.md, eq. 1; [001] eq. 126-138 for the operations.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import angle_rates, from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.solution import base_rays, linearised_parallaxes, normal_matrices
 

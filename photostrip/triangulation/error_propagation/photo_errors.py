@@ -5,11 +5,12 @@ Source: derived; see docs/precision.md, eq. 3.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import distinct
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.points import take_rows
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, ranges
 from photostrip.triangulation.resection.collinearity import partials
@@ -127,6 +128,6 @@ def _resected(sightings: Sightings, resection: Resection, item: Numbers, place: 
     flat = scaled.reshape(len(scaled), -1, 6)
     solved = np.linalg.inv(flat.transpose(0, 2, 1) @ flat) @ flat.transpose(0, 2, 1)
     turned = (unit[:, None] * solved).reshape(len(scaled), 2, 3, -1)
-    turned = resection.rotations[np.unique(sightings.photo), None] @ turned
+    turned = resection.rotations[distinct(sightings.photo), None] @ turned
     by_image = turned.reshape(len(scaled), 6, -1, 2)[item, :, place]
     return _Resected(by_image, by_image @ design[:, :, :3] @ rotations.transpose(0, 2, 1))

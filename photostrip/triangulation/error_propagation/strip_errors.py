@@ -15,12 +15,12 @@ Source: derived; see docs/precision.md, eq. 2 and 3.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import distinct
+from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.triangulation.error_propagation import pair_errors
@@ -132,7 +132,7 @@ def _image_points(
     A point on photo i enters the elements of the models i - 1 and i directly, and the scale of the models i - 2 to i:
     by its own ray, and by the elements of both models of a junction.
     """
-    row = np.unique(orientation.rows)
+    row = distinct(orientation.rows)
     row = row[np.argsort(position[row], kind="stable")]
     components = np.zeros((len(row), 2, SPAN, COMPONENTS))
     images = ImagePoints(row=row, photo=position[row], sigma=sigma[row], components=components)

@@ -12,13 +12,12 @@ Film deformation is corrected before, by the interior orientation. ``distort`` g
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.triangulation.image_coordinates import lens_distortion
 from photostrip.triangulation.image_coordinates.refraction import curvature_constant, refraction_constant
 

@@ -7,14 +7,13 @@ transformation in both hands.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geometry import plane
 from photostrip.points import PhotoPoints, take_rows
 

@@ -5,12 +5,12 @@ A plane transformation takes the marks of a photo to their calibrated coordinate
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.frozen import replace
 from photostrip.notes import Note, named
 from photostrip.triangulation.image_coordinates.fiducial_marks import enough, fault, gather, right_pattern
 from photostrip.triangulation.image_coordinates.film_deformation import Deformation

@@ -12,11 +12,12 @@ distortion, tabulated every 20 mm, it is 0.1 um off; a monotone interpolation, w
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.frozen import NamedTuple
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.notes import Note, named
-from photostrip.statistics import median
 from photostrip.triangulation.image_coordinates.fiducial_marks import QUARTER, fault
 
 if TYPE_CHECKING:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from photostrip.camera import Camera

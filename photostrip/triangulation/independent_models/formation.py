@@ -9,13 +9,13 @@ Source: [001] for the chain; seven parameters in place of one derived, see docs/
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.notes import counted
 from photostrip.triangulation.independent_models import linking
 
@@ -209,7 +209,7 @@ def _counting(models: StripModels, links: ScreenedLinks, places: Similarities, x
     """
     used = np.ones(len(models.model), bool)
     shared = links.shared
-    touched = np.unique(models.node[shared.before[~links.used]])
+    touched = distinct(models.node[shared.before[~links.used]])
     for node in touched.tolist():
         rows = np.flatnonzero(models.node == node)
         rows = rows[np.argsort(models.model[rows], kind="stable")]

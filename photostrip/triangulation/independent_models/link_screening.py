@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct, median
 from photostrip.frozen import dataclass
 from photostrip.rejection import Rejection
-from photostrip.statistics import chi2_quantile, median
+from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.independent_models import linking
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def _worst(
     """One of the ``free`` rows of each link that must go; links that cannot tell it, or would break, are closed."""
     size = np.where(free & open_links[shared.link] & (value > limit[shared.link]), value, -np.inf)
     rows = []
-    for link in np.unique(shared.link[np.isfinite(size)]).tolist():
+    for link in distinct(shared.link[np.isfinite(size)]).tolist():
         rows_of_link = np.flatnonzero(shared.link == link)
         row = int(rows_of_link[np.argmax(size[rows_of_link])])
         alone = used.copy()
@@ -155,7 +156,7 @@ def _doubtful(shared: CommonPoints, value: Floats, limit: Floats) -> tuple[tuple
     """Rows of each link of which one is wrong, the worst first."""
     beyond = np.flatnonzero(value > limit[shared.link])
     found = []
-    for link in np.unique(shared.link[beyond]).tolist():
+    for link in distinct(shared.link[beyond]).tolist():
         rows_of_link = np.flatnonzero(shared.link == link)
         rows_of_link = rows_of_link[np.argsort(-np.nan_to_num(value[rows_of_link], nan=-np.inf), kind="stable")]
         near = rows_of_link[value[rows_of_link[0]] - value[rows_of_link] < EQUALLY_GOOD]

@@ -10,11 +10,11 @@ Source: [001] eq. 145-149 for the similarity; weights and iteration derived, see
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 

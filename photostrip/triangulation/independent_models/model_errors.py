@@ -10,15 +10,14 @@ Source: derived; see docs/independent-models.md.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import median
+from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
-from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import replace
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows

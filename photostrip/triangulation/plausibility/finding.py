@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Finding
 
 if TYPE_CHECKING:

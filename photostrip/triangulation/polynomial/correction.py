@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.frozen import dataclass
 from photostrip.statistics import f_p_value
 from photostrip.triangulation.polynomial import terms as polynomial_terms
@@ -241,7 +242,7 @@ def _carried_without(problem: FitProblem, counted: Numbers, inner: Sequence[Numb
     stations = polynomial_terms.count_stations(problem.xyz[counted, 0], problem.spacing) - 1
     degree = polynomial_terms.degree_of(terms)
     sizes = np.array([len(rows) for rows in inner])
-    for size in np.unique(sizes).tolist():
+    for size in distinct(sizes).tolist():
         chosen = polynomial_terms.ladder(stations, len(counted) - size, degree)
         left = np.array([rows for rows in inner if len(rows) == size])
         for drop in polynomial_terms.DROP_ORDER:
@@ -268,7 +269,7 @@ def _conditions_without(problem: FitProblem, counted: Numbers, groups: Numbers, 
 def _left_out(problem: FitProblem, fits: Sequence[AxisFit], axes: tuple[int, ...], groups: Sequence[Numbers]) -> float:
     """Root mean square error at groups of control predicted from all others, without fitting again."""
     errors: list[Floats] = []
-    for size in np.unique([len(rows) for rows in groups]).tolist():
+    for size in sorted({len(rows) for rows in groups}):
         rows = np.array([each for each in groups if len(each) == size])
         if not any(fits[axis].terms for axis in axes):
             basis, residuals = problem.similarity

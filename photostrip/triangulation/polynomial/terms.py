@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def columns(xyz: Floats, terms: Sequence[str]) -> Floats:
 
 def count_stations(x: Floats, spacing: float) -> int:
     """Largest number of points along the strip of which no two are nearer than a spacing."""
-    return len(np.unique(bands(x, spacing))) if len(x) else 0
+    return len(distinct(bands(x, spacing))) if len(x) else 0
 
 
 def bands(x: Floats, spacing: float) -> Numbers:

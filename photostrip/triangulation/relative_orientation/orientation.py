@@ -5,14 +5,14 @@ Source: [001] for the elements; precision and criteria are derived.
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.points import take_rows
 from photostrip.triangulation.relative_orientation import solution

@@ -6,16 +6,15 @@ thousand pairs cost little more than one.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.notes import counted
 from photostrip.points import PhotoPoints, take_rows
-from photostrip.statistics import median
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

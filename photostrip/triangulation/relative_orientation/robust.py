@@ -7,11 +7,11 @@ of the source knows half of them, and a single far point that turns a pair makes
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple, replace
 from photostrip.triangulation.relative_orientation import solution
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.triangulation.robust import TUNING, falling_weights, medians, scales

@@ -9,10 +9,11 @@ Source: [001] for the elements; condition, derivatives, start values and retries
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 
 if TYPE_CHECKING:

@@ -5,9 +5,11 @@ With (u, v, w) = R^T (X - S): x = -f u / w, y = -f v / w. Source: derived.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from photostrip.frozen import NamedTuple
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import distinct
+from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation.resection.collinearity import KnownPhotos, partials, project
 
@@ -40,7 +40,7 @@ class Resection:
 def runs(ends: Numbers, most: int) -> list[tuple[int, int]]:
     """Cut photos, whose rows end where ``ends`` says after a 0, into runs of about `most` rows: first, last + 1."""
     first = np.searchsorted(ends, np.append(np.arange(0, ends[-1], most), ends[-1]))
-    return list(pairwise(np.unique(first).tolist()))
+    return list(pairwise(distinct(first).tolist()))
 
 
 def with_residuals(xy: Floats, points: Floats, photo: Numbers, photos: KnownPhotos) -> Resection:

@@ -8,10 +8,11 @@ Source: derived; see docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from photostrip.frozen import replace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,13 +10,14 @@ Source: [001] eq. 139-141.
 from __future__ import annotations
 
 from dataclasses import field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
-from photostrip.statistics import median, normal_quantile
+from photostrip.frozen import NamedTuple, dataclass
+from photostrip.statistics import normal_quantile
 from photostrip.triangulation.robust import medians, scales
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ Source: [001] eq. 125-141.
 
 from __future__ import annotations
 
-from dataclasses import field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.solution import base_rays
 from photostrip.triangulation.strip_formation.intersection import Intersection, intersect

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +10,7 @@ import typer
 
 from photostrip.cli.documents import FORMS, Form, Rendering, require_target, write_rule
 from photostrip.cli.options import Silent
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

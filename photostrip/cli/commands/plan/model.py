@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,7 +9,7 @@ import typer
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import CONTROL_SIGMA, Flight, Options, PlanCamera, PlanFile, PlanOptions, Sets
 from photostrip.cli.failures import failures_as
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from photostrip.planning.model.plan import ModelSpec

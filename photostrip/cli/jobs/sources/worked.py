@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from photostrip.frozen import NamedTuple
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, compare, source_cameras
 from photostrip.planning.model.plan import source_example
 from photostrip.terrestrial.accuracy import EXAMPLES, worked

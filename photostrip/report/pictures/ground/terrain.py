@@ -6,10 +6,11 @@ Around each photo it is the plane through the points near by, and what these lie
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple
 from photostrip.report.pictures.ground.image_plane import cameras_of, frame_of
 from photostrip.report.pictures.ground.plan_view import Grid
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from photostrip.frozen import NamedTuple
 from photostrip.notes import counted
 from photostrip.report.page.numbers import short
 from photostrip.report.pictures import svg

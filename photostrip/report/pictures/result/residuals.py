@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from photostrip.frozen import NamedTuple
 from photostrip.notes import counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, WIDTH

@@ -7,11 +7,11 @@ and with the smallest trace of their cofactors.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import replace
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import similarity_derivatives
@@ -40,7 +41,7 @@ MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll ab
 def refuse_repeated(problem: BundleProblem) -> None:
     """Refuse points that are measured twice on a photo (``bundle-repeated``)."""
     key = np.sort(problem.images.point * np.intp(problem.photos) + problem.images.photo)
-    again = np.unique(key[1:][key[1:] == key[:-1]])
+    again = distinct(key[1:][key[1:] == key[:-1]])
     if len(again):
         pairs = zip(*(part.tolist() for part in np.divmod(again, problem.photos)), strict=True)
         raise InputError(
@@ -164,7 +165,7 @@ def _parts(prepared: PreparedProblem) -> list[Numbers]:
         if (least == label).all():
             break
         label = least
-    return [np.sort(structure.order[label == first]) for first in np.unique(label)]
+    return [np.sort(structure.order[label == first]) for first in distinct(label)]
 
 
 def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held:

@@ -9,11 +9,11 @@ Source: [Granshaw 1980] for the elimination.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, Rays, by_point
 from photostrip.triangulation.bundle.structure import triangle
 

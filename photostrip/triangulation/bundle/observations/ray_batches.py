@@ -12,11 +12,11 @@ Batches are cut so small that what is computed for one stays in the cache of the
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers

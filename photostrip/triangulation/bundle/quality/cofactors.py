@@ -7,12 +7,12 @@ Y = Z T and M = I + T'Y give the cofactors L^-T M L^-1 of the point and -Y L^-1 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.bundle.normal_equations import datum
 from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced, factored, given_at, reduce

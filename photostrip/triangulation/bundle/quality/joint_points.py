@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.quality.cofactors import at_solution, solved_for
 

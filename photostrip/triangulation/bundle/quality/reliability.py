@@ -6,12 +6,12 @@ number: the share of an error of the observation that shows in its own residual.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
 
 if TYPE_CHECKING:

@@ -6,12 +6,11 @@ share of the redundancy, until the ratios are one.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.triangulation.bundle.quality import reliability
 
 if TYPE_CHECKING:

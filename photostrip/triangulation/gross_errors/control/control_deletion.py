@@ -13,14 +13,14 @@ Source: derived; data snooping with correlated observations.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.statistics import chi2_quantile, f_p_value
 from photostrip.triangulation.gross_errors.pairs.deletion import gains
 from photostrip.triangulation.polynomial import terms
@@ -228,7 +228,7 @@ def adjust(strip: StripAtControl, w: Floats, covariance: Floats, *, bends: bool 
     size = np.sqrt(weight)
     scaled = errors / size
     projector = projected(covariance, strip.design)
-    points = [np.flatnonzero(found.point == point) for point in np.unique(found.point)]
+    points = [np.flatnonzero(found.point == point) for point in distinct(found.point)]
     height = found.axis == HEIGHT
     parts = [rows[height[rows] == which] for rows in points for which in (False, True)]
     parts += [np.array([count + number]) for number in range(bent.shape[1])]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple, replace
 from photostrip.rejection import Rejection
 from photostrip.statistics import f_quantile, normal_quantile
 from photostrip.triangulation.gross_errors.control.control_deletion import ALPHA, Deletion, adjust

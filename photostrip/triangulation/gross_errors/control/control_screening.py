@@ -10,13 +10,12 @@ Source: derived; data snooping with correlated observations.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import PhotostripError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.triangulation.gross_errors.control.control_components import candidates
 from photostrip.triangulation.gross_errors.control.control_deletion import adjust
 from photostrip.triangulation.gross_errors.control.control_rejections import (

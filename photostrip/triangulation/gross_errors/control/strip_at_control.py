@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import distinct
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.absolute_orientation import Targets
 
@@ -61,7 +61,7 @@ class StripAtControl:
         before = np.cumsum(self.control.use[order].sum(axis=1)) - 1
         total = len(self.coordinates.point)
         part = before * -(-total // LARGEST) // max(total, 1)
-        parts = [np.sort(order[part == number]) for number in np.unique(part)]
+        parts = [np.sort(order[part == number]) for number in distinct(part)]
         return [(rows, self._section(rows)) for rows in parts] if len(parts) > 1 else [(np.sort(order), self)]
 
     def _section(self, rows: Numbers) -> StripAtControl:

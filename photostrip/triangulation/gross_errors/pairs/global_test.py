@@ -5,13 +5,13 @@ Source: derived; [004a] stops at tests of single residuals. See docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photostrip.frozen import dataclass
-from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, median, normal_quantile
+from photostrip.arrays import median
+from photostrip.frozen import dataclass, replace
+from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, normal_quantile
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.robust import MEDIAN_SPREAD

@@ -12,12 +12,12 @@ Source: derived; the order of work is chosen here, see docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import distinct
+from photostrip.frozen import dataclass, replace
 from photostrip.rejection import Rejection
 from photostrip.triangulation.gross_errors.pairs import deletion
 from photostrip.triangulation.gross_errors.pairs.global_test import FIFTH_WRONG, GlobalTest, ParallaxScatter
@@ -145,7 +145,7 @@ class _Log:
                     row = rows[place, size[rows[place]].argmax()]
                     if size[row] > most[pair]:
                         self._remove(weight, np.array([row]), "residual", float(size[row]), float(most[pair]))
-        changed = np.unique(pairs[weight != part.pairs.weight])
+        changed = distinct(pairs[weight != part.pairs.weight])
         return orient_again(part, weight, changed, self.lost)
 
     def without_beyond(self, part: Orientation, test: GlobalTest, todo: Numbers) -> Orientation:
@@ -171,7 +171,7 @@ class _Log:
 
 def _alike(todo: Numbers, count: Numbers) -> list[Numbers]:
     """Split pairs into some at a time with equal numbers of points."""
-    groups = [todo[count[todo] == number] for number in np.unique(count[todo])]
+    groups = [todo[count[todo] == number] for number in distinct(count[todo])]
     return [some for group in groups for some in np.array_split(group, 1 + len(group) // AT_ONCE)]
 
 

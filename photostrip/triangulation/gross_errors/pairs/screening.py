@@ -12,14 +12,14 @@ Source: [004a]; the two-sided form and the order of work are chosen here, see do
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import InputError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.statistics import grubbs_limit, tau_limit
 from photostrip.triangulation.gross_errors.pairs.global_test import by_number, residual_sigma
 from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, rejection, search
@@ -166,7 +166,7 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
 def _without(orientation: Orientation, rows: Numbers) -> Orientation:
     weight = orientation.pairs.weight.copy()
     weight[rows] = 0.0
-    return orient_again(orientation, weight, np.unique(orientation.pairs.pair[rows]))
+    return orient_again(orientation, weight, distinct(orientation.pairs.pair[rows]))
 
 
 def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientation, list[Rejection]]:

@@ -11,11 +11,11 @@ Source: [Baarda 1968] for the test; deletion derived, as for pairs; see docs/sou
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST, subsets

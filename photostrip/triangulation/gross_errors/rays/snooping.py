@@ -9,14 +9,14 @@ Source: [Baarda 1968], [Pope 1976].
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.rejection import Rejection
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up
@@ -73,7 +73,7 @@ class ScreenedBundle:
     ) -> ScreenedBundle:
         chosen = selected(problem, selection)
         solution = solve(chosen, rough=rough)
-        points_out = len(np.unique(problem.images.point[~selection.images]))
+        points_out = len(distinct(problem.images.point[~selection.images]))
         return cls(
             problem=chosen,
             selection=selection,
@@ -350,7 +350,7 @@ class _Search:
         changed[self.problem.images.photo[images != self.decided.images]] = True
         self.decided = done.selection
         within = self.beyond <= limit.of(np.diff(self.first))  # the limit rises where less is established
-        numbers = np.unique(point[~images & (changed[self.problem.images.photo] | within[point])])
+        numbers = distinct(point[~images & (changed[self.problem.images.photo] | within[point])])
         rows, single = list(map(self.rays_of, numbers.tolist())), np.diff(self.first)[numbers, None] < LEAST_RAYS
         placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] > 1
         place = np.where(single, xyz[numbers], np.where(placed, done.solution.points[numbers], np.nan))

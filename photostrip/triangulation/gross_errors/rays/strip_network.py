@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import GeometryError
+from photostrip.frozen import replace
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle.observations.problem import (
     BundleCameras,
@@ -40,7 +41,7 @@ def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> t
 
     None where what is left holds the photos too badly for an adjustment.
     """
-    rows = np.unique(oriented.rows)
+    rows = distinct(oriented.rows)
     problem, kept = _free_network(oriented, formed, rays, rows), np.isin(rows, rays.kept)
     begin = replace(Selection.everything(problem), images=~_suspected(oriented, formed, rays, rows))
     try:

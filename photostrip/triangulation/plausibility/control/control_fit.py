@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.frozen import dataclass
 from photostrip.statistics import SIGMA_FROM_MEDIAN, t_quantile
 
@@ -93,7 +94,7 @@ def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> Plan
 
 def _evenly(count: int, most: int) -> Numbers:
     """Numbers below a count, evenly drawn from all where there are too many."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
+    return distinct(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
 
 
 def _median(size: Floats, unknowns: int) -> Floats:

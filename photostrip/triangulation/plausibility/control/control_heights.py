@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct, median
 from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import EARTH_RADIUS
-from photostrip.statistics import median, t_quantile
+from photostrip.statistics import t_quantile
 from photostrip.triangulation.plausibility.control.control_fit import (
     KEPT_SIGMAS,
     LEAST_POINTS,
@@ -258,7 +259,7 @@ def _other_scale(on_strip: StripPoints, ratio: float, sigma: float, in_fit: Flag
 
 def _groups(given: GivenPoints, in_fit: Flags) -> Iterator[tuple[str, Flags, str]]:
     """Give groups of heights that may be of another kind: lists, and points without plan."""
-    for number in np.unique(given.group[in_fit])[1:].tolist():
+    for number in distinct(given.group[in_fit])[1:].tolist():
         inside = given.group == number
         if min((inside & in_fit).sum(), (~inside & in_fit).sum()) >= LEAST_GROUP:
             yield f"control[{number}]", inside, f"control[{number}].height"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.statistics import median
+from photostrip.arrays import median
+from photostrip.frozen import replace
 from photostrip.triangulation.plausibility.control.control_fit import PlanSimilarity, fit_similarity
 from photostrip.triangulation.plausibility.control.control_strip import (
     FEET_TOLERANCE,

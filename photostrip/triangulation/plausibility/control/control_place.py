@@ -6,12 +6,13 @@ readings that would bring them back are tried. A neighbouring zone cannot be see
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import column_medians, median
 from photostrip.errors import GeometryError, InputError
-from photostrip.statistics import column_medians, median
+from photostrip.frozen import NamedTuple
 from photostrip.triangulation.plausibility.control.control_strip import FOOT, KINDS_OF_FEET
 from photostrip.triangulation.plausibility.finding import found
 

@@ -8,11 +8,11 @@ the others predict, check points too, but no check point ever takes part in a fi
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.triangulation.plausibility.control import control_heights, control_lists, control_slips
 from photostrip.triangulation.plausibility.control.control_fit import (

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import permutations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.triangulation.plausibility.control.digits import slip

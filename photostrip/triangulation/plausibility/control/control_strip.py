@@ -5,13 +5,12 @@ In plan the bending is taken out by a conformal polynomial, with as few terms as
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.triangulation.plausibility.control.control_fit import (
     LEAST_POINTS,
     TINY,

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import column_medians, distinct, median
 from photostrip.errors import GeometryError, InputError
-from photostrip.statistics import column_medians, median
 from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, WrittenAxes
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _plain_axes(control: ControlPoints, frames: Sequence[GroundFrame]) -> Writte
 def _moved(written: Floats, lists: Numbers) -> Floats:
     """By how much coordinates in plan that lie far from all others of their list are moved to its middle (n, 3)."""
     moved = np.zeros_like(written)
-    for number in np.unique(lists).tolist():
+    for number in distinct(lists).tolist():
         rows = np.flatnonzero((lists == number) & np.isfinite(written[:, :2]).all(axis=1))
         if len(rows) < LEAST_OF_LIST:
             continue
@@ -83,7 +83,7 @@ def _moved(written: Floats, lists: Numbers) -> Floats:
 def _filled(written: Floats, lists: Numbers) -> Floats:
     """Coordinates with the mean of their list, or of all, where they are not given."""
     filled = written.copy()
-    for number in np.unique(lists).tolist():
+    for number in distinct(lists).tolist():
         rows = lists == number
         for axis in range(3):
             values = written[rows, axis]
@@ -99,7 +99,7 @@ def _decoded(filled: Floats, control: ControlPoints, frames: Sequence[GroundFram
     """Bring the points through their frames; None where the frames refuse."""
     cartesian = np.empty_like(filled)
     try:
-        for number in np.unique(control.frame).tolist():
+        for number in distinct(control.frame).tolist():
             rows = control.frame == number
             cartesian[rows] = frames[number].cartesian_from_ground(filled[rows])
         middle = column_medians(cartesian[plan])
@@ -117,7 +117,7 @@ def _axes_through_frames(
 ) -> WrittenAxes:
     axes, unit = np.empty((len(filled), 3, 3)), np.ones_like(filled)
     try:
-        for number in np.unique(control.frame).tolist():
+        for number in distinct(control.frame).tolist():
             rows, frame = control.frame == number, frames[number]
             axes[rows] = frame.axes_at(cartesian[rows])
             if frame.kind != "geocentric":  # whose coordinates are no plan and no height

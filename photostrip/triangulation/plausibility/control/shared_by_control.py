@@ -11,11 +11,13 @@ Source: derived.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import PhotostripError
+from photostrip.frozen import NamedTuple
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.statistics import f_p_value
 from photostrip.triangulation.gross_errors.control.control_deletion import HEIGHT, adjust
@@ -99,7 +101,7 @@ def _shifts(strip: StripAtControl, whole: JointAdjustment, alone: float) -> list
     found = []
     for number in numbers[np.argsort(sizes, kind="stable")][:-1].tolist():
         inside = lists == number
-        axes = np.unique(place.axis[inside])
+        axes = distinct(place.axis[inside])
         tested = _tested(whole, (inside[:, None] & (place.axis[:, None] == axes)).astype(float), alone)
         if tested is not None:
             shift, sigma = np.full((2, 3), np.nan)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import column_medians, median
 from photostrip.notes import listed
-from photostrip.statistics import column_medians, median
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.arrays import median
+from photostrip.frozen import dataclass, replace
 from photostrip.notes import MOST_NAMED, listed
-from photostrip.statistics import median
 from photostrip.triangulation.plausibility.finding import found
 from photostrip.triangulation.plausibility.photos import mosaic
 from photostrip.triangulation.plausibility.photos.units import reading_of

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import median
 from photostrip.points import locate
-from photostrip.statistics import median
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:

@@ -9,14 +9,13 @@ Links do not depend on the principal distance, on the unit, on the order of the 
 from __future__ import annotations
 
 import heapq
-from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
-from photostrip.statistics import median
+from photostrip.arrays import median
+from photostrip.frozen import NamedTuple, dataclass, replace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

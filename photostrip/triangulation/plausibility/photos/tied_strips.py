@@ -6,12 +6,12 @@ function of the place. What lies far off it is no error of a strip.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
-from photostrip.statistics import median
+from photostrip.arrays import median
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.triangulation.plausibility.control.control_strip import LEAST_REDUNDANCY, fit_simplest
 from photostrip.triangulation.plausibility.finding import found
 

@@ -6,12 +6,13 @@ than a tenth across the flight. A reach beyond the format or a tenth of it is no
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct, median, quantile
+from photostrip.frozen import NamedTuple
 from photostrip.notes import listed
-from photostrip.statistics import median
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -98,15 +99,16 @@ def _scaled(observations: PhotoPoints, cameras: Mapping[str, Camera], camera: Ca
 def _reach(observations: PhotoPoints, scaled: Floats, photo: Numbers) -> _Reach:
     """Measure how far image points of a camera reach, photo by photo and from their own middle."""
     size = np.abs(scaled).max(axis=1)
-    middle = np.asarray(np.quantile(scaled, [1.0 - REACH_SHARE, REACH_SHARE], axis=0).mean(axis=0), float)
+    ends = [[quantile(each, share) for each in scaled.T] for share in (1.0 - REACH_SHARE, REACH_SHARE)]
+    middle = np.mean(ends, axis=0)
     return _Reach(
-        whole=float(np.quantile(size, REACH_SHARE)),
+        whole=quantile(size, REACH_SHARE),
         of_photo={
-            observations.photo_ids[number]: float(np.quantile(size[photo == number], REACH_SHARE))
-            for number in np.unique(photo).tolist()
+            observations.photo_ids[number]: quantile(size[photo == number], REACH_SHARE)
+            for number in distinct(photo).tolist()
         },
         middle=middle,
-        about_middle=float(np.quantile(np.abs(scaled - middle).max(axis=1), REACH_SHARE)),
+        about_middle=quantile(np.abs(scaled - middle).max(axis=1), REACH_SHARE),
     )
 
 
@@ -125,7 +127,7 @@ def find_wrong_units(
         low, high = REACH if known else REACH_OF_DISTANCE
         factors[name] = 1.0
         scaled, photo = _scaled(observations, cameras, camera)
-        if not len(scaled) or low < float(np.quantile(np.abs(scaled).max(axis=1), REACH_SHARE)) < high:
+        if not len(scaled) or low < quantile(np.abs(scaled).max(axis=1), REACH_SHARE) < high:
             continue
         reach = _reach(observations, scaled, photo)
         odd = [photo for photo, own in reach.of_photo.items() if not low < own < high]
