@@ -110,7 +110,8 @@ def _replace(value: Any, /, **changes: object) -> Any:  # noqa: ANN401 (any data
 
 
 def _values(value: Any) -> tuple[object, ...]:  # noqa: ANN401 (any dataclass)
-    return tuple(getattr(value, each.name) for each in dataclasses.fields(value))
+    kind: Any = type(value)
+    return tuple(getattr(value, name) for name in _values_left_out(kind)[0])
 
 
 def _text(self: Any) -> str:  # noqa: ANN401 (any dataclass)
@@ -119,7 +120,9 @@ def _text(self: Any) -> str:  # noqa: ANN401 (any dataclass)
 
 
 def _same(self: object, other: object) -> bool:
-    return _values(self) == _values(other) if type(other) is type(self) else NotImplemented
+    if type(other) is not type(self):
+        return NotImplemented
+    return self is other or _values(self) == _values(other)
 
 
 def _hash(self: object) -> int:

@@ -8,8 +8,7 @@ below 1e-11 over the range the tests of photostrip use.
 from __future__ import annotations
 
 from functools import lru_cache
-from math import exp, fabs, inf, lgamma, log, sqrt
-from statistics import NormalDist
+from math import erfc, exp, fabs, inf, lgamma, log, pi, sqrt
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -112,7 +111,21 @@ def _solve(excess: Callable[[float], float], start: float, low: float, high: flo
 
 @lru_cache(maxsize=4096)
 def normal_quantile(probability: float) -> float:
-    return NormalDist().inv_cdf(probability)
+    """Quantile of the normal distribution by Newton's method; ``statistics.NormalDist`` loads decimal numbers."""
+    tail = min(probability, 1 - probability)
+    if not tail > 0:
+        message = f"a probability lies between 0 and 1, not at {probability}"
+        raise ValueError(message)
+    x = sqrt(
+        -2 * log(2 * tail)
+    )  # from above, where the logarithm of the tail, which is concave, leads down to the root
+    for _ in range(STEPS):
+        upper = erfc(x / sqrt(2)) / 2
+        step = log(tail / upper) * upper * sqrt(2 * pi) * exp(x * x / 2)
+        x -= step
+        if fabs(step) <= 4 * PRECISION * x:
+            break
+    return x if probability > tail else -x
 
 
 def t_sf(t: float, dof: float) -> float:
@@ -132,7 +145,7 @@ def t_quantile(probability: float, dof: float) -> float:
     if tail == 0.5:  # noqa: PLR2004  the median
         return 0.0
     # In the logarithm the tail is nearly straight, so that secants converge for far tails and few degrees alike.
-    start = log(max(-NormalDist().inv_cdf(max(tail, 1e-300)), 1e-3))
+    start = log(max(-normal_quantile(max(tail, 1e-300)), 1e-3))
     size = exp(_solve(lambda s: log(tail) - log(max(t_sf(exp(s), dof), TINY)), start, -50.0, 700.0))
     return size if probability > tail else -size
 
@@ -156,7 +169,7 @@ def f_quantile(probability: float, dof_numerator: float, dof_denominator: float)
 @lru_cache(maxsize=4096)
 def chi2_quantile(probability: float, dof: float) -> float:
     """Quantile of chi-square, from the cube-root approximation of Wilson and Hilferty."""
-    z = NormalDist().inv_cdf(probability)
+    z = normal_quantile(probability)
     start = dof * max(1 - 2 / (9 * dof) + z * sqrt(2 / (9 * dof)), 1e-3) ** 3
     return 2 * _solve(lambda x: gamma_cdf(x, dof / 2) - probability, start / 2, 0.0, inf)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -267,6 +266,8 @@ class Result:
 
     def _repr_html_(self) -> str:
         """Return the verdict and the differences at given points for a notebook."""
+        from html import escape
+
         rows = []
         for role in ("control", "check"):
             found = self._document["summary"].get(role) or {}

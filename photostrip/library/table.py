@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, overload
 
@@ -104,6 +103,8 @@ class Table:
 
     def _repr_html_(self) -> str:
         """Return the first rows for a notebook."""
+        from html import escape
+
         heads = "".join(
             f'<th title="{escape(self.meanings[name])}">{escape(name)}{f"<br>{escape(unit)}" if unit else ""}</th>'
             for name, unit in self.units.items()

@@ -53,15 +53,17 @@ Table = dict[str, "Quantity | Table"]
 def described() -> Table:
     """Read the description: what stands under each key of a result; the records of a list are described once."""
     found: Table = {}
-    block = ""
+    blocks = [found]
     for line in Path(__file__).with_name("quantities.txt").read_text(encoding="utf-8").splitlines():
         if line.startswith("["):
-            block = line[1:-1]
+            blocks = [table_at(path, found) for path in _expanded(line[1:-1])]
         elif line and not line.startswith("#"):
             key, form, meaning = line.split(" | ")
-            for path in _expanded(f"{block}.{key}" if block else key):
-                *above, last = path.split(".")
-                table_at(".".join(above), found)[last] = Quantity.of(form, meaning)
+            entry = Quantity.of(form, meaning)
+            for path in _expanded(key) if "{" in key else (key,):
+                above, _, last = path.rpartition(".")
+                for block in blocks:
+                    table_at(above, block)[last] = entry
     return found
 
 

@@ -1,7 +1,5 @@
 """The blocks `cameras` and `strips` of a project."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from photostrip.project.schema.ground import Angles

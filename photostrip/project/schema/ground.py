@@ -1,7 +1,5 @@
 """The blocks of a project that stand in a ground frame: control, camera positions, orientations, output."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from photostrip.geometry.rotation import SYSTEMS

@@ -1,8 +1,7 @@
 """The blocks of a project that name tables of measurements: points on photos, fiducial marks, models."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Iterable
+from typing import Annotated
 
 from photostrip.formats.measured.control import CONTROL
 from photostrip.formats.measured.models import MODEL_CENTERS, MODEL_POINTS
@@ -11,13 +10,9 @@ from photostrip.formats.measured.pairs import LAYOUTS
 from photostrip.formats.measured.repeated import POLICIES
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
+from photostrip.formats.text.tables import Column
 from photostrip.project.schema.sections import After, Before, Section, key, wrong
 from photostrip.project.schema.values import Positive, Sigma3, Words, YAxis, choice, if_empty
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from photostrip.formats.text.tables import Column
 
 
 def header_names(*layouts: Iterable[Column]) -> After:

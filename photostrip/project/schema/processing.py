@@ -3,8 +3,6 @@
 Defaults are those of the settings beside the mathematics; none is repeated.
 """
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion

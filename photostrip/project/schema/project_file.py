@@ -1,7 +1,5 @@
 """The project file: every key, its unit, its default. Each description ends with the unit."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion

