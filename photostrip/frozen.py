@@ -84,13 +84,15 @@ def _builder(cls: type) -> Callable[..., None]:
 
     def build(self: object, *values: object, **named: object) -> None:
         names, defaults, factories = _values_left_out(cls)
-        given = dict(zip(names, values, strict=False))
-        state = {**defaults, **given, **named}
-        for name, factory in factories.items():
-            if name not in state:
-                state[name] = factory()
-        if len(values) > len(given) or given.keys() & named or state.keys() != names.keys():
-            _refuse_arguments(cls, names, values, named)
+        state = named
+        if values or named.keys() != names.keys():
+            given = dict(zip(names, values, strict=False))
+            state = {**defaults, **given, **named}
+            for name, factory in factories.items():
+                if name not in state:
+                    state[name] = factory()
+            if len(values) > len(given) or given.keys() & named or state.keys() != names.keys():
+                _refuse_arguments(cls, names, values, named)
         self.__dict__.update(state)
         if finish is not None:
             finish(self)

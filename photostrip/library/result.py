@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.library.table import Table
 from photostrip.notes import named
 from photostrip.result.records import as_lists
-from photostrip.result.tables import table_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from os import PathLike
 
     from photostrip.arrays import Floats, Numbers
+    from photostrip.library.table import Table
     from photostrip.pipeline import Result as Computed
     from photostrip.result.numbers import Document
 
@@ -114,6 +113,9 @@ class Result:
         return self._table("notes")
 
     def _table(self, name: str) -> Table:
+        from photostrip.library.table import Table
+        from photostrip.result.tables import table_of
+
         return Table(name, table_of(self._document, name))
 
     def covariance_of(self, ids: Sequence[str] | str, *, joint: bool = False) -> Floats:

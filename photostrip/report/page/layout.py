@@ -145,8 +145,14 @@ def _shorten(columns: Sequence[Column], sizes: list[int], shown: Sequence[int], 
 def _row(
     row: Sequence[str], columns: Sequence[Column], sizes: Sequence[int], shown: Sequence[int], plain: Plain
 ) -> str:
-    dots = plain("…")
-    return GAP.join(pad(cut(row[n], sizes[n], dots), sizes[n], left=columns[n].left) for n in shown)
+    return GAP.join(_filled(row[n], sizes[n], columns[n].left, plain) for n in shown)
+
+
+def _filled(text: str, width: int, left: bool, plain: Plain) -> str:  # noqa: FBT001 (a cell: one of thousands)
+    """Shorten or fill a cell of a table."""
+    if not text.isascii() or len(text) > width:
+        return pad(cut(text, width, plain("…")), width, left=left)
+    return text.ljust(width) if left else text.rjust(width)
 
 
 def wrapped(text: str, width: int) -> list[str]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.triangulation.bundle.observations.problem import BundleProblem, StartValues
 
 if TYPE_CHECKING:

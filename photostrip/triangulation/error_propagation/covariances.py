@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
@@ -267,7 +268,7 @@ def _halves(
     covariances of these, and X those of the image points with them.
     """
     n, slots, size, _ = rows.by_component.shape
-    models = np.unique(rows.first)
+    models = distinct(rows.first)
     by = by_model(rows)
     half = _by_model(by, rows.first, covariances_of_models(errors, along, models, slots) / 2)
     before = near.with_components[:, :, :REACH].reshape(n, size, -1)
@@ -323,7 +324,7 @@ def around_models(of_models: Floats, models: Numbers, before: int, after: int) -
 def with_parameters(rows: ErrorRows, near: NearImages, fit: ParameterCovariances) -> Floats:
     """C: covariances (n, d, t) of rows that are ordered by their first models with the fitted parameters."""
     n, slots, size, _ = rows.by_component.shape
-    models, sums = np.unique(rows.first), fit.sums
+    models, sums = distinct(rows.first), fit.sums
     matrices = np.concatenate(
         [fit.similarities[models], _stacked(around_models(sums.with_components, models, 0, slots))], axis=1
     )

@@ -223,7 +223,7 @@ def without_points(formed: FormedStrip, orientation: Orientation, points: Number
         point=formed.point[stay],
         xyz=formed.xyz[stay],
         model_count=formed.model_count[stay],
-        bridging=np.setdiff1d(formed.bridging, orientation.rows[gone]),
+        bridging=formed.bridging[~np.isin(formed.bridging, orientation.rows[gone])],
         home=formed.home[stay] if len(formed.home) else formed.home,
     )
 
