@@ -10,10 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import dataclass, replace
-from photostrip.pipeline.common_points import mean_points
-from photostrip.pipeline.given_points import measured_control
-from photostrip.pipeline.strips.adjusting import adjust_formed
-from photostrip.pipeline.strips.forming import form_photos
 from photostrip.triangulation.image_coordinates import corrections
 
 if TYPE_CHECKING:
@@ -70,6 +66,12 @@ def correct(photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground:
 
 def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, ground: GroundFrames) -> Heights:
     """Mean heights of cameras and ground from the strips, adjusted as they will be, in the frames of the run."""
+    # a check, which asks for no heights, does without the fifty modules of a strip
+    from photostrip.pipeline.common_points import mean_points
+    from photostrip.pipeline.given_points import measured_control
+    from photostrip.pipeline.strips.adjusting import adjust_formed
+    from photostrip.pipeline.strips.forming import form_photos
+
     control = measured_control(inputs.control, observations)
     formed = form_photos(inputs, observations, settings)
     if settings.adjustment == "bundle":

@@ -15,7 +15,6 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.points import locate
-from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.triangulation.plausibility.control.control_strip import Rays, StripPoints
 from photostrip.triangulation.plausibility.photos import mosaic
@@ -120,6 +119,8 @@ def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Evidenc
     """Form a strip as far as that goes, for evidence alone; None when a pair or a junction cannot be determined."""
     if len(strip.photos) < 2:
         return None  # a single photo of a block has no pairs
+    from photostrip.triangulation.gross_errors.pairs import screening  # a check forms no strips
+
     try:
         pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
         first, converged = orient_unchecked(pairs)

@@ -14,7 +14,6 @@ from photostrip.arrays import median
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import replace
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline.common_points import compared_strips
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.plausibility import (
     control_layout,
@@ -67,6 +66,8 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
 
 def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment being done."""
+    from photostrip.pipeline.common_points import compared_strips  # a check has no adjusted strips
+
     inputs, settings = result.inputs, result.settings
     if inputs.models is not None:
         return _of_adjusted_models(result, inputs.models, directory)
