@@ -122,9 +122,7 @@ def _text(self: Any) -> str:  # noqa: ANN401 (any dataclass)
 
 
 def _same(self: object, other: object) -> bool:
-    if type(other) is not type(self):
-        return NotImplemented
-    return self is other or bool(_values(self) == _values(other))
+    return (self is other or _values(self) == _values(other)) if type(other) is type(self) else NotImplemented
 
 
 def _hash(self: object) -> int:
