@@ -18,7 +18,7 @@ from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.frame import rays, small_turn
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats
+    from photostrip.arrays import Flags, Floats, Numbers
 
 ANGLES = 3  # a turn to the right, up, and about the optical axis
 MOST_ITERATIONS = 20
@@ -78,19 +78,20 @@ class Turn:
     def dof(self) -> int:
         return int((self.weights > 0).sum()) - ANGLES
 
-    def predict(self, number: int) -> tuple[Floats, Floats] | None:
-        """Fit the turn without one point; None when the other points do not determine it."""
-        weighted = self.design[number] * self.weights[number][:, None]
-        normal = self.normal - weighted.T @ self.design[number]
-        if not determined(normal):
-            return None
-        shift = np.linalg.solve(normal, weighted.T @ np.nan_to_num(self.residuals[number]))
-        return self.values - shift, normal
+    def predict(self, rows: Numbers) -> tuple[Floats, Floats, Flags]:
+        """Fit the turn without each of some points alone: turns (r, 3), normal matrices, where others determine it."""
+        design = self.design[rows]
+        weighted = design * self.weights[rows][:, :, None]
+        normal = self.normal - weighted.transpose(0, 2, 1) @ design
+        known = determined(normal)
+        normal = np.where(known[:, None, None], normal, np.eye(ANGLES))
+        sums = np.einsum("rik,ri->rk", weighted, np.nan_to_num(self.residuals[rows]))
+        return self.values - np.linalg.solve(normal, sums[:, :, None])[:, :, 0], normal, known
 
 
 def turned(before: Floats, principal_distance: float, turn: Floats) -> Floats:
-    """Where points (m, 2), mm from the principal point, stand in the photo after the camera turned."""
-    ray = rays(before, principal_distance) @ small_turn(turn)
+    """Where points (m, 2), mm from the principal point, stand in the photo after one turn, or each after its own."""
+    ray = (rays(before, principal_distance)[:, None, :] @ small_turn(turn))[:, 0]
     return -principal_distance * ray[:, :2] / ray[:, 2:]
 
 
@@ -130,13 +131,12 @@ def fit(pair: ImagePair, used: Flags) -> Turn | None:
     return None
 
 
-def determined(normal: Floats) -> bool:
-    """Whether a normal matrix of a turn can be inverted."""
-    length = np.sqrt(np.diag(normal))
-    if not length.all():
-        return False
-    size = np.linalg.eigvalsh(normal / np.outer(length, length))
-    return bool(size[0] > LEAST_RECIPROCAL)
+def determined(normal: Floats) -> Flags:
+    """Whether normal matrices (..., 3, 3) of turns can be inverted."""
+    length = np.sqrt(np.diagonal(normal, axis1=-2, axis2=-1))
+    length = np.where(length.all(axis=-1, keepdims=True), length, np.inf)  # leaves a matrix of zeros
+    size = np.linalg.eigvalsh(normal / (length[..., :, None] * length[..., None, :]))
+    return np.asarray(size[..., 0] > LEAST_RECIPROCAL, bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,28 +171,28 @@ def find_motion(left: ImagePair, right: ImagePair) -> Motion:
 def _worst(pairs: tuple[ImagePair, ImagePair], turns: tuple[Turn | None, Turn | None], used: Flags) -> Rejection | None:
     """Find the point that fits worst to the turns that the others give, if it fits too badly."""
     rows = np.flatnonzero(used)
-    worst: Rejection | None = None
-    for row in rows:
-        value, components = 0.0, 0
-        for pair, turn in zip(pairs, turns, strict=True):
-            drop, parts = _misfit(pair, turn, int(row))
-            value, components = value + drop, components + parts
-        if not components:
-            continue
-        limit = chi2_quantile(1 - FALSE_REJECTION / len(rows), components)
-        if value > limit and (worst is None or value / limit > worst.value / worst.limit):
-            worst = Rejection(kind="stable", row=int(row), test="chi-square", value=value, limit=limit)
-    return worst
+    misfits = [_misfits(pair, turn, rows) for pair, turn in zip(pairs, turns, strict=True) if turn is not None]
+    if not misfits:
+        return None
+    values, components = np.sum(misfits, axis=0)
+    limits = np.array(
+        [chi2_quantile(1 - FALSE_REJECTION / len(rows), count) if count else np.inf for count in components]
+    )
+    worst = int(np.argmax(values / limits))
+    if values[worst] <= limits[worst]:
+        return None
+    return Rejection(
+        kind="stable", row=int(rows[worst]), test="chi-square", value=float(values[worst]), limit=float(limits[worst])
+    )
 
 
-def _misfit(pair: ImagePair, turn: Turn | None, row: int) -> tuple[float, int]:
-    """Squared misclosure of a point against the turn fitted without it, and its degrees of freedom."""
-    there = pair.measured[row]
-    without = turn.predict(row) if turn is not None else None
-    if without is None or turn is None or not there.any():
-        return 0.0, 0
-    values, normal = without
-    miss = (pair.after[row] - turned(pair.before[row : row + 1], pair.principal_distance, values)[0])[there]
-    design = turn.design[row][there]
-    covariance = np.diag(pair.variances[row][there]) + design @ np.linalg.inv(normal) @ design.T
-    return float(miss @ np.linalg.solve(covariance, miss)), int(there.sum())
+def _misfits(pair: ImagePair, turn: Turn, rows: Numbers) -> tuple[Floats, Floats]:
+    """Squared misclosures of points, each against the turn fitted without it, and their degrees of freedom."""
+    values, normal, known = turn.predict(rows)
+    there = pair.measured[rows] & known[:, None]
+    miss = np.where(there, pair.after[rows] - turned(pair.before[rows], pair.principal_distance, values), 0.0)
+    design = np.where(there[:, :, None], turn.design[rows], 0.0)
+    covariance = np.where(there, pair.variances[rows], 1.0)[:, :, None] * np.eye(2)
+    covariance += design @ np.linalg.inv(normal) @ design.transpose(0, 2, 1)
+    drops = np.einsum("ri,ri->r", miss, np.linalg.solve(covariance, miss[:, :, None])[:, :, 0])
+    return drops, there.sum(axis=1, dtype=float)

@@ -188,15 +188,15 @@ def _turns(series: Series, motion: Motion | None, removed: tuple[bool, ...]) -> 
         result.values[:, angles] = turn.values
         result.common[angles, :, columns] = np.einsum("jk,mik->jmi", turn.covariance, weighted)
         result.stable[:, angles, :, columns] = result.common[angles, :, columns]
-        for number in np.flatnonzero(turn.weights.any(axis=1)):
-            without = turn.predict(int(number))
-            if without is None:
-                result.known[stable[number]] = False
-                continue
-            result.values[stable[number], angles] = without[0]
-            influence = np.einsum("jk,mik->jmi", np.linalg.inv(without[1]), weighted)
-            influence[:, number] = 0.0
-            result.stable[number, angles, :, columns] = influence
+        rows = np.flatnonzero(turn.weights.any(axis=1))
+        values, normal, known = turn.predict(rows)
+        result.known[stable[rows[~known]]] = False
+        rows, values, normal = rows[known], values[known], normal[known]
+        result.values[stable[rows], angles] = values
+        influence = np.einsum("rjk,mik->rjmi", np.linalg.inv(normal), weighted)
+        influence[range(len(rows)), :, rows] = 0.0
+        for number, each in zip(rows, influence, strict=True):
+            result.stable[number, angles, :, columns] = each
     return result
 
 
@@ -305,23 +305,19 @@ def _parallax_precision(series: Series, epochs: list[_Epoch]) -> tuple[Floats, F
 
 def _rates(times: Floats, first: list[Step], covariance: Floats) -> Rates:
     """Fit a uniform motion to each point: generalised least squares on its displacements since the first epoch."""
-    count = len(first[0].values)
-    values, spread = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
-    misfit, dof = np.full(count, np.nan), np.zeros(count, np.intp)
-    moved = np.array([step.values for step in first])
-    for point in range(count):
-        there = np.flatnonzero(np.isfinite(np.array([step.covariance[point] for step in first])).all(axis=(1, 2)))
-        if not len(there):
-            continue
-        matrix = covariance[np.ix_(there + 1, there + 1)][:, :, point].transpose(0, 2, 1, 3)
-        matrix = matrix.reshape(3 * len(there), 3 * len(there))
-        design = np.kron((times[there + 1] - times[0])[:, None], np.eye(3))
-        weighted = np.linalg.solve(matrix, design)
-        spread[point] = np.linalg.inv(design.T @ weighted)
-        observed = moved[there, point].ravel()
-        values[point] = spread[point] @ (weighted.T @ observed)
-        left = observed - design @ values[point]
-        dof[point] = len(left) - len(values[point])
-        if dof[point]:
-            misfit[point] = float(left @ np.linalg.solve(matrix, left))
-    return Rates(Step(values, spread), misfit, dof)
+    there = np.isfinite([step.covariance for step in first]).all(axis=(2, 3)).T  # by point and epoch
+    points, epochs = there.shape
+    used = np.repeat(there, 3, axis=1)
+    matrix = covariance[1:, 1:].transpose(2, 0, 3, 1, 4).reshape(points, 3 * epochs, 3 * epochs)
+    matrix = np.where(used[:, :, None] & used[:, None, :], matrix, np.eye(3 * epochs))
+    design = used[:, :, None] * np.kron((times[1:] - times[0])[:, None], np.eye(3))
+    observed = np.where(used, np.concatenate([step.values for step in first], axis=1), 0.0)[:, :, None]
+    weighted = np.linalg.solve(matrix, design)
+    normal = weighted.transpose(0, 2, 1) @ design
+    known = there.any(axis=1)[:, None, None]
+    spread = np.where(known, np.linalg.inv(np.where(known, normal, np.eye(3))), np.nan)
+    values = spread @ (weighted.transpose(0, 2, 1) @ observed)
+    left = observed - design @ values
+    dof = np.maximum(3 * (there.sum(axis=1) - 1), 0)
+    misfit = (left.transpose(0, 2, 1) @ np.linalg.solve(matrix, left))[:, 0, 0]
+    return Rates(Step(values[:, :, 0], spread), np.where(dof > 0, misfit, np.nan), dof)

@@ -125,10 +125,10 @@ def _known_turn(turn: Turn | None, number: int | None) -> tuple[Floats, Floats]:
         return np.zeros(SPACE), np.zeros((SPACE, SPACE))
     if number is None:
         return turn.values, turn.covariance
-    without = turn.predict(number)
-    if without is None:
+    values, normal, known = turn.predict(np.array([number]))
+    if not known.all():
         raise _undetermined(())
-    return without[0], np.asarray(np.linalg.inv(without[1]), float)
+    return values[0], np.asarray(np.linalg.inv(normal[0]), float)
 
 
 def _displacement(quantities: Floats, principal_distance: float, rotation: Floats) -> tuple[Floats, Floats]:

@@ -106,17 +106,17 @@ def test_the_fit_without_a_point_is_the_fit_to_the_others(point: int) -> None:
     whole, others = fit(given_, ALL), fit(given_, np.arange(len(PLACES)) != point)
     assert whole is not None
     assert others is not None
-    predicted = whole.predict(point)
-    assert predicted is not None
-    np.testing.assert_allclose(predicted[0], others.values, atol=1e-3 * others.sigma.min())
-    np.testing.assert_allclose(predicted[1], others.normal, rtol=1e-3)
+    (values,), (normal,), (known,) = whole.predict(np.array([point]))
+    assert known
+    np.testing.assert_allclose(values, others.values, atol=1e-3 * others.sigma.min())
+    np.testing.assert_allclose(normal, others.normal, rtol=1e-3)
 
 
 def test_a_point_that_the_turn_rests_on_has_no_prediction() -> None:
     given_ = pair((0, 0, 0), 3, PLACES[:2])
     found = fit(given_, np.ones(2, bool))
     assert found is not None
-    assert found.predict(0) is None
+    assert found.predict(np.array([0]))[2].tolist() == [False]
 
 
 # ------------------------------------------------------------------------------------------------- moved points
