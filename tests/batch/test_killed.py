@@ -10,18 +10,16 @@ import subprocess
 import time
 import warnings
 from contextlib import redirect_stderr, redirect_stdout, suppress
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.batch.evaluation import evaluate
 from photostrip.cli.jobs import batch as batch_job
 from photostrip.cli.main import main
 from photostrip.formats.output.batch import parsed_record
 from photostrip.formats.text.source import digest
-from tests.batch.projects import Alone, command, environment, run, tree, write_projects
+from tests.batch.projects import Alone, command, environment, known, run, tree, write_projects
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -68,16 +66,13 @@ def in_a_child(act: Callable[[], object], seconds: float | None = None) -> int:
 
 @pytest.fixture
 def _known_results(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Adjust each project once, and wait about as long the next times: it is the writing that dies."""
-    known = cache(evaluate)
+    """Wait about as long as it takes to adjust a project that is known: it is the writing that dies."""
 
     def waited_for(task: Task) -> Answer:
-        before = known.cache_info().hits
-        answer = known(task)
-        time.sleep(ADJUSTING * (known.cache_info().hits - before))
-        return answer
+        time.sleep(ADJUSTING)
+        return known(task)
 
-    monkeypatch.setattr("tests.batch.projects.evaluate", waited_for)
+    monkeypatch.setattr("tests.batch.projects.known", waited_for)
 
 
 def trusted(out: Path) -> set[str]:
@@ -127,7 +122,6 @@ def test_killed_at_every_single_step_of_writing(here: Path, monkeypatch: pytest.
     """Die before the first, second, ... file that is written or renamed; then go on."""
     shutil.rmtree(here / "strips")
     write_projects(here / "strips", 1)
-    monkeypatch.setattr("tests.batch.projects.evaluate", cache(evaluate))  # it is the writing that dies
     assert main([*BATCH[:3], "whole", "--quiet"]) == 0
     whole = tree(here / "whole")
     steps = 0
