@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import email
 import os
-import shutil
 import subprocess
 import sys
 import tarfile
 import tomllib
+import venv
 import zipfile
+from importlib.metadata import Distribution, distribution, distributions
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
 
 import photostrip
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Iterable
 
 pytestmark = pytest.mark.slow
 
@@ -85,50 +88,53 @@ def wheel(tmp_path_factory: pytest.TempPathFactory, source_archive: Path) -> Pat
     return build("wheel", folder / "built", source)
 
 
-def assert_runs(python: str, folder: Path, installed: Path, environment: dict[str, str], *form: str) -> None:
-    """Import the installed package, adjust a sample by its command, and print a table of its own."""
+def installed(requirements: Iterable[str], extras: Iterable[str]) -> dict[str, Distribution]:
+    """Give what is installed here of all that is required, directly or not: each must be of a version that will do."""
+    found: dict[str, Distribution] = {}
+    for each in map(Requirement, requirements):
+        if each.marker is None or any(each.marker.evaluate({"extra": extra}) for extra in ("", *extras)):
+            found[each.name] = distribution(each.name)
+            assert each.specifier.contains(found[each.name].version), each
+            found |= installed(found[each.name].requires or (), each.extras)
+    return found
 
-    def run(*command: str) -> str:
-        done = subprocess.run(
-            [python, *command], cwd=folder, env=environment, capture_output=True, text=True, check=True
-        )
+
+def link(found: Iterable[Distribution], packages: Path) -> None:
+    """Put distributions that are installed here into another environment, too."""
+    for each in nonempty(found):
+        for top in {file.parts[0] for file in nonempty(each.files or ())} - {"..", "__pycache__"}:
+            if not (packages / top).exists():
+                (packages / top).symlink_to(Path(str(each.locate_file(top))).resolve())
+
+
+def test_the_wheel_runs_in_an_environment_that_has_what_it_asks_for_and_nothing_else(
+    tmp_path: Path, wheel: Path
+) -> None:
+    venv.create(tmp_path / "empty", symlinks=True)
+    python, command = (str(tmp_path / "empty/bin" / name) for name in ("python", "photostrip"))
+    (packages,) = tmp_path.glob("empty/lib/python3.*/site-packages")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "COVERAGE"))}
+    sample = ROOT / "sample_data/simulated-20"
+
+    def run(*arguments: str) -> str:
+        done = subprocess.run(arguments, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
         return done.stdout
 
-    where = run("-c", "import photostrip; print(len(photostrip.__all__), photostrip.__file__)")
-    assert where.strip() == f"{len(photostrip.__all__)} {installed / 'photostrip/__init__.py'}"
-    sample = str(ROOT / "sample_data/simulated-20")
-    run("-m", "photostrip", "run", f"{sample}/project.yaml", "-o", "result", "-q", *form)
-    assert "SAME" in run("-m", "photostrip", "compare", "result", f"{sample}/baseline.json")
-    assert "[001]" in run("-m", "photostrip", "sources")
-
-
-def test_the_wheel_runs_beside_the_libraries_that_are_here(tmp_path: Path, wheel: Path) -> None:
-    installed = tmp_path / "installed"
-    shutil.unpack_archive(wheel, installed, "zip")
-    assert_runs(sys.executable, tmp_path, installed, os.environ | {"PYTHONPATH": str(installed)}, "--html")
-
-
-def test_the_wheel_brings_what_it_needs_into_an_empty_environment(tmp_path: Path, wheel: Path) -> None:
-    empty = tmp_path / "empty"
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(empty)], check=True, capture_output=True)
-    python = str(empty / "bin/python")
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "COVERAGE"))}
-
-    def pip(*command: str) -> subprocess.CompletedProcess[str]:
-        options = ["--quiet", "--disable-pip-version-check", "--no-compile", "--retries", "1", "--timeout", "20"]
-        return subprocess.run(
-            [sys.executable, "-m", "pip", "--python", python, "install", *options, *command],
-            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-
-    installed = pip(str(wheel))
-    if installed.returncode and pip("--dry-run", "--no-deps", "typer").returncode:
-        pytest.skip(f"no package index is reachable: {installed.stderr.strip().splitlines()[-1]}")
-    assert installed.returncode == 0, installed.stderr
-    (packages,) = empty.glob("lib/python3.*/site-packages")
-    assert_runs(python, tmp_path, packages, environment)
-    version = subprocess.run([empty / "bin/photostrip", "--version"], capture_output=True, text=True, check=True)
-    assert photostrip.__version__ in version.stdout
+    install = ["install", "--quiet", "--no-deps", "--no-index", "--no-compile", "--disable-pip-version-check"]
+    run(sys.executable, "-m", "pip", "--python", python, *install, str(wheel))
+    (this,) = distributions(path=[str(packages)])
+    needed = installed(this.requires or (), ())
+    link(needed.values(), packages)
+    where = run(python, "-c", "import photostrip; print(len(photostrip.__all__), photostrip.__file__)")
+    assert where.strip() == f"{len(photostrip.__all__)} {packages / 'photostrip/__init__.py'}"
+    run(command, "run", str(sample / "project.yaml"), "-o", "result", "-q")
+    assert "SAME" in run(command, "compare", "result", str(sample / "baseline.json"))
+    assert "[001]" in run(command, "sources")
+    assert photostrip.__version__ in run(python, "-m", "photostrip", "--version")
+    reporting = installed(this.requires or (), ["report"])
+    link([each for name, each in reporting.items() if name not in needed], packages)
+    run(command, "report", "result", "-o", "page.html")
+    assert (tmp_path / "page.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
 
 
 def needs() -> dict[str, str]:
