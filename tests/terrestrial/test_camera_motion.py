@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.terrestrial.camera_motion import ImagePair, find_motion, fit, turn_gradient, turned
+from tests.draws import orthogonal_normal
 from tests.terrestrial.simulated import ARCSECOND, attitude
 
 if TYPE_CHECKING:
@@ -22,12 +23,15 @@ F, SIGMA = 100.0, 0.005
 PLACES = np.array([(-70, 45), (65, 50), (-60, -50), (72, -44), (5, 0), (-20, 30), (30, -25)], float)
 
 
-def pair(turn: tuple[float, float, float], seed: int | None = None, places: Floats = PLACES) -> ImagePair:
+def pair(
+    turn: tuple[float, float, float], seed: int | None = None, places: Floats = PLACES, drawn: Floats | None = None
+) -> ImagePair:
     """Photograph points before and after a turn, by a rotation written apart from the program."""
     columns = attitude(*turn)
     ray = np.column_stack([places[:, 0], np.full(len(places), F), places[:, 1]]) @ columns
     after = F * ray[:, [0, 2]] / ray[:, 1:2]
     noise = np.zeros((2, *places.shape)) if seed is None else Draws(seed, Purpose.IMAGE).normal(2, *places.shape)
+    noise = noise if drawn is None else drawn.reshape(noise.shape)
     variances = np.full(places.shape, 2 * SIGMA**2)
     return ImagePair(places + SIGMA * noise[0], after + SIGMA * noise[1], variances, F)
 
@@ -89,13 +93,14 @@ def test_two_points_in_one_place_do_not_determine_a_turn() -> None:
 
 @pytest.mark.slow
 def test_precision_and_test_value_are_those_of_repeated_measurements() -> None:
-    turn, runs = (40 * ARCSECOND, -25 * ARCSECOND, 60 * ARCSECOND), 600
-    found = [fit(pair(turn, seed), ALL) for seed in range(runs)]
+    turn, draws = (40 * ARCSECOND, -25 * ARCSECOND, 60 * ARCSECOND), 16 * PLACES.size  # in two epochs: eight blocks
+    rows = orthogonal_normal(np.random.default_rng(1), draws, 2 * PLACES.size)
+    found = [fit(pair(turn, drawn=row), ALL) for row in rows]
     errors = np.array([(each.values - turn) / each.sigma for each in found if each is not None])
-    assert len(errors) == runs
-    assert np.abs(errors.mean(axis=0)).max() < 4 / np.sqrt(runs)
+    assert len(errors) == draws
+    assert np.abs(errors.mean(axis=0)).max() < 0.16
     np.testing.assert_allclose(errors.std(axis=0), 1.0, atol=0.1)
-    still = [fit(pair((0, 0, 0), seed), ALL) for seed in range(runs)]
+    still = [fit(pair((0, 0, 0), drawn=row), ALL) for row in rows]
     assert np.mean([each.statistic for each in still if each is not None]) == pytest.approx(3.0, abs=0.4)
     assert np.mean([each.weighted_sum for each in still if each is not None]) == pytest.approx(11.0, abs=0.6)
 

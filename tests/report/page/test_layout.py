@@ -19,10 +19,10 @@ def tables(draw: st.DrawFn) -> Table:
         Column(
             draw(st.sampled_from(["point", "σ0", "d east", "condition"])), draw(st.sampled_from(["", "µm"])), left, rank
         )
-        for left, rank in draw(st.lists(st.tuples(st.booleans(), st.integers(0, 3)), min_size=1, max_size=12))
+        for left, rank in draw(st.lists(st.tuples(st.booleans(), st.integers(0, 3)), min_size=1, max_size=9))
     )
     row = st.tuples(*(WORDS if column.left else NUMBERS for column in columns))
-    return Table(columns, tuple(draw(st.lists(row, max_size=3))), note=draw(WORDS))
+    return Table(columns, tuple(draw(st.lists(row, max_size=2))), note=draw(WORDS))
 
 
 SECTIONS = st.builds(
@@ -32,15 +32,15 @@ SECTIONS = st.builds(
         st.one_of(
             tables(),
             st.builds(Words, WORDS, st.just(""), st.sampled_from(["", "1.", "-"])),
-            st.builds(Facts, st.lists(st.tuples(WORDS, WORDS), max_size=3).map(tuple)),
+            st.builds(Facts, st.lists(st.tuples(WORDS, WORDS), max_size=2).map(tuple)),
         ),
-        max_size=3,
+        max_size=2,
     ).map(tuple),
 )
 
 
 @pytest.mark.slow
-@given(WORDS, st.lists(SECTIONS, max_size=3), st.integers(0, 300), st.booleans())
+@given(WORDS, st.lists(SECTIONS, max_size=2), st.integers(0, 300), st.booleans())
 def test_no_line_is_wider_than_the_page_or_ends_in_a_blank(
     title: str, sections: list[Section], width: int, ascii_only: bool
 ) -> None:
