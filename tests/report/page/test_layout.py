@@ -19,10 +19,10 @@ def tables(draw: st.DrawFn) -> Table:
         Column(
             draw(st.sampled_from(["point", "σ0", "d east", "condition"])), draw(st.sampled_from(["", "µm"])), left, rank
         )
-        for left, rank in draw(st.lists(st.tuples(st.booleans(), st.integers(0, 3)), min_size=1, max_size=9))
+        for left, rank in draw(st.lists(st.tuples(st.booleans(), st.integers(0, 3)), min_size=1, max_size=12))
     )
     row = st.tuples(*(WORDS if column.left else NUMBERS for column in columns))
-    return Table(columns, tuple(draw(st.lists(row, max_size=2))), note=draw(WORDS))
+    return Table(columns, tuple(draw(st.lists(row, min_size=1, max_size=2))), note=draw(WORDS))
 
 
 SECTIONS = st.builds(
