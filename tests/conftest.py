@@ -54,6 +54,22 @@ def _quick_start(forks: Forks, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def _adjusted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let commands take over what the same data gave before, where a test looks at what is done with a result."""
+    from tests.results import known  # not for tests without any
+
+    monkeypatch.setattr("photostrip.pipeline.triangulate", known)
+
+
+@pytest.fixture
+def _adjusted_each_time(_adjusted_once: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Adjust anew among tests that do not: for what comes out again."""
+    from photostrip.pipeline.run import triangulate
+
+    monkeypatch.setattr("photostrip.pipeline.triangulate", triangulate)
+
+
+@pytest.fixture
 def _no_findings(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out what the data say against themselves, where many repetitions are adjusted for their numbers alone."""
     monkeypatch.setattr("photostrip.pipeline.plausibility.gate.of_result", lambda *_: ())

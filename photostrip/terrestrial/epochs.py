@@ -306,7 +306,7 @@ def _parallax_precision(series: Series, epochs: list[_Epoch]) -> tuple[Floats, F
 def _rates(times: Floats, first: list[Step], covariance: Floats) -> Rates:
     """Fit a uniform motion to each point: generalised least squares on its displacements since the first epoch."""
     there = np.isfinite([step.covariance for step in first]).all(axis=(2, 3)).T  # by point and epoch
-    points, epochs = there.shape
+    (points, epochs), count = there.shape, there.sum(axis=1)
     used = np.repeat(there, 3, axis=1)
     matrix = covariance[1:, 1:].transpose(2, 0, 3, 1, 4).reshape(points, 3 * epochs, 3 * epochs)
     matrix = np.where(used[:, :, None] & used[:, None, :], matrix, np.eye(3 * epochs))
@@ -314,10 +314,10 @@ def _rates(times: Floats, first: list[Step], covariance: Floats) -> Rates:
     observed = np.where(used, np.concatenate([step.values for step in first], axis=1), 0.0)[:, :, None]
     weighted = np.linalg.solve(matrix, design)
     normal = weighted.transpose(0, 2, 1) @ design
-    known = there.any(axis=1)[:, None, None]
+    known = (count > 0)[:, None, None]
     spread = np.where(known, np.linalg.inv(np.where(known, normal, np.eye(3))), np.nan)
     values = spread @ (weighted.transpose(0, 2, 1) @ observed)
     left = observed - design @ values
-    dof = np.maximum(3 * (there.sum(axis=1) - 1), 0)
+    dof = np.maximum(3 * (count - 1), 0)
     misfit = (left.transpose(0, 2, 1) @ np.linalg.solve(matrix, left))[:, 0, 0]
     return Rates(Step(values[:, :, 0], spread), np.where(dof > 0, misfit, np.nan), dof)

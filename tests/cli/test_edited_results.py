@@ -18,6 +18,8 @@ from tests.reports import RESULT, saved
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 CASES = 60
 
 

@@ -20,6 +20,8 @@ from tests.results import spec, write_project
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 PHOTOS = ["0123", "NO", "1:20", "1e3", "~"]
 NAMES = ["Камера", "+7", "-1"]  # camera, strip, project
 

@@ -15,6 +15,8 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 PROJECT = str(ROOT / "sample_data" / "simulated-20" / "project.yaml")
 BUNDLE = ("--set", "processing.adjustment=bundle")
 
@@ -128,6 +130,7 @@ def test_the_report_of_a_bundle(capsys: pytest.CaptureFixture[str], tmp_path: Pa
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_adjusted_each_time")
 def test_the_bundle_is_the_same_every_time(capsys: pytest.CaptureFixture[str]) -> None:
     first, second = (run(capsys, PROJECT, *BUNDLE, "--format", "json")[1] for _ in range(2))
     assert first == second

@@ -16,6 +16,8 @@ from tests.loops import nonempty
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:

@@ -21,6 +21,8 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from tests.results import Document
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 TABLES = ("points", "photos", "residuals", "parallaxes", "rejected", "refined")
 FILES = {*(f"{name}.csv" for name in TABLES), "project.resolved.yaml", "result.json"}
 

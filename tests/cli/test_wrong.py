@@ -22,6 +22,8 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 WRONG = [*((FILES, *case) for case in ONE_FAULT), *((MARKED_FILES, *case) for case in MARKS)]
 
 

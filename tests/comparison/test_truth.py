@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     Document = dict[str, Any]
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 FRAMES: dict[str, Document] = {
     "projected": {},
     "north first": {"crs": "EPSG:32633", "axes": ["north", "east", "up"]},

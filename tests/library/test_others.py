@@ -14,6 +14,8 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 FOLDER = ROOT / "sample_data/simulated-20"
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 SAMPLE = ROOT / "sample_data/simulated-20/project.yaml"
 
 

@@ -10,6 +10,8 @@ import photostrip
 from tests.loops import nonempty
 from tests.test_startup import HEAVY, loaded_after
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 # What scripts of users rely on. A change here needs a line in CHANGELOG.md that says what to do instead.
 PARAMETERS = {
     "check": ["project", "tables", "overrides"],

@@ -18,6 +18,8 @@ from photostrip.result.statement.certificate import result_hash
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 SAMPLE = ROOT / "sample_data" / "sxb-strasbourg"
 FILES = sorted(path.name for path in SAMPLE.iterdir() if path.suffix in {".yaml", ".csv"})
 
@@ -79,6 +81,7 @@ def test_presets_and_overrides_stand_in_the_certificate(copied: Path) -> None:
     assert block["set"] == ['name="other"']
 
 
+@pytest.mark.usefixtures("_adjusted_each_time")
 def test_what_has_not_changed_comes_out_again(copied: Path) -> None:
     found = verify(copied / "result")
     assert found["status"] == "same"
@@ -87,6 +90,7 @@ def test_what_has_not_changed_comes_out_again(copied: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_adjusted_each_time")
 @pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
 def test_what_was_overridden_is_overridden_again(copied: Path, adjustment: str) -> None:
     photostrip.run(copied / "project.yaml", processing={"adjustment": adjustment}).write(copied / "result")

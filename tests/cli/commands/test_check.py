@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
     from tests.results import Document
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 MILLIMETRE = 1e-3
 SAMPLES = sorted((ROOT / "sample_data").glob("*/project.yaml"))
 

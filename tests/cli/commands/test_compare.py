@@ -22,6 +22,8 @@ from tests.loops import nonempty
 from tests.results import case
 from tests.source_tree import ROOT
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 PROFILES = ROOT / "configs" / "tolerances"
 
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     from tests.results import Document
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 ODD_IDS = [
     "0123",
     "NO",

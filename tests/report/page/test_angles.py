@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
     from tests.results import Document
 
+pytestmark = pytest.mark.usefixtures("_adjusted_once")
+
 ADJUSTMENTS = ("polynomial", "bundle")
 PER_DEGREE = {"gon": 200 / 180, "rad": np.pi / 180}
 
