@@ -291,9 +291,9 @@ def test_pictures_are_the_same_every_time(capsys: pytest.CaptureFixture[str], tm
     file = tmp_path / "c.yaml"
     file.write_text(CAMERAS)
     for command, endings in (
-        (("model",), [".svg", ".svg", ".png", ".png"]),
-        (("camera", str(file)), [".svg"]),
+        (("camera", str(file)), [".svg", ".svg", ".png", ".png"]),
         (("camera", "--source-table"), [".svg"]),
+        (("model",), [".svg"]),
         (("model", "--source-table"), [".svg"]),
         (("model", "--elements", "5,-3,10,-8,12"), [".svg"]),
     ):
