@@ -15,6 +15,8 @@ from photostrip.pipeline import triangulate
 from photostrip.simulation import Flight, Ground, Spec
 from photostrip.simulation.simulation import simulate
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 ETRS89, ITRF2020 = FrameSpec("EPSG:4937", GROUND_AXES), FrameSpec("EPSG:9989", GROUND_AXES)
 PLACE = np.array([[11.5, 48.2, 500.0]])  # Munich
 METRES_IN_DEGREE = np.array([74_300.0, 111_200.0, 1.0])

@@ -52,6 +52,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 MICRON = 1e-6  # metres, and radians: what exact means; geocentric coordinates are stored to 1e-9 m
 SIGMA = 5e-6 * 10_000  # metres: 5 micrometres at the photo scale 1:10 000
 EXACT_CONTROL = (0.0, 0.0, 0.0)
@@ -454,7 +456,6 @@ def test_relative_orientation_finds_the_noise() -> None:
     assert variance == pytest.approx(1.0, abs=3 * np.sqrt(2 / redundancy.sum()))
 
 
-@pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
     """Limits of ten models and three bands, in units of sigma at photo scale; floors at half of them."""
@@ -466,7 +467,6 @@ def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
     assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found["2"])
 
 
-@pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("bands", "degree", "strips", "limits"),

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     from photostrip.simulation.simulation import Simulation
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 SIDE = 2300.0  # of a photo on the ground, m
 DISTANCE = 153.0
 

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 SEEDS = st.integers(0, 2**32 - 1)
 CUBIC = ("1", "X", "Y", "XY", "X^2", "X^3")
 SQUARE = ("1", "X", "Y", "XY", "X^2")

@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.float64]
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 SEEDS = st.integers(0, 2**31)
 DESIGN = [1, 1, 1, 1e3, 1e3, 1e3, 1e2]  # sizes of the columns of a similarity
 

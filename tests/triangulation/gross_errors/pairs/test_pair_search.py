@@ -341,9 +341,9 @@ def test_parallaxes_that_scatter_by_a_hundredth_of_the_principal_distance_are_no
 
 @pytest.mark.slow
 def test_the_number_of_pairs_at_a_time_is_for_the_memory_and_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    flown = level(25, 150, (3,) * 6)
+    flown = level(25, 96, (3,) * 6)
     rng = np.random.default_rng(26)
-    wrong = rng.permuted(np.tile(np.arange(18) < 4, (150, 1)), axis=1)
+    wrong = rng.permuted(np.tile(np.arange(18) < 4, (96, 1)), axis=1)
     pairs = spoiled(flown, np.where(wrong, rng.uniform(0.1, 5.0, wrong.shape), 0.0))
     sizes, of_sets = list[int](), deletion.search
 

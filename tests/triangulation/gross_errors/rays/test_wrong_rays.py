@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 SIGMA = 5 * MICROMETRE
 STATIONS = (0, 3, 6, 9, 12)
 SEEDS = st.integers(0, 2**31)
@@ -198,7 +200,6 @@ def test_a_photo_with_a_fifth_of_its_rays_wrong_is_oriented(photo: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_no_findings")
 def test_strips_without_errors_lose_nothing() -> None:
     lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.wrong_rays) for seed in range(20)]
     assert sum(each > 0 for each in lost) <= 2
