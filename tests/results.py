@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.tying import TiedFrames
     from photostrip.pipeline import Inputs, Result
+    from photostrip.pipeline.frames import TiedFrames
 
 Document = dict[str, Any]
 
