@@ -193,6 +193,7 @@ nmae: strip
 """
 
 
+@pytest.mark.slow
 def test_a_wrong_page_is_found(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(BAD_PAGE, encoding="utf-8")

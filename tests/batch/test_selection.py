@@ -103,6 +103,7 @@ names = st.sampled_from(["a", "A", "b", "project", "s1"])
 paths = st.builds(lambda folders, name: str(Path("/", *folders, f"{name}.yaml")), st.lists(names, max_size=4), names)
 
 
+@pytest.mark.slow
 @given(st.lists(paths, unique=True, min_size=1, max_size=12))
 def test_no_two_results_share_a_folder(projects: list[str]) -> None:
     outputs = output_names(projects)

@@ -154,6 +154,7 @@ def test_a_tolerance_that_is_not_kept_gives_1_and_the_whole_result(
     assert out.startswith("FAILED: 1 of 1 tolerance not kept.")
 
 
+@pytest.mark.slow
 def test_tolerances_that_are_kept_give_0(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(
         capsys, "run", project, "--set", "tolerances.check_rms_xy=5", "--set", "tolerances.check_rms_z=5"
@@ -350,6 +351,7 @@ def test_a_damaged_result_is_refused_in_words(result: Path, tmp_path: Path, caps
     )
 
 
+@pytest.mark.slow
 def test_report_needs_no_mathematics(result: Path) -> None:
     code = (
         "import sys\nfrom photostrip.cli.main import main\n"

@@ -264,6 +264,7 @@ def test_a_full_disk_takes_the_same_form(
     assert list((tmp_path / "out").iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [1, 2])
 @pytest.mark.parametrize(("name", "expected"), [("project.yaml", 0), ("nothing.yaml", 2)])
 def test_an_output_that_the_caller_closed_takes_everything(

@@ -316,6 +316,7 @@ def test_what_was_taken_back_is_not_rejected() -> None:
     assert compare_results(now, before)["status"] == "same"
 
 
+@pytest.mark.slow
 @given(step=st.floats(0.0, 1.0), allowed=st.floats(0.0, 1.0), relative=st.floats(0.0, 0.1))
 def test_the_larger_part_of_a_tolerance_counts(step: float, allowed: float, relative: float) -> None:
     tolerances = Tolerances(sigma0=Tolerance(absolute=allowed, relative=relative))

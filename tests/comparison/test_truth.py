@@ -137,6 +137,7 @@ CONTROL = {"kind": "control", "point": "G05", "axis": "z", "size_m": 3.0}
 SWAP = {"kind": "swap", "photo": "1005", "point": "1005-1"}
 
 
+@pytest.mark.slow
 def test_a_gross_error_is_missed_when_no_rejection_names_it() -> None:
     simulation, result = planted(IMAGE, CONTROL, SWAP)
     whole = photostrip.compare(result, simulation.truth)

@@ -80,6 +80,7 @@ def test_round_trip(crs: str, u: float, v: float, up: float) -> None:
     assert np.abs(grid.cartesian_from_ground(enu) - xyz).max() < MICROMETRE
 
 
+@pytest.mark.slow
 @given(lon=st.floats(-180.0, 180.0), lat=st.floats(-90.0, 90.0), up=height)
 def test_geographic_round_trip_and_the_geocentric_frame_beside_it(lon: float, lat: float, up: float) -> None:
     geographic, geocentric = pair("EPSG:4979", "geocentric")
@@ -260,6 +261,7 @@ def test_geocentric_kilometres() -> None:
     assert grid.difference([[1.0, 2.0, 3.0]], [[0.0, 0.0, 0.0]])[0] == pytest.approx((1000.0, 2000.0, 3000.0))
 
 
+@pytest.mark.slow
 @given(lon=st.floats(-180.0, 180.0), lat=st.floats(-90.0, 90.0), up=st.floats(-9000.0, 110000.0))
 def test_geocentric_coordinates_on_the_moon(lon: float, lat: float, up: float) -> None:
     geocentric, output = pair(

@@ -97,6 +97,7 @@ def test_linear_fits_agree_with_direct_least_squares(kind: str, seed: int) -> No
     assert np.allclose(found, expected, rtol=0, atol=1e-11 * np.abs(target).max())
 
 
+@pytest.mark.slow
 @given(seed=SEEDS)
 @settings(max_examples=20)
 def test_the_projective_fit_agrees_with_an_optimiser(seed: int) -> None:

@@ -68,6 +68,7 @@ def test_a_simulation_needs_no_files(tmp_path: Path) -> None:
         photostrip.simulate({"flight": {"photos": -1}})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "overrides", "options"),
     [

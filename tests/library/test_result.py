@@ -78,6 +78,7 @@ def test_every_column_of_every_table_has_a_meaning(result: photostrip.Result, bu
             assert [column for column in table.columns if not table.meanings[column]] == [], name
 
 
+@pytest.mark.slow
 def test_geographic_coordinates_are_in_degrees() -> None:
     found = photostrip.run(SAMPLE, output={"crs": "EPSG:4326", "axes": ["north", "east", "up"]})
     assert [found.points.units[axis] for axis in "xyz"] == ["deg", "deg", "m"]
@@ -177,6 +178,7 @@ def test_covariances_are_those_of_the_table(result: photostrip.Result) -> None:
         result.covariance_of(["K07", "X1"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adjustment", ["covariance", "bundle"])
 @pytest.mark.parametrize("crs", ["EPSG:32633", "geocentric"])
 def test_joint_covariances_hold_those_of_the_points(adjustment: str, crs: str) -> None:
@@ -222,6 +224,7 @@ def test_without_precision_covariances_are_not_known() -> None:
     assert np.isnan(found.covariance_of("K07")).all()
 
 
+@pytest.mark.slow
 def test_reports_are_those_of_the_command(
     result: photostrip.Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

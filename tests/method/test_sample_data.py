@@ -354,6 +354,7 @@ def test_a_polynomial_on_all_lunar_points_leaves_what_others_found() -> None:
     assert rms(errors) == pytest.approx([17.1, 14.1, 38.5], rel=0.2)
 
 
+@pytest.mark.slow
 def test_lunar_check_points_are_as_good_as_others_found() -> None:
     errors = lunar_errors(apollo(free=False), check=True)
     assert len(errors) == 282

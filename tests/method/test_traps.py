@@ -207,6 +207,7 @@ def test_flat_treatment_of_a_curved_earth_costs_metres(plane_map: tuple[Simulati
     assert 2.0 < height_rms(plane_map, SIMILARITY) < 4.5
 
 
+@pytest.mark.slow
 def test_the_square_term_hides_most_of_the_curvature(plane_map: tuple[Simulation, Inputs, Floats]) -> None:
     """The trap: residuals at control look fine, what is left across the strip and between does not show."""
     _, inputs, _ = plane_map
@@ -314,6 +315,7 @@ def test_points_seen_once_are_listed_and_change_nothing() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seen_on", [(2,), (3, 5)], ids=["one photo", "two photos that are not neighbours"])
 def test_control_without_coordinates_in_the_strip_does_not_take_part(seen_on: tuple[int, ...]) -> None:
     done = simulate(Spec())
@@ -352,6 +354,7 @@ def test_a_strip_whose_only_control_is_seen_once_is_refused() -> None:
 # --------------------------------------------------------------------------------------- photos without control
 
 
+@pytest.mark.slow
 def test_photos_that_see_no_control_are_carried_by_the_strip() -> None:
     """Control at both ends only: the photos between are oriented, exactly without errors and worse with them."""
     spec = Spec(flight=Flight(photos=14), control=Control(layout="corners", noise=(0.0, 0.0, 0.0)))

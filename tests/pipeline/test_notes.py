@@ -48,6 +48,7 @@ def without_far_control(share: float) -> Inputs:
     return replace(inputs, control=control.take(kept))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "adjustment"), [(0.7, "auto"), (0.7, "covariance"), (1.0, "covariance")])
 def test_standard_deviations_beyond_the_control_are_told(share: float, adjustment: str) -> None:
     result = triangulate(without_far_control(share), Settings(adjustment=adjustment))

@@ -91,6 +91,7 @@ def renamed(inputs: Inputs) -> tuple[Inputs, dict[str, str]]:
     }
 
 
+@pytest.mark.slow
 def test_there_is_something_to_reject() -> None:
     found = rows(rejected(inputs_of(flown())))
     assert {row["stage"] for row in found} >= STAGES

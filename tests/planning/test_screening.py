@@ -80,6 +80,7 @@ def test_without_a_search_every_error_stays_and_turns_its_pair() -> None:
     assert [found.mean_change, found.worst_change] == pytest.approx([change.mean(), change.max()])
 
 
+@pytest.mark.slow
 def test_every_error_is_counted_once() -> None:
     outcome = screening_experiment(ScreeningSpec(methods=("parallax+grubbs", "auto"), repetitions=3))
     for method in nonempty(outcome.methods):

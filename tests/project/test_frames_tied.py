@@ -29,6 +29,7 @@ def plain() -> Result:
     return adjust_project(load_project(SAMPLE / "project.yaml"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overrides", [(), ED50, ("processing.adjustment=similarity",)])
 def test_a_run_ties_its_frames_once(overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[object] = []

@@ -301,6 +301,7 @@ def test_run_and_report_write_the_same_page(tmp_path: Path, capsys: pytest.Captu
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_long_tables_are_whole() -> None:
     document = copy.deepcopy(saved())
     document["control"] = [row | {"id": f"{row['id']} {n}"} for n in range(9) for row in document["control"]]

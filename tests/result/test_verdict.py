@@ -34,6 +34,7 @@ def quiet(document: Document) -> str:
     return to_text("", chosen_sections(document, quiet=True), 200)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plan", "height", "missing"),
     [(0, 0, "the result"), (2, 0, "the heights"), (0, 2, "the plan coordinates")],
@@ -48,6 +49,7 @@ def test_what_nothing_verifies_is_not_good(plan: int, height: int, missing: str)
     assert text.count("no point verifies") == 1
 
 
+@pytest.mark.slow
 def test_check_points_verify() -> None:
     document = with_checks(2, 1)
     assert (document["status"], document["verdict"]["verified"]) == (GOOD, True)
@@ -86,6 +88,7 @@ def test_check_points_beyond_their_standard_deviations_are_not_good(adjustment: 
     assert document["status"] == LOOK
 
 
+@pytest.mark.slow
 def test_few_inside_is_enough() -> None:
     """None of two points inside the ellipse, and the squares of all coordinates nothing out of the way."""
     document = moved(0, 0.0)
@@ -127,6 +130,7 @@ def test_of_contradicting_data_a_deformation_is_told_without_metres() -> None:
     assert any(text.startswith("7 models are deformed alike (bending): t = 9.0") for text in found["look_at"])
 
 
+@pytest.mark.slow
 def test_a_check_point_that_stands_out_is_taken_out_of_the_headline() -> None:
     document = moved(1, 447.0)
     rows = {row["id"]: row for row in document["control"]}
@@ -206,12 +210,14 @@ def test_wrong_check_points_do_not_hide_each_other() -> None:
     assert stand_out(np.array([447.0, 0.088]), 2, np.full(2, 1e-9)).tolist() == [True, False]
 
 
+@pytest.mark.slow
 def test_sound_differences_hardly_ever_stand_out() -> None:
     rng = np.random.default_rng(20261122)
     wrong = [stand_out(rng.normal(size=n), 1, np.full(n, 1e-9)).any() for n in (2, 4, 9, 30) for _ in range(1500)]
     assert np.mean(wrong) < 0.002
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [21, 22])
 def test_a_principal_distance_one_percent_off_over_relief_is_not_good(seed: int) -> None:
     """Heights are half a metre to a metre off where control fits: only the check points see it."""

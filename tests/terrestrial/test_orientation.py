@@ -70,6 +70,7 @@ def without(given_: Sightings, *cells: tuple[int, int]) -> Sightings:
 # ------------------------------------------------------------------------------------------------------ recovery
 
 
+@pytest.mark.slow
 @given(st.floats(-np.pi, np.pi), st.floats(-1.2, 1.2), st.floats(-np.pi, np.pi))
 def test_any_orientation_comes_back_from_points_without_errors(alpha: float, omega: float, kappa: float) -> None:
     found = orient(sightings((alpha, omega, kappa)), 100.0, settings=OrientationSettings(EVERYTHING))

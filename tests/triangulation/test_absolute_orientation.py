@@ -256,6 +256,7 @@ def test_a_run_with_equal_weights_lies_on_its_control_as_the_closed_form_does() 
     assert found["stated"] > 0.01
 
 
+@pytest.mark.slow
 def test_with_noise_sigma0_is_one() -> None:
     rng, squares = np.random.default_rng(1), []
     for _ in range(150):
@@ -265,6 +266,7 @@ def test_with_noise_sigma0_is_one() -> None:
     assert np.mean(squares) == pytest.approx(1, abs=0.11)  # 150 times 17 degrees of freedom: 4 standard deviations
 
 
+@pytest.mark.slow
 @given(SEEDS, st.floats(0, 360))
 def test_the_intermediate_frame_does_not_matter(seed: int, azimuth: float) -> None:
     rng = np.random.default_rng(seed)

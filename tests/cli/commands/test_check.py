@@ -378,6 +378,7 @@ def test_debug_by_variable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caps
     assert "Traceback" not in call(capsys, "run", tmp_path / "no.yaml")[2]
 
 
+@pytest.mark.slow
 def test_what_the_pipeline_would_refuse_is_told_with_its_place(
     tmp_path: Path, project: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -288,6 +288,7 @@ def line_of(folder: Path, point: str) -> int:
     )
 
 
+@pytest.mark.slow
 def test_a_broken_baseline_does_not_hide_the_others(folders: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folders / "base/a/baseline.json").write_text("{", encoding="utf-8")
     (folders / "base/b/baseline.json").write_bytes((folders / "other.json").read_bytes())

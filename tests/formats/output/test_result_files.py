@@ -202,6 +202,7 @@ def rejection(point: str, other: str | None, value: float | None) -> Document:
 # ------------------------------------------------------------------------------------------------------ reading
 
 
+@pytest.mark.slow
 def test_a_result_is_read_back(tmp_path: Path) -> None:
     file = tmp_path / "result.json"
     file.write_text(to_json(with_odd_ids()), encoding="utf-8")

@@ -121,6 +121,7 @@ def test_whatever_ties_the_photos_to_the_ground(title: str) -> None:
     assert not any(note.code == "free-network" for note in result.notes)
 
 
+@pytest.mark.slow
 def test_offset_and_drift_are_found_as_they_are() -> None:
     simulation = simulate(BLOCK)
     step = np.array([0.1, -0.2, 0.05])
@@ -162,6 +163,7 @@ def test_a_free_network_has_the_shape_of_the_truth() -> None:
     assert document_of(result)["bundle"]["free_network"] is True
 
 
+@pytest.mark.slow
 def test_single_photos_join_a_strip() -> None:
     """Every strip but the first is cut into photos of their own."""
     simulation = simulate(exact(flight=Flight(photos=6, strips=2, side_lap_percent=60.0)))

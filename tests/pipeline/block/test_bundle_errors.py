@@ -148,6 +148,7 @@ def test_good_measurements_stay(alpha: float | None, share: float) -> None:
     assert out <= share * total
 
 
+@pytest.mark.slow
 def test_what_the_user_keeps_stays() -> None:
     simulation = simulate(replace(BLOCK, gross_errors=(GrossError("image", count=1, size_um=120.0),)))
     (error,) = simulation.truth.errors
@@ -168,6 +169,7 @@ def test_what_the_user_keeps_stays() -> None:
 # ---------------------------------------------------------------------------------------------- what theory says
 
 
+@pytest.mark.slow
 def test_redundancy_numbers_sum_to_the_redundancy() -> None:
     simulation = simulate(BLOCK)
     noise = np.random.default_rng(2).normal(size=(16, 3)) * 0.05
@@ -336,6 +338,7 @@ def test_a_priori_values_hold_what_is_not_determined() -> None:
     assert found.sigma == pytest.approx(0.001 * result.bundle.unit, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wanted", ["principal_distance", "principal_point"])
 def test_what_cannot_be_told_apart_is_refused_by_name(wanted: str) -> None:
     """Vertical photos over a plane: the principal distance goes with the flying height, the point with the shift."""

@@ -58,6 +58,7 @@ def test_every_output_knows_single_photos() -> None:
     assert compare_results(document, document)["status"] == "same"
 
 
+@pytest.mark.slow
 def test_refraction_takes_its_heights_from_single_photos_too() -> None:
     simulation = simulate(exact(flight=Flight(photos=6), control=MANY))
     asked = settings_of(simulation)
@@ -84,6 +85,7 @@ def test_approximate_orientations_far_off_are_a_start_and_no_more(
     assert np.abs(errors(simulation, result)).max() < MICROMETRE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("screening", ["snooping", "none"])
 def test_approximate_heights_below_the_ground_are_a_start_too(screening: str) -> None:
     """The photos are oriented on their control in closed form then."""

@@ -253,6 +253,7 @@ def test_heights_of_two_kinds() -> None:
     assert finding.evidence["constant_m"] == pytest.approx(47.3, abs=1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("before", [False, True])
 def test_one_of_two_lists_in_feet_or_elsewhere(before: bool) -> None:
     ask = (lambda wrong: gate.of_inputs(wrong, Settings())) if before else told
@@ -450,6 +451,7 @@ def test_findings_are_told_in_every_form(tmp_path: Path, capsys: pytest.CaptureF
     assert "P201" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_what_is_accepted_is_told_and_no_longer_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = simulation("utm")
     for path, text in project_files(made).items():
@@ -629,6 +631,7 @@ def test_evidence_is_free_of_distortion_though_a_photo_stands_twice_in_the_list(
     assert codes(told(wrong)) == ["P203"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plant", "code"),
     [

@@ -45,6 +45,7 @@ def test_a_list_that_lies_beside_the_others_is_named(shift: tuple[float, float, 
     assert result.strips[0].wrong_control == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shift", "code", "axes"), [((2.0, 1.0, 0.0), "P407", 3), ((0.0, 0.0, 2.0), "P404", 1)])
 def test_a_bundle_leaves_the_list_out_as_a_whole(shift: tuple[float, float, float], code: str, axes: int) -> None:
     """Good control of the other list went with it, one point after the other."""

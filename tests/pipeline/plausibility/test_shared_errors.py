@@ -96,6 +96,7 @@ def test_one_strip_of_several_is_named_alone() -> None:
     assert set(finding.photos) == set(result.inputs.strips[1].photos)
 
 
+@pytest.mark.slow
 def test_a_drift_of_the_positions_is_named() -> None:
     """Half a metre from photo to photo."""
     _, result = adjusted(strips=1, shift=np.arange(10)[:, None] * np.array([0.5, 0.0, 0.2]))
@@ -126,6 +127,7 @@ def test_single_wrong_positions_stay_single() -> None:
     assert result.bundle.screened.common == ()
 
 
+@pytest.mark.slow
 def test_sound_positions_share_nothing() -> None:
     """Nothing is taken up where nothing is wrong."""
     _, result = adjusted()
@@ -157,6 +159,7 @@ def test_the_strip_method_names_a_principal_distance_off_by_a_percent(share: flo
     assert result.strips[0].wrong_control == ()
 
 
+@pytest.mark.slow
 def test_wrong_control_points_are_no_principal_distance() -> None:
     """Two coordinates that are off stay two coordinates."""
     result = on_hills(0.0, GrossError("control", count=2, size_m=3.0))

@@ -65,12 +65,14 @@ def test_photos_laid_side_by_side_prove_little(layout: str, seed: int) -> None:
     assert [each.code for each in gate.of_inputs(made.inputs, made.settings)] == []
 
 
+@pytest.mark.slow
 def test_the_bend_of_a_long_strip_of_models_is_no_slip() -> None:
     spec = Spec(seed=1, flight=Flight(photos=50), control=Control(every=8, per_band=3), models=Models())
     inputs = inputs_of(simulate(spec))
     assert told(inputs, Settings()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "off"), [("G05", -20.0), ("K02", 20.0)])
 def test_a_slip_stands_out_against_the_adjustment_of_models(name: str, off: float) -> None:
     """In a strip that bends by metres: one digit of a control point, and of a check point."""

@@ -99,6 +99,7 @@ def test_a_tie_of_two_rays_may_be_farther_off_than_one_of_three(rays: int, off: 
     assert [each.points for each in find_shared_ids_of_strips(ties)] == [("P4",)] * named
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.0, 150.0, 400.0])
 def test_wrong_image_coordinates_are_no_shared_ids(size: float) -> None:
     """A coordinate along the base that is off moves a point of two rays in one strip only."""

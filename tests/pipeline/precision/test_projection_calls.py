@@ -26,6 +26,7 @@ def calls(monkeypatch: pytest.MonkeyPatch, adjustment: str, check: int) -> int:
     return counted.call_count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adjustment", ADJUSTMENTS)
 def test_more_check_points_make_no_more_calls_of_the_projection(
     monkeypatch: pytest.MonkeyPatch, adjustment: str

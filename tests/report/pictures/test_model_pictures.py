@@ -27,6 +27,7 @@ def document(*, centers: bool, strips: int = 2) -> Document:
     return found
 
 
+@pytest.mark.slow
 def test_models_without_centres_have_a_plan_of_their_points() -> None:
     found = document(centers=False)
     assert {photo["x"] for photo in found["photos"]} == {None}

@@ -107,6 +107,7 @@ def against(found: Floats, expected: Floats) -> float:
     return float(np.abs((found - expected) / (deviation[:, :, None] * deviation[:, None, :])).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_estimate_and_cofactors_are_those_of_a_dense_adjustment(name: str) -> None:
     problem = PROBLEMS[name]()

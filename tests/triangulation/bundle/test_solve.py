@@ -91,6 +91,7 @@ def test_the_order_of_rays_and_photos_does_not_matter() -> None:
     assert other.chi_square == pytest.approx(solution.chi_square, rel=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(st.integers(0, 1000), st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3), st.floats(0.5, 2.0))
 def test_turning_the_frame_turns_the_result(seed: int, vector: list[float], scale: float) -> None:

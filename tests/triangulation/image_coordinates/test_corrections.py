@@ -118,6 +118,7 @@ image_points = st.lists(st.tuples(st.floats(-115, 115), st.floats(-115, 115)), m
 bendings = st.builds(Bending, st.floats(-4e-4, 4e-4), st.floats(0, 1e-3))
 
 
+@pytest.mark.slow
 @given(cameras, image_points, bendings)
 def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constant: Bending) -> None:
     ideal = corrections.undistort(image, camera, constant)

@@ -360,6 +360,7 @@ def left_out_by_refitting(
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
+@pytest.mark.slow
 @given(SEEDS)
 @examples(max_examples=20)
 def test_bands_left_out_in_closed_form_are_refitted(seed: int) -> None:
@@ -377,6 +378,7 @@ def test_bands_left_out_in_closed_form_are_refitted(seed: int) -> None:
             assert evidence.left_out == pytest.approx(left_out_by_refitting(one, terms, axes, inner), rel=1e-6)
 
 
+@pytest.mark.slow
 @given(SEEDS)
 @examples(max_examples=20)
 def test_points_left_out_in_closed_form_are_refitted(seed: int) -> None:
@@ -501,6 +503,7 @@ def test_heights_may_be_bent_more_than_plan() -> None:
     assert found.axes[2].terms == CUBIC
 
 
+@pytest.mark.slow
 @given(st.floats(0, 360))
 @examples(max_examples=20)
 def test_plan_control_comes_in_along_the_axes_of_its_ground_frame(azimuth: float) -> None:

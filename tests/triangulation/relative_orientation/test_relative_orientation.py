@@ -282,6 +282,7 @@ def test_sigma0_and_sigmas_are_those_of_the_errors() -> None:
     assert np.all((standardised > 0.75) & (standardised < 1.33))  # a variance from 400 is known to 7 percent
 
 
+@pytest.mark.slow
 @given(SEEDS)
 def test_redundancy_numbers_sum_to_the_redundancy(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -307,6 +308,7 @@ def test_six_points_check_the_corners_hardly() -> None:
 # ------------------------------------------------------------------------------------------- invariants
 
 
+@pytest.mark.slow
 @given(SEEDS)
 def test_the_order_of_the_points_does_not_matter(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -318,6 +320,7 @@ def test_the_order_of_the_points_does_not_matter(seed: int) -> None:
     assert np.allclose(one.parallax[order], two.parallax, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @given(SEEDS, st.floats(-170, 170))
 def test_turning_both_photos_in_their_planes_turns_both_kappas(seed: int, turn_deg: float) -> None:
     pairs = true_pairs(np.random.default_rng(seed), sigma=5 * MICROMETRE, tilt_deg=3.0).pairs
@@ -329,6 +332,7 @@ def test_turning_both_photos_in_their_planes_turns_both_kappas(seed: int, turn_d
     assert np.abs(difference).max() < 1e-10
 
 
+@pytest.mark.slow
 @given(SEEDS, st.floats(0.01, 100))
 def test_enlarging_the_photos_changes_lengths_only(seed: int, size: float) -> None:
     pairs = true_pairs(np.random.default_rng(seed), sigma=5 * MICROMETRE, tilt_deg=3.0).pairs

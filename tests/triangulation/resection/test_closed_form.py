@@ -33,6 +33,7 @@ def scene(seed: int, points: int = 8, tilt: float = 0.1, flat: float = 0.1) -> t
     return xy, xyz, center, turn
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), st.integers(4, 12), st.sampled_from([0.0, 0.05, 0.4]), st.sampled_from([0.0, 0.02, 0.3]))
 def test_a_photo_comes_back_from_its_points(seed: int, points: int, tilt: float, flat: float) -> None:

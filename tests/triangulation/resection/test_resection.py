@@ -187,6 +187,7 @@ def differences(one: Scene, found: Resection, axis: int) -> Floats:
 # ------------------------------------------------------------------------------------------- invariants
 
 
+@pytest.mark.slow
 @given(SEEDS)
 def test_many_photos_at_once_are_what_each_is_alone(seed: int) -> None:
     one = scene(seed, [6, 11, 8], 5 * MICROMETRE)

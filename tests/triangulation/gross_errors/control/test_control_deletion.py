@@ -108,6 +108,7 @@ def squares(strip: Drawn, out: tuple[int, ...]) -> tuple[float, Floats, Floats]:
     return float(left), estimate[7:], sigma[7:]
 
 
+@pytest.mark.slow
 @given(SEEDS)
 @examples(max_examples=25)
 def test_deletion_is_least_squares_with_the_errors_as_unknowns(seed: int) -> None:
@@ -281,6 +282,7 @@ def test_a_bend_takes_no_good_control() -> None:
     assert [names[each.row] for each in found] == ["p6_1"]
 
 
+@pytest.mark.slow
 def test_a_wrong_image_of_a_control_point_on_two_photos_is_named_instead_of_its_coordinates() -> None:
     """Its other ray leads all along the error; nothing else contradicts it."""
     strip = flown()
@@ -299,6 +301,7 @@ def test_a_wrong_image_of_a_control_point_on_two_photos_is_named_instead_of_its_
     assert line["blamed"] == [o.photo_ids[0]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", ["nothing", "given", "image"])
 def test_a_control_point_whose_middle_ray_is_wrong_counts_and_is_tested(wrong: str) -> None:
     """It stands in no pair: two photos that are no neighbours place it."""
@@ -320,6 +323,7 @@ def test_a_control_point_whose_middle_ray_is_wrong_counts_and_is_tested(wrong: s
         assert control.use[control.ids.index("p6_1")].tolist() == [wrong == "nothing"] * 2 + [True]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", ["image", "height"])
 def test_of_a_height_and_an_image_nothing_tells_which_is_wrong_under_a_steep_ray(wrong: str) -> None:
     """The point lies below the first photo: an error of its image in the second changes its height alone."""

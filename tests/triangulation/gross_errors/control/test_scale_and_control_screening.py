@@ -47,6 +47,7 @@ def adjusted(strip: Flown, wrong: dict[str, tuple[float, float, float]] | None =
 # ----------------------------------------------------------------------------------------------------- control
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("error", "axes"),
     [((0.0, 0.0, 8.0), (2,)), ((-30.0, 0.0, 0.0), (0,)), ((0.0, 5000.0, 0.0), (1,))],

@@ -128,6 +128,7 @@ def test_two_equal_errors_in_a_corner_zone_come_out_although_the_third_point_loo
     assert not by_tau[:, 6:8].all(axis=1).any()
 
 
+@pytest.mark.slow
 def test_wrong_points_that_stand_alone_in_their_zones_go_rather_than_good_ones() -> None:
     flown = level(25, 20, (4, 1, 4, 1, 4, 1))
     errors = np.zeros((20, 15))

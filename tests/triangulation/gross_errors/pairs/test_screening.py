@@ -157,6 +157,7 @@ def test_the_shares_of_the_published_experiment(limit: float, published: dict[st
     assert 0.5 < good < 2.0  # of 500 good points, 1.1 and 1.5 in the published runs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "share"), [("grubbs", 0.025), ("tau", 0.052)])
 def test_false_alarms_of_clean_models(method: str, share: float) -> None:
     oriented, _ = experiment(2, 4000, errors=False)

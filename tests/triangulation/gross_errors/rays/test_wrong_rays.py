@@ -180,6 +180,7 @@ def sound_error(strip: Flown, result: Result, wrong: Numbers) -> float:
     return float(np.sqrt((error**2).mean()))
 
 
+@pytest.mark.slow
 def test_the_wrong_ray_of_a_pair_of_six_points_is_named_by_the_strip() -> None:
     """At first any of its rays may be the wrong one; when two of them are back, the third is known to be it."""
     strip, (wrong,) = one_photo_spoiled(13, 6, extra=0)
