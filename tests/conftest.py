@@ -75,7 +75,7 @@ def _no_findings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("photostrip.pipeline.plausibility.gate.of_result", lambda *_: ())
 
 
-class Backwards(pytest.Dir):
+class Backwards(pytest.Dir):  # type: ignore[misc]  # final for its names, which stay
     """A folder that is read from its end."""
 
     def collect(self) -> Iterator[pytest.Item | pytest.Collector]:
