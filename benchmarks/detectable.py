@@ -17,7 +17,7 @@ from collections import Counter
 from multiprocessing import get_context
 from pathlib import Path
 from statistics import NormalDist, median
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
@@ -30,9 +30,6 @@ import numpy as np  # noqa: E402
 
 from benchmarks.gross_errors import STRIP, adjusted, pair_of_projects  # noqa: E402
 from photostrip.triangulation.gross_errors.rays import point_decisions, snooping, strip_network  # noqa: E402
-
-if TYPE_CHECKING:
-    from photostrip.triangulation.gross_errors.rays.point_decisions import PointRays
 
 KINDS = (
     "two photos, along the base",
@@ -92,10 +89,10 @@ def missed(found: snooping.ScreenedBundle, search: Any, row: int, axis: int, siz
     point = int(search.problem.images.point[row])
     rows = search.rays_of(point)
     placed = found.selection.images[rows].sum() > 1
-    place = found.solution.points[point] if placed else search._meeting(found.solution, rows)  # noqa: SLF001
-    with patch.object(snooping, "decide", lambda point, _: point):
-        linearised = cast("PointRays", search._decided(found, rows, found.limit, place))  # noqa: SLF001
-    _, weight, basis = point_decisions._misclosures(linearised)  # noqa: SLF001
+    place = np.where(placed, found.solution.points[[point]], np.nan)
+    with patch.object(snooping, "decide", wraps=point_decisions.decide) as decide:
+        search._decided(found, [rows], found.limit, place)  # noqa: SLF001
+    _, (weight,), (basis,) = point_decisions._misclosures(decide.call_args.args[0])  # noqa: SLF001
     effect = basis[2 * rows.tolist().index(row) + axis]
     shift = size * np.sqrt(max(effect @ weight @ effect, 0.0)) / found.limit.unit
     return NormalDist().cdf(float(found.limit.of(len(rows))) - float(shift))
