@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 # of the principal distance: y parallaxes that scatter by more are no measurements of the same points
 LARGEST_SCATTER = 0.01
-AT_ONCE = 64  # pairs, for the sake of memory; it changes no result
+AT_ONCE = 64  # pairs, or points to decide on, for the sake of memory; it changes no result
 
 
 @dataclass(frozen=True, eq=False)

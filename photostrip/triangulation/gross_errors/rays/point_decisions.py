@@ -19,6 +19,7 @@ from photostrip.frozen import NamedTuple, dataclass
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST, subsets
+from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.quality.reliability import Limit
 
 
-AT_ONCE = 32  # points that are decided on together: more take more memory and hardly less time
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
 ROUNDING = 1e-9  # keeps a point that holds its photos alone from stopping the others
 WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
