@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from photostrip.geometry.rotation import from_vector
 from photostrip.statistics import chi2_quantile, normal_quantile
 from photostrip.triangulation.bundle.quality.reliability import Limit
+from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
 from photostrip.triangulation.gross_errors.rays import point_decisions
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
     LIKELIER,
@@ -233,9 +234,9 @@ def test_points_are_decided_on_together_as_one_by_one() -> None:
 
 
 def test_points_with_as_many_rays_are_taken_some_at_a_time() -> None:
-    sizes = [(2, 0), (3, 0), (2, 3), (3, 0)] * point_decisions.AT_ONCE
+    sizes = [(2, 0), (3, 0), (2, 3), (3, 0)] * AT_ONCE
     found = [each.tolist() for each in point_decisions.alike(sizes)]
-    assert [len(each) for each in found] == [point_decisions.AT_ONCE] * 4
+    assert [len(each) for each in found] == [AT_ONCE] * 4
     assert sorted(place for each in found for place in each) == list(range(len(sizes)))
     assert all(len({sizes[place] for place in each}) == 1 for each in nonempty(found))
 
