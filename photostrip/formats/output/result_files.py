@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import re
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from photostrip.formats.output.result_json import to_json
+from photostrip.formats.text import number_columns
 from photostrip.result import columns as tables
 from photostrip.result.numbers import PER_RADIAN, Document
 from photostrip.result.points.image_coordinates import refined_rows
 from photostrip.result.records import Records
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
+    from photostrip.formats.text.number_columns import Cells
     from photostrip.pipeline import Result
     from photostrip.result.columns import Column
     from photostrip.result.description import Quantity
@@ -56,11 +61,7 @@ def refined_csv(result: Result) -> str:
     if not found["photo"]:
         return ""
     listed = tables.refined_csv()
-    form = ",".join("%s" if each.quantity.decimals is None else f"%.{each.quantity.decimals}f" for each in listed)
-    rows = zip(
-        _texts(found["photo"]), _texts(found["point"]), *(found[column.key] for column in listed[2:]), strict=True
-    )
-    return "\n".join([_header(listed), *(form % row for row in rows)]) + "\n"
+    return _written(listed, [_cells(column.quantity, found[column.key]) for column in listed])
 
 
 def rejected_csv(document: Document) -> str:
@@ -77,13 +78,13 @@ def _flat_points(points: Iterable[Document], unit: str) -> Iterable[Document]:
     return ({**point, key: None if azimuth is None else azimuth * per_degree} for point, azimuth in known)
 
 
-def _checked_rays(residuals: Iterable[Document]) -> Iterator[Document]:
+def _checked_rays(residuals: Sequence[Document]) -> Records:
     """Return a record for each ray that took part in the bundle adjustment."""
     names = [column.key for column in tables.reliability_csv()[1:]]
-    for group in residuals:
-        for values in zip(*(group[name] for name in names), strict=True):
-            if values[1] is not None:
-                yield {"photo": group["photo"], **dict(zip(names, values, strict=True))}
+    columns = {name: [value for group in residuals for value in group[name]] for name in names}
+    columns["photo"] = [group["photo"] for group in residuals for _ in group[names[0]]]
+    tested = [value is not None for value in columns[names[1]]]
+    return Records({name: list(compress(column, tested)) for name, column in columns.items()})
 
 
 def _table(columns: Sequence[Column], rows: Iterable[Document]) -> str:
@@ -92,24 +93,30 @@ def _table(columns: Sequence[Column], rows: Iterable[Document]) -> str:
         listed = list(rows)
         rows = Records({column.key: [row.get(column.key) for row in listed] for column in columns})
     nothing = [None] * len(rows)
-    cells = [_cells(column.quantity, rows.columns.get(column.key, nothing)) for column in columns]
-    line = ",".join(form for form, _ in cells)
-    return "\n".join([_header(columns), *(line % row for row in zip(*(each for _, each in cells), strict=True))]) + "\n"
+    return _written(columns, [_cells(column.quantity, rows.columns.get(column.key, nothing)) for column in columns])
+
+
+def _written(columns: Iterable[Column], cells: Sequence[Cells]) -> str:
+    """Write the cells of columns below their names."""
+    count = cells[0].shape[1]
+    parts = [part for each in cells for part in (each, number_columns.repeated(",", count))]
+    return f"{_header(columns)}\n" + number_columns.joined([*parts[:-1], number_columns.repeated("\n", count)])
 
 
 def _header(columns: Iterable[Column]) -> str:
     return ",".join(column.name for column in columns)
 
 
-def _cells(quantity: Quantity, values: Sequence[Any]) -> tuple[str, Sequence[Any]]:
-    """Return the form of the cells of a column, and what is written in that form."""
+def _cells(quantity: Quantity, values: Sequence[Any]) -> Cells:
+    """Write the cells of a column; nothing where there is no number."""
     decimals = BY_UNIT_DECIMALS if quantity.unit_key else quantity.decimals
-    if quantity.kind == "text" and decimals is None:
-        return "%s", _texts(values)
-    form = f"%.{decimals}f" if decimals is not None else "%d" if quantity.kind in {"count", "flag"} else "%s"
-    if None not in values:
-        return form, values
-    return "%s", ["" if value is None else form % value for value in values]
+    if decimals is None and quantity.kind in {"count", "flag"}:
+        decimals = 0
+    if decimals is not None:
+        return number_columns.as_fixed(np.array(values, float), decimals, "")
+    if quantity.kind == "text":
+        return number_columns.as_texts(_texts(values))
+    return number_columns.as_texts(["" if value is None else str(value) for value in values])
 
 
 def _texts(values: Sequence[str | Sequence[str] | None]) -> list[str]:
@@ -132,21 +139,9 @@ def _cell(text: str | Sequence[str] | None) -> str:
 def _grouped(columns: Sequence[Column], groups: Iterable[Document]) -> str:
     """Write points that stand together under a photo or a pair: its ids, then a line for each point."""
     first = [column.key for column in columns].index("points")
-    heads, numbers = columns[:first], columns[first + 1 : -1]
     groups = list(groups)
-    names = dict.fromkeys(point for group in groups for point in group["points"])
-    cells = dict(zip(names, _texts(list(names)), strict=True))
-    blocks = [f"{_header(columns)}\n"]
-    for group in groups:
-        head = ",".join(_cell(group[column.key]) for column in heads).replace("%", "%%")
-        points = [cells[point] for point in group["points"]]
-        values, forms = [group[column.key] for column in numbers], [f"%.{each.quantity.decimals}f" for each in numbers]
-        if any(None in column for column in values):
-            values = [
-                ["" if value is None else form % value for value in column]
-                for form, column in zip(forms, values, strict=True)
-            ]
-            forms = ["%s"] * len(forms)
-        line = f"{head},%s,{','.join(forms)},%d\n"
-        blocks += [line % row for row in zip(points, *values, group["used"], strict=True)]
-    return "".join(blocks)
+    counts = [len(group["points"]) for group in groups]
+    heads = [_cells(column.quantity, [group[column.key] for group in groups]) for column in columns[:first]]
+    flat = [[value for group in groups for value in group[column.key]] for column in columns[first:]]
+    of_points = [_cells(column.quantity, values) for column, values in zip(columns[first:], flat, strict=True)]
+    return _written(columns, [*(np.repeat(head, counts, axis=1) for head in heads), *of_points])

@@ -1,0 +1,80 @@
+"""Records as lines of JSON, column by column."""
+
+from __future__ import annotations
+
+from itertools import accumulate, chain, pairwise
+from types import NoneType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.formats.text import number_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from photostrip.formats.output.result_json import Encoder
+    from photostrip.formats.text.number_columns import Cells
+    from photostrip.result.numbers import Plain
+
+
+def lines(columns: Mapping[str, Sequence[Plain]], encode: Encoder) -> str:
+    """Write records, given as columns, each on a line of its own."""
+    count = len(next(iter(columns.values())))
+    return number_columns.joined([*_objects(columns, encode), number_columns.repeated(",\n", count)])[:-2]
+
+
+def columns_of(records: Sequence[Mapping[str, Plain]]) -> dict[str, list[Plain]] | None:
+    """Turn records with the same keys into columns."""
+    keys = list(records[0])
+    if not keys or any(list(record) != keys for record in records):
+        return None
+    return {key: [record[key] for record in records] for key in keys}
+
+
+def _objects(columns: Mapping[str, Sequence[Plain]], encode: Encoder) -> list[Cells]:
+    parts, sign = [], "{"
+    for key, column in columns.items():
+        parts += [number_columns.repeated(f"{sign}{encode.text(key)}: ", len(column)), _cells(column, encode)]
+        sign = ", "
+    return [*parts, number_columns.repeated("}", len(column))]
+
+
+def _cells(column: Sequence[Plain], encode: Encoder) -> Cells:
+    kinds = set(map(type, column))
+    if _of_numbers(kinds):
+        return _numbers(column, kinds, encode)
+    if kinds == {dict} and (parts := columns_of(column)) is not None:
+        return np.concatenate(_objects(parts, encode))
+    return number_columns.as_texts(_texts(column, kinds, encode))
+
+
+def _texts(column: Sequence[Plain], kinds: set[type], encode: Encoder) -> list[str]:
+    if kinds == {str}:
+        return list(map(encode.text, column))
+    if kinds <= {str, bool, NoneType}:
+        written = {value: encode.value(value) for value in set(column)}
+        return [written[value] for value in column]
+    if kinds == {list} and (flat := list(chain.from_iterable(column))):
+        ends = [0, *accumulate(map(len, column))]
+        kinds = set(map(type, flat))
+        if _of_numbers(kinds):
+            groups = number_columns.joined_in_groups(_numbers(flat, kinds, encode), ", ", ends)
+            return [f"[{group}]" for group in groups]
+        if kinds <= {str, bool}:
+            texts = _texts(flat, kinds, encode)
+            return [f"[{', '.join(texts[start:stop])}]" for start, stop in pairwise(ends)]
+    return [encode.value(value) for value in column]
+
+
+def _of_numbers(kinds: set[type]) -> bool:
+    return kinds == {int} or (float in kinds and kinds <= {float, NoneType})
+
+
+def _numbers(column: Sequence[Plain], kinds: set[type], encode: Encoder) -> Cells:
+    if kinds == {int}:
+        return number_columns.as_whole(np.array(column, np.int64))
+    values = np.array(column, float)
+    if np.count_nonzero(np.isfinite(values)) + column.count(None) < len(column):
+        encode.value(list(column))  # refuses what is no number
+    return number_columns.as_repr(values, "null")
