@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,19 +62,25 @@ def records(block: str, columns: Mapping[str, Any]) -> Records:
     """Make the records of a block from its columns, rounded as their keys are described.
 
     A column is an array or a list, or a dictionary of columns where the record has parts; a text, a flag or None
-    stands in every record.
+    stands in every record. All values of a column with a unit beside it have the same.
     """
     size = next(len(column) for column in columns.values() if isinstance(column, list | tuple | np.ndarray))
-    return Records({key: _cells(table_at(block)[key], column, size) for key, column in columns.items()})
+    table = table_at(block)
+    return Records({key: _cells(table[key], column, size, columns) for key, column in columns.items()})
 
 
-def _cells(entry: Quantity | Table, column: Any, size: int) -> Sequence[Plain]:  # noqa: ANN401 (any column)
+def _cells(
+    entry: Quantity | Table,
+    column: Any,  # noqa: ANN401 (any column)
+    size: int,
+    beside: Mapping[str, Any] = MappingProxyType({}),
+) -> Sequence[Plain]:
     if isinstance(column, Mapping) and isinstance(entry, dict):
         return as_records({key: _cells(entry[key], part, size) for key, part in column.items()})
     if not isinstance(column, list | tuple | np.ndarray):
         return [column] * size
     if isinstance(entry, Quantity):
-        cells: Sequence[Plain] = rounded_as(entry, column)
+        cells: Sequence[Plain] = rounded_as(entry, column, next(iter(beside.get(entry.unit_key, ())), ""))
         return cells
     return [None if each is None else _record(entry, each) for each in column]
 

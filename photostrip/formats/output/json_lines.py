@@ -13,7 +13,7 @@ from photostrip.formats.text import number_columns
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from photostrip.formats.output.result_json import Encoder
+    from photostrip.formats.output.json_encoder import Encoder
     from photostrip.formats.text.number_columns import Cells
     from photostrip.result.numbers import Plain
 

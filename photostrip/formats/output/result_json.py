@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import json
-from json.encoder import encode_basestring, encode_basestring_ascii
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
+from photostrip.formats.output import json_encoder
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
 from photostrip.result.reading import faults_of, located
 from photostrip.result.records import Records
 from photostrip.visible import visible_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
+    from photostrip.formats.output.json_encoder import Encoder
     from photostrip.result.numbers import Document, Plain
 
 LARGEST_RESULT = 1000 * MEGABYTE
@@ -24,23 +25,12 @@ FEW = 300  # lines below which their columns are not worth the trouble
 LINE = 160  # characters up to which a dictionary stands on one line
 
 
-class Encoder(NamedTuple):
-    """How values are written, and texts in a tenth of that time."""
-
-    value: Callable[[Plain], str]
-    text: Callable[[str], str]
-
-
-_ENCODER = Encoder(json.JSONEncoder(ensure_ascii=False, allow_nan=False, default=list).encode, encode_basestring)
-_ASCII = Encoder(json.JSONEncoder(ensure_ascii=True, allow_nan=False, default=list).encode, encode_basestring_ascii)
-
-
 def to_json(document: Document, *, ascii_only: bool = False) -> str:
     """Return the text of result.json.
 
     Each element of a list of records stands on a line of its own, so that results can be compared line by line.
     """
-    return "".join(map(visible_json, _pieces(document, _ASCII if ascii_only else _ENCODER)))
+    return "".join(map(visible_json, _pieces(document, json_encoder.ASCII if ascii_only else json_encoder.UNICODE)))
 
 
 def _pieces(document: Document, encode: Encoder) -> Iterator[str]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,14 +12,15 @@ from photostrip.arrays import median
 from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.result.numbers import PER_RADIAN, Document, rms
-from photostrip.result.quantities import record
+from photostrip.result.quantities import grouped, record, records
+from photostrip.result.records import Records, as_records
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline import Result
     from photostrip.pipeline.results import Bundle
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
@@ -90,12 +92,11 @@ def bundle_of(result: Result) -> Document:
         "variance_components": _components(found),
         "calibration": _calibration(found),
         "correlations": [asdict(each) for each in found.correlations],
-        "given": [
-            _observed(found, group, (row, axis), shift, written[group.kind])
+        "given": Records.joined(
+            records("bundle.given", _observed(found, group, np.argwhere(known), shift, written[group.kind]))
             for group in found.groups
-            if group.kind != reliability.IMAGE
-            for row, axis in np.argwhere(np.isfinite(group.sigma)).tolist()
-        ],
+            if group.kind != reliability.IMAGE and (known := np.isfinite(group.sigma)).any()
+        ),
         "positions": list(_positions(found)),
         "corrections": list(_corrections(found)),
     }
@@ -230,11 +231,10 @@ def with_reliability(result: Result, residuals: list[Document]) -> list[Document
         map(problem.photo_name, images.photo.tolist()), map(problem.point_name, images.point.tolist()), strict=True
     )
     row_of = {name: row for row, name in enumerate(names)}
-    rows = []
-    for each in residuals:
-        at = [row_of.get((each["photo"], point), -1) for point in each["points"]]
-        rows.append(each | record("residuals", dict(zip(RELIABILITY, values[at].T, strict=True))))
-    return rows
+    at = [row_of.get((each["photo"], point), -1) for each in residuals for point in each["points"]]
+    ends = [0, *accumulate(len(each["points"]) for each in residuals)]
+    added = grouped("residuals", {}, dict(zip(RELIABILITY, values[at].T, strict=True)), ends)
+    return [each | more for each, more in zip(residuals, added, strict=True)]
 
 
 def _foremost(found: Bundle, shift: float, written: Mapping[str, Kind], values: list[Floats]) -> list[Document]:
@@ -248,43 +248,45 @@ def _foremost(found: Bundle, shift: float, written: Mapping[str, Kind], values: 
     rows = []
     for _, number, at in sorted(chosen)[:SHOWN]:
         group = found.groups[number]
-        rows.append(_observed(found, group, divmod(at, group.sigma.shape[1]), shift, written[group.kind]))
+        place = np.array([divmod(at, group.sigma.shape[1])])
+        rows += as_records(_observed(found, group, place, shift, written[group.kind]))
     return rows
 
 
-def _observed(found: Bundle, group: reliability.Group, at: tuple[int, int], shift: float, kind: Kind) -> Document:
-    """Return everything about one observed coordinate; errors that would be found where others check it."""
-    photo, point = names_of_observation(found.screened.problem, group.kind, at[0])
-    checked = group.redundancy[at] >= reliability.UNCONTROLLED
-    external = float(group.external(shift, at)) if checked else np.nan
+def _observed(found: Bundle, group: reliability.Group, at: Numbers, shift: float, kind: Kind) -> dict[str, Any]:
+    """Return columns of everything about observed coordinates (n, 2): row and axis; errors to be found where others check."""
+    count, problem, (row, axis) = len(at), found.screened.problem, at.T
+    names = [names_of_observation(problem, group.kind, each) for each in row.tolist()]
+    checked = group.redundancy[row, axis] >= reliability.UNCONTROLLED
+    external = np.where(checked, group.external(shift)[row, axis], np.nan)
     return {
-        "kind": group.kind,
-        "photo": photo,
-        "point": point,
-        "axis": kind.axes[at[1]],
-        "redundancy": group.redundancy[at],
-        "error": group.error[at] * kind.factor,
-        "standardised": group.standardised[at],
-        "detectable": float(group.detectable(shift, at)) * kind.factor if checked else None,
-        "unit": kind.unit,
+        "kind": [group.kind] * count,
+        "photo": [photo for photo, _ in names],
+        "point": [point for _, point in names],
+        "axis": [kind.axes[each] for each in axis.tolist()],
+        "redundancy": group.redundancy[row, axis],
+        "error": group.error[row, axis] * kind.factor,
+        "standardised": group.standardised[row, axis],
+        "detectable": np.where(checked, group.detectable(shift)[row, axis] * kind.factor, np.nan),
+        "unit": [kind.unit] * count,
         "external": external,
-        "effect": _effect(found, group.kind, at[0], external),
+        "effect": _effect(found, group.kind, row, external),
     }
 
 
-def _effect(found: Bundle, kind: str, row: int, external: float) -> float:
+def _effect(found: Bundle, kind: str, row: Numbers, external: Floats) -> Floats:
     """Return the largest shift of its own point or camera by an error that is just not found, metres."""
     problem, precision = found.screened.problem, found.screened.precision
     if kind == reliability.IMAGE:
-        block = precision.points[problem.images.point[row]]
+        blocks = precision.points[problem.images.point[row]]
     elif kind == reliability.CONTROL:
-        block = precision.points[problem.control.point[row]]
+        blocks = precision.points[problem.control.point[row]]
     else:
         part = problem.positions if kind == reliability.POSITION else problem.attitudes
-        block = precision.photos[part.photo[row], :3, :3]
-    if not np.isfinite(external) or not np.isfinite(block).all():
-        return np.nan
-    return float(external * np.sqrt(np.linalg.eigvalsh(block)[-1]))
+        blocks = precision.photos[part.photo[row], :3, :3]
+    known = np.isfinite(external) & np.isfinite(blocks).all(axis=(1, 2))
+    largest = np.linalg.eigvalsh(np.where(known[:, None, None], blocks, 0.0))[:, -1]
+    return np.asarray(np.where(known, external * np.sqrt(largest), np.nan), float)
 
 
 def names_of_observation(problem: BundleProblem, kind: str, row: int) -> tuple[str | None, str | None]:
