@@ -254,7 +254,7 @@ def _foremost(found: Bundle, shift: float, written: Mapping[str, Kind], values: 
 
 
 def _observed(found: Bundle, group: reliability.Group, at: Numbers, shift: float, kind: Kind) -> dict[str, Any]:
-    """Return columns of everything about observed coordinates (n, 2): row and axis; errors to be found where others check."""
+    """Return columns of everything about observed coordinates, (n, 2): row and axis."""
     count, problem, (row, axis) = len(at), found.screened.problem, at.T
     names = [names_of_observation(problem, group.kind, each) for each in row.tolist()]
     checked = group.redundancy[row, axis] >= reliability.UNCONTROLLED
