@@ -171,15 +171,17 @@ class BlockMatrix:
 
         With ``both`` each value stands at its mirrored place too; otherwise the mirrored values are given themselves.
         """
-        same = row[0] == column[0]
-        block, i, j = row[0][same], row[1][same], column[1][same]
-        np.add.at(self.diagonal, (block, i, j), values[same])
+        height = self.diagonal.shape[1]
+        inside = row[1] * height + column[1]
+        mirrored = column[1] * height + row[1]
+        same, right, left = (np.flatnonzero(column[0] == row[0] + apart) for apart in (0, 1, -1))
+        block = row[0] * height**2
+        # flat places: three indices take ten times as long
+        np.add.at(self.diagonal.reshape(-1), (block + inside)[same], values[same])
+        np.add.at(self.beside.reshape(-1), (block + inside)[right], values[right])
         if both:
-            np.add.at(self.diagonal, (block, j, i), values[same])
-        right, left = column[0] == row[0] + 1, column[0] == row[0] - 1
-        np.add.at(self.beside, (row[0][right], row[1][right], column[1][right]), values[right])
-        if both:
-            np.add.at(self.beside, (column[0][left], column[1][left], row[1][left]), values[left])
+            np.add.at(self.diagonal.reshape(-1), (block + mirrored)[same], values[same])
+            np.add.at(self.beside.reshape(-1), (column[0] * height**2 + mirrored)[left], values[left])
 
 
 @dataclass(frozen=True, eq=False)
