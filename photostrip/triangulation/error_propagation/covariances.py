@@ -248,7 +248,7 @@ class NearImages(NamedTuple):
             with_components[:, :, slot * COMPONENTS : (slot + SPAN) * COMPONENTS] += products
         return cls(
             by_image.reshape(n, 2 * photos * most, size).transpose(0, 2, 1),
-            with_components.reshape(n, size, -1, COMPONENTS),
+            with_components.reshape(n, size, photos + REACH + 1, COMPONENTS),
         )
 
 

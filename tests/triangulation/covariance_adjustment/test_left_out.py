@@ -36,6 +36,21 @@ def test_groups_are_predicted_as_without_them(photos: int, lap: float) -> None:
         assert left_out.squares > 0
 
 
+def test_a_strip_predicts_the_same_in_parts_of_which_some_hold_no_wanted_coordinate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A strip of 200 photos with ten check points ended as an internal error."""
+    result = noisy(9, 80.0, 4)
+    (strip,), found = result.strips, errors_of(result)
+    given = strip.absolute.misclosures[found.control.point, found.control.axis]
+    parts = (found.errors, strip.of_photos.orientation, strip.of_photos.formed)
+    solved = system.system(found.errors, conditions.conditions(*parts, found.control, given), FACTOR)
+    wanted = found.control.take(np.arange(3)).rows
+    at_once = prediction.joint_covariance(solved, wanted)
+    monkeypatch.setattr(prediction, "AT_A_TIME", 1)
+    assert prediction.joint_covariance(solved, wanted) == pytest.approx(at_once)
+
+
 def test_control_that_alone_holds_the_strip_cannot_be_predicted() -> None:
     result = noisy(4, 62.0, 3)
     (strip,), found = result.strips, errors_of(result)
