@@ -32,7 +32,7 @@ print(json.dumps([os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_sti
 
 @pytest.mark.slow
 def test_a_thousand_photos_are_checked_in_about_a_second(tmp_path: Path) -> None:
-    """Seconds of the processor, the best of two, in units of loading the libraries in turn with it."""
+    """Seconds of the processor, at best of two, in units of loading the libraries in turn with it."""
     spec = Spec(
         name="big",
         flight=Flight(photos=250, strips=4, side_lap_percent=30.0),
@@ -49,6 +49,8 @@ def test_a_thousand_photos_are_checked_in_about_a_second(tmp_path: Path) -> None
         taken.append(seconds)
         assert kilobytes < MEMORY_MB * 1024
         unit.append(measured(libraries, tmp_path / "none.txt")[0])
+        if min(taken) < RATIO * min(unit):
+            break  # what is fast enough at the first time is not tried again
     assert "1000 in 4 strips" in (tmp_path / "out.txt").read_text(encoding="utf-8")
     assert min(taken) < RATIO * min(unit)
 
