@@ -117,6 +117,21 @@ def test_as_many_more_points_of_a_photo_go_at_a_time_as_tests_have_taken_from_it
     assert np.flatnonzero(found).tolist() == np.sort(problem.images.point[now])[-1 - taken :].tolist()
 
 
+@pytest.mark.parametrize(("out", "more"), [(0, 0), (7, 0), (8, 1), (15, 1)])
+def test_of_given_coordinates_one_more_goes_at_a_time_for_every_eight_that_went(
+    problem: BundleProblem, out: int, more: int
+) -> None:
+    """None of them comes back: as many more as went would cost good ones."""
+    xyz = problem.control.xyz + np.random.default_rng(3).normal(0.0, 5.0, problem.control.xyz.shape)
+    spoiled = replace(problem, control=replace(problem.control, xyz=xyz))
+    search = snooping._Search(spoiled, Selection.everything(spoiled), BundleSettings(), None, rough=False)
+    done = search.adjust(Selection.everything(spoiled))
+    gone = (Rejection(kind=CONTROL, row=row, test="tau", value=9.0, limit=3.0) for row in range(out))
+    search.out = {(CONTROL, each.row, 0): each for each in gone}
+    worst = search._worst(done)
+    assert [each.kind for each in worst] == [CONTROL] * (1 + more)
+
+
 def test_a_tenth_of_the_rays_takes_few_adjustments() -> None:
     """91 adjustments with one point of a neighbourhood at a time, and the same rays go."""
     result = adjusted(simulate(Spec(flight=Flight(photos=4, strips=2), points=Points(extra_per_model=60))))
