@@ -99,7 +99,8 @@ def decide(points: PointRays, limit: Limit) -> list[Decision]:
             size[left_over[row], ~wrong] = np.nan
         left_over = left_over[~(least <= bound)]
     if r == 2 and freedom == 1:  # half of the y parallax each
-        size[out[:, 0], :, 0], size[out[:, 0], :, 1] = 0.0, (0.5 * pulled[:, 1::2] / share[:, 1::2])[out[:, 0]]
+        rows = np.flatnonzero(out[:, 0])
+        size[rows] = np.stack([np.zeros((len(rows), 2)), 0.5 * pulled[rows, 1::2] / share[rows, 1::2]], axis=2)
     cause = np.where(told, WRONG_RAY, np.where(out[:, 0], cause_of_all(r), ""))
     found = zip(out, cause.tolist(), value.tolist(), size, strict=True)
     return [Decision(out=each, cause=why, value=most, size=by) for each, why, most, by in found]
