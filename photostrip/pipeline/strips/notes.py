@@ -228,15 +228,24 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
         yield Note("covariance-proposed", text, severity="note", strip=strip.id)
 
 
-def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceAdjustment | None) -> Iterator[Note]:
-    """Say what the tests of the adjustment with the covariance of the strip found.
+def covariance_notes(
+    strip: Strip, control: ControlPoints, formed: FormedStrip, adjusted: CovarianceAdjustment | None
+) -> Iterator[Note]:
+    """Say what the tests of the adjustment with the covariance of the strip found, and what it could not take.
 
     Returns doubtful control, the worst point only: it raises the test values of its neighbours; and a failed test of
         the whole.
     """
     if adjusted is None:
         return
-    tested = adjusted.tested
+    tested, joined = adjusted.tested, formed.junctions
+    known = int(joined.used.sum()) - len(np.unique(joined.junction[joined.used]))
+    if 0 < tested.distances < known:
+        text = (
+            f"strip {strip.id}: its points lie on so many photos that the adjustment with the covariance used "
+            f"{tested.distances} of {known} distances at the junctions; a bundle uses all, and takes less time"
+        )
+        yield Note("distances-left-out", text, severity="note", strip=strip.id)
     worst = tested.doubtful[:1]
     for row in worst.tolist():
         name, axis = control.ids[adjusted.control.point[row]], GROUND_AXES[adjusted.control.axis[row]]

@@ -179,7 +179,7 @@ class FormedPhotos:
                 *notes.precision_beyond_control(strip, oriented.control_rows, covariance),
                 *([] if correction is None or found.choice else notes.covariance_proposal(strip, correction)),
                 *notes.photo_notes(strip, resection),
-                *notes.covariance_notes(strip, oriented.control, covariance),
+                *notes.covariance_notes(strip, oriented.control, self.formed, covariance),
             ),
             screened_control=screened.screened_control,
             shared=screened.shared,

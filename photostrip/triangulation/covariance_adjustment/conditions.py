@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 JUNCTION, CONTROL, DISTANCE = 0, 1, 2
+# distances at all junctions over which a point reaches, at most: the time grows with their third power. 126 points on a
+# photo and 13 photos a point: 2 s in place of 15, rms 0.047 in place of 0.029 m; strips of 3 photos a point keep 333
+MOST_DISTANCES = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +170,10 @@ def _distances(
     number = joined.junction[chosen][order]
     last = np.append(number[1:] != number[:-1], np.ones(min(len(number), 1), bool))
     chosen = np.sort(chosen[order[~last]])
+    across = pairs.point[joined.after[chosen], 1]
+    chosen = np.sort(
+        chosen[_spread(joined.junction[chosen], across, MOST_DISTANCES // errors.points.by_component.shape[1])]
+    )
     junction, before, after = joined.junction[chosen], joined.before[chosen], joined.after[chosen]
     ray_before, ray_after = pairs.point[before] - pairs.base[junction], pairs.point[after]
     lengths = np.linalg.norm(ray_before, axis=1) + np.linalg.norm(ray_after, axis=1)
@@ -199,6 +206,15 @@ def _distances(
         source=chosen,
         local=local,
     )
+
+
+def _spread(junction: Numbers, across: Floats, most: int) -> Numbers:
+    """Rows of at most so many of each junction, from one side of the strip to the other."""
+    order = np.lexsort((across, junction))
+    _, begin, count = np.unique(junction, return_index=True, return_counts=True)
+    rank = np.arange(len(order)) - np.repeat(begin, count)
+    step = np.maximum(np.repeat(count, count) / most, 1.0)
+    return np.asarray(order[np.floor(rank / step) != np.floor((rank - 1) / step)], np.intp)
 
 
 def centers_of(errors: StripErrors) -> Floats:

@@ -319,3 +319,28 @@ def test_repetitions_scatter_as_stated() -> None:
         factor = (0.005 / precision.sigma[0]) ** 2 if precision.basis[0] == "a-posteriori" else 1.0
         stated = np.sqrt(factor * np.diagonal(precision.points, axis1=1, axis2=2).mean(axis=0))
         assert stated / np.sqrt(squares[name].mean(axis=0) / 60) == pytest.approx(np.ones(3), abs=0.1)
+
+
+def test_points_on_many_photos_leave_so_many_distances_to_each_junction(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that are left lie from one side of the strip to the other; nothing else changes; it is said."""
+    whole = prepared(noisy(8, 80.0), distances=True)[1]
+    monkeypatch.setattr(conditions, "MOST_DISTANCES", 20)
+    result = noisy(8, 80.0)
+    errors, wanted = prepared(result, distances=True)
+    most = 20 // errors.points.by_component.shape[1]
+    (strip,) = result.strips
+    joined, every = strip.of_photos.formed.junctions, set(whole.source[whole.kind == conditions.DISTANCE].tolist())
+    left = wanted.source[wanted.kind == conditions.DISTANCE]
+    assert set(left.tolist()) < every
+    for junction in nonempty(np.unique(joined.junction[sorted(every)]).tolist()):
+        of_junction = np.array([each for each in sorted(every) if joined.junction[each] == junction])
+        across = errors.pairs.point[joined.after[of_junction], 1]
+        chosen = np.isin(of_junction, left)
+        assert chosen.sum() == min(most, len(of_junction))
+        assert across[chosen].min() == across.min()
+        assert np.ptp(across[chosen]) > 0.5 * np.ptp(across)
+    notes = triangulate(result.inputs, COVARIANCE).notes
+    (note,) = (each for each in notes if each.code == "distances-left-out")
+    assert f"{len(left)} of {len(every)} distances" in note.message
+    monkeypatch.undo()
+    assert all(each.code != note.code for each in triangulate(result.inputs, COVARIANCE).notes)
