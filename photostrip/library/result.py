@@ -43,6 +43,11 @@ class Result:
         return dict(as_lists(self._document))
 
     @property
+    def in_columns(self) -> Document:
+        """The same with its records as columns, as it is printed and written: a fifth of the memory."""
+        return self._document
+
+    @property
     def name(self) -> str:
         """Name of the project."""
         return str(self._document["name"])
@@ -240,11 +245,16 @@ class Result:
 
     def files(self, *, html: bool = False) -> dict[str, str]:
         """Return the files of the result, content by name: result.json, the tables, with html the report as a page."""
-        from photostrip.formats.output.result_files import refined_csv, result_files
+        from photostrip.formats.output.result_json import to_json
+
+        return self._beside_json(html=html) | {RESULT: to_json(self._document)}
+
+    def _beside_json(self, *, html: bool) -> dict[str, str]:
+        from photostrip.formats.output.result_files import beside_json, refined_csv
 
         pages = {"report.html": self.report("html")} if html else {}
         refined = refined_csv(self.computed) if self.computed is not None else ""
-        return pages | result_files(self._document, self._resolved, refined)
+        return pages | beside_json(self._document, self._resolved, refined)
 
     def pictures(self) -> dict[str, str]:
         """Return the pictures of the report as SVG, content by file name."""
@@ -254,13 +264,19 @@ class Result:
         with faults_instead(self.name, "reported"):
             return picture_files(self.document)
 
-    def write(self, folder: str | PathLike[str], *, html: bool = False) -> None:
-        """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none."""
+    def write(self, folder: str | PathLike[str], *, html: bool = False) -> tuple[str, ...]:
+        """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none.
+
+        Returns their names.
+        """
         from pathlib import Path
 
+        from photostrip.formats.output.result_json import json_pieces
         from photostrip.formats.text.writing import write_files
 
-        write_files(Path(folder), self.files(html=html))
+        files = self._beside_json(html=html) | {RESULT: json_pieces(self._document)}
+        write_files(Path(folder), files)
+        return tuple(files)
 
     def __repr__(self) -> str:
         """Say the verdict in a line."""

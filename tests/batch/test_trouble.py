@@ -16,11 +16,12 @@ from photostrip.batch.result_folder import opened
 from photostrip.cli.jobs import batch as batch_job
 from photostrip.cli.main import main
 from photostrip.errors import InputError
+from photostrip.formats.text import writing
 from photostrip.formats.text.writing import write_files
 from tests.batch.projects import Alone, command, environment, tree, write_projects
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
 
@@ -54,15 +55,15 @@ def batch(folder: Path, *arguments: str, before: Callable[[], None] = as_anybody
 
 def full(monkeypatch: pytest.MonkeyPatch, full_for: str) -> None:
     """Let the disk be full whenever something is written below a folder."""
-    write = Path.write_bytes
+    write = writing._write
 
-    def refused(path: Path, data: bytes) -> int:
+    def refused(path: Path, data: str | Iterable[str]) -> None:
         if full_for in str(path):
-            write(path, data[: len(data) // 2])
+            write(path, "".join(data)[:100])
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
-        return write(path, data)
+        write(path, data)
 
-    monkeypatch.setattr(Path, "write_bytes", refused)
+    monkeypatch.setattr(writing, "_write", refused)
 
 
 @pytest.mark.slow

@@ -6,19 +6,22 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from photostrip.cli.main import main
 from photostrip.formats.output.result_json import to_json
+from photostrip.formats.text import writing
 from photostrip.report.sections.document import SectionName, sections_of
 from photostrip.report.sections.overview import MOST_LINES
 from tests.results import spec, write_project
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
     from tests.results import Document
 
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
@@ -225,14 +228,14 @@ def test_a_run_that_fails_leaves_the_earlier_result(
     out = tmp_path / "out"
     assert run(capsys, "run", project, "-o", out)[0] == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    write = Path.write_bytes
+    write = writing._write
 
-    def full(self: Path, data: bytes) -> int:
+    def full(self: Path, data: str | Iterable[str]) -> None:
         if "result.json" in self.name:
             raise OSError(28, "No space left on device", str(self))
-        return write(self, data)
+        write(self, data)
 
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(writing, "_write", full)
     code, _, err = run(capsys, "run", project, "-o", out, "--set", "processing.adjustment=similarity")
     assert code == 2
     assert "No space left on device" in err

@@ -7,12 +7,12 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from photostrip.cli.main import main
+from photostrip.formats.text import writing
 from tests.loops import nonempty
 from tests.project.samples import FILES, MARKED_FILES, PROJECT, sample
 from tests.project.test_faults import MARKS, ONE_FAULT
@@ -21,6 +21,7 @@ from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
@@ -251,10 +252,10 @@ def test_a_full_disk_takes_the_same_form(
 ) -> None:
     path = write_project(tmp_path / "p", spec())
 
-    def full(self: Path, _data: bytes) -> int:
+    def full(self: Path, _data: str) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", str(self))
 
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(writing, "_write", full)
     code, out, err = call(capsys, "run", path, "-o", tmp_path / "out", "--format", form)
     assert code == 2
     assert "no space left on device" in (out + err).lower()

@@ -88,14 +88,12 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         if depfile is not None and output is not None:  # before the result: it must not be the newer of the two
             write_text(depfile, make_rule(output / RESULT, read.files_read(result)))
         if output is not None:
-            files = result.files(html=html)
-            write_files(output, files)
-            messages.say(f"wrote {len(files)} files to {output}")
+            messages.say(f"wrote {len(result.write(output, html=html))} files to {output}")
         if plots is not None:
             pictures = result.pictures()
             write_files(plots, pictures)
             messages.say(f"wrote {len(pictures)} pictures to {plots}")
-    print_result(result.document, form, width, Parts(quiet, verbose, section or ()))
+    print_result(result.in_columns, form, width, Parts(quiet, verbose, section or ()))
     return exit_code(result.status, strict=strict)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from photostrip.cli.failures import failures_as
 from photostrip.cli.stdout import Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
-from photostrip.formats.text.writing import write_files, write_text
+from photostrip.formats.text.writing import write_text
 from photostrip.library.project import loaded_from
 from photostrip.pipeline import AUTO, METHODS
 from photostrip.report.commands.methods import methods_sections
@@ -56,7 +56,7 @@ def compare_methods(
             name = result.name
             found[adjustment] = result.document
             if output is not None and adjustment != AUTO:  # one of the others
-                write_files(output / adjustment, result.files(html=html))
+                result.write(output / adjustment, html=html)
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
         failures = [each for each in found.values() if not isinstance(each, dict)]
         if len(failures) == len(found):

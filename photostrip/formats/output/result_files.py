@@ -34,6 +34,11 @@ def result_files(document: Document, resolved: str = "", refined: str = "") -> d
     result.json comes last: when it is there, all are. `resolved` is the text of project.resolved.yaml, `refined` that
     of refined.csv, which is not rendered from the document; they are not written when they are empty.
     """
+    return {**beside_json(document, resolved, refined), "result.json": to_json(document)}
+
+
+def beside_json(document: Document, resolved: str, refined: str) -> dict[str, str]:
+    """Return the files beside result.json."""
     frame, photos = document["frame"], document["photos"]
     angles = photos[0]["angles"] if photos else {"system": "alpha-omega-kappa", "unit": "deg"}
     unit = angles["unit"]
@@ -52,7 +57,7 @@ def result_files(document: Document, resolved: str = "", refined: str = "") -> d
         files["refined.csv"] = refined
     if resolved:
         files["project.resolved.yaml"] = resolved
-    return {**files, "result.json": to_json(document)}
+    return files
 
 
 def refined_csv(result: Result) -> str:

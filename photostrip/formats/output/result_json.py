@@ -30,11 +30,15 @@ def to_json(document: Document, *, ascii_only: bool = False) -> str:
 
     Each element of a list of records stands on a line of its own, so that results can be compared line by line.
     """
-    return "".join(map(visible_json, _pieces(document, json_encoder.ASCII if ascii_only else json_encoder.UNICODE)))
+    return "".join(json_pieces(document, ascii_only=ascii_only))
+
+
+def json_pieces(document: Document, *, ascii_only: bool = False) -> Iterator[str]:
+    """Give the text of result.json piece by piece: with many points it takes as much memory as all else."""
+    return map(visible_json, _pieces(document, json_encoder.ASCII if ascii_only else json_encoder.UNICODE))
 
 
 def _pieces(document: Document, encode: Encoder) -> Iterator[str]:
-    """Give the text piece by piece, to be joined once: a text of many points is not copied from block to whole."""
     before = "{\n"
     for key, value in document.items():
         yield f"{before}{encode.text(key)}: "

@@ -16,7 +16,11 @@ from typing import TYPE_CHECKING
 from photostrip.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
+
+    Content = str | bytes | Iterable[str]  # the last: a text in pieces, each made when it is written
+
+PIECE = 1_000_000  # characters that are encoded at a time
 
 
 def write_text(path: Path, text: str | bytes) -> None:
@@ -27,7 +31,7 @@ def write_text(path: Path, text: str | bytes) -> None:
     write_files(path.parent, {path.name: text})
 
 
-def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
+def write_files(folder: Path, files: Mapping[str, Content]) -> None:
     """Write the files of one folder, all of them or none; the folder is made when it is missing.
 
     All contents are written first and renamed then, in the order given: put the file last that make or another program
@@ -42,15 +46,14 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
             _refuse(folder / name, "is a folder", "a file")
     waiting: list[tuple[Path, Path]] = []
     try:
-        for name, text in files.items():
+        for name, content in files.items():
             target = folder / name
-            content = text if isinstance(text, bytes) else text.encode()
             if target.exists() and not target.is_file():  # a pipe or a device: renaming would replace it
-                target.write_bytes(content)
+                _write(target, content)
                 continue
             target = Path(os.path.realpath(target))  # through a link, to where the file is
             waiting.append((target.with_name(f".{target.name}.{os.getpid()}.tmp"), target))
-            waiting[-1][0].write_bytes(content)
+            _write(waiting[-1][0], content)
         for temporary, target in waiting:
             temporary.replace(target)
     except BaseException:  # also when the user interrupts
@@ -58,6 +61,20 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
             with suppress(OSError):
                 temporary.unlink()
         raise
+
+
+def _write(path: Path, content: Content) -> None:
+    with path.open("wb") as file:
+        for piece in _encoded(content):
+            file.write(piece)
+
+
+def _encoded(content: Content) -> Iterator[bytes]:
+    if isinstance(content, bytes):
+        yield content
+        return
+    for text in (content,) if isinstance(content, str) else content:
+        yield from (text[start : start + PIECE].encode() for start in range(0, len(text), PIECE))
 
 
 def _make(folder: Path) -> None:

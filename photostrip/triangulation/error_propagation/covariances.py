@@ -201,9 +201,8 @@ def covariances(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances,
     size = rows.by_similarity.shape[1]
     result = np.empty((len(rows.first), size, size))
     order = np.argsort(rows.first, kind="stable")
-    ordered = rows.take(order)
-    for start, stop in _slices(ordered):
-        part, phi = ordered.part(start, stop), influence[order[start:stop]]
+    for start, stop in _slices(rows):
+        part, phi = rows.take(order[start:stop]), influence[order[start:stop]]
         near = NearImages.of(errors, part)
         by, half = _halves(errors, part, near, fit.along)
         mixed = phi @ (fit.parameters / 2) - with_parameters(part, near, fit)

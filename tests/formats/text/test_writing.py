@@ -6,12 +6,17 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from photostrip.errors import InputError
+from photostrip.formats.text import writing
 from photostrip.formats.text.writing import make_rule, write_files, write_text
 from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
 
 
 def content(folder: Path) -> dict[str, str]:
@@ -38,30 +43,44 @@ def test_a_failure_in_the_middle_leaves_everything_as_it_was(tmp_path: Path) -> 
     assert content(tmp_path) == {"one.csv": "old", "two.csv": "old"}
 
 
+def test_a_text_is_made_piece_by_piece_while_it_is_written(tmp_path: Path) -> None:
+    def pieces(count: int) -> Iterator[str]:
+        for number in range(count):
+            yield f"{number}µ" * writing.PIECE
+        if count > 2:
+            raise OSError(28, "No space left on device")
+
+    write_files(tmp_path, {"one.csv": pieces(2)})
+    assert (tmp_path / "one.csv").read_text(encoding="utf-8") == "0µ" * writing.PIECE + "1µ" * writing.PIECE
+    with pytest.raises(OSError, match="No space left"):
+        write_files(tmp_path, {"one.csv": pieces(3)})
+    assert content(tmp_path) == {"one.csv": "0µ" * writing.PIECE + "1µ" * writing.PIECE}
+
+
 def test_a_full_disk_leaves_everything_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_files(tmp_path, {"one.csv": "old", "two.csv": "old"})
-    write = Path.write_bytes
+    write = writing._write
 
-    def full(self: Path, data: bytes) -> int:
+    def full(self: Path, data: str | Iterable[str]) -> None:
         if "two.csv" in self.name:
-            write(self, data[:1])
+            write(self, "".join(data)[:1])
             raise OSError(28, "No space left on device", str(self))
-        return write(self, data)
+        write(self, data)
 
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(writing, "_write", full)
     with pytest.raises(OSError, match="No space left"):
         write_files(tmp_path, {"one.csv": "new", "two.csv": "new"})
     assert content(tmp_path) == {"one.csv": "old", "two.csv": "old"}
 
 
 def test_an_interrupt_leaves_no_temporary_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write = Path.write_bytes
+    write = writing._write
 
-    def interrupted(self: Path, data: bytes) -> int:
+    def interrupted(self: Path, data: str) -> None:
         write(self, data)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Path, "write_bytes", interrupted)
+    monkeypatch.setattr(writing, "_write", interrupted)
     with pytest.raises(KeyboardInterrupt):
         write_text(tmp_path / "one.csv", "new")
     assert content(tmp_path) == {}
