@@ -28,8 +28,8 @@ MEMBERS = {
     "Plan": ["document", "files", "report"],
     "Project": ["check", "files_read", "loaded", "name", "overridden", "photos", "resolved", "run"],
     "Result": [
-        "accuracy", "computed", "control", "covariance_of", "document", "files", "findings", "name", "notes", "pairs",
-        "parallaxes", "photos", "pictures", "points", "rejected", "report", "residuals", "statement", "status",
+        "accuracy", "computed", "control", "covariance_of", "document", "files", "findings", "in_columns", "name", "notes",
+        "pairs", "parallaxes", "photos", "pictures", "points", "rejected", "report", "residuals", "statement", "status",
         "strips", "summary", "trace", "write",
     ],
     "Simulation": ["files", "files_read", "project", "summary", "truth", "write"],

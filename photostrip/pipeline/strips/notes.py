@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import column_medians
+from photostrip.arrays import column_medians, distinct
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
@@ -239,7 +239,7 @@ def covariance_notes(
     if adjusted is None:
         return
     tested, joined = adjusted.tested, formed.junctions
-    known = int(joined.used.sum()) - len(np.unique(joined.junction[joined.used]))
+    known = int(joined.used.sum()) - len(distinct(joined.junction[joined.used]))
     if 0 < tested.distances < known:
         text = (
             f"strip {strip.id}: its points lie on so many photos that the adjustment with the covariance used "

@@ -78,7 +78,7 @@ def _bridged(
 ) -> FormedStrip:
     """Add the points whose good rays come from photos that are no neighbours."""
     rows = oriented.rows[~np.isin(oriented.point, formed.point)]
-    good = distinct(rows[~np.isin(rows, [each.row for each in found])])
+    good = distinct(rows[~np.isin(rows, np.array([each.row for each in found], np.intp))])
     if not len(good):
         return formed
     return non_neighbours.bridge(formed, rays.observations, photos, oriented.pairs.focal, good)
