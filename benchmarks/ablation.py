@@ -73,7 +73,7 @@ def put(home: str, name: str, value: object) -> None:
     setattr(holder, name, value)
     if name in (fields := getattr(holder, "__dataclass_fields__", {})):  # its class keeps defaults to itself
         fields[name].default = value
-        setattr(holder, "__init__", frozen._builder(holder))  # noqa: B010, SLF001
+        frozen._values_left_out.cache_clear()  # noqa: SLF001
     holders = [holder]
     for module in [each for key, each in sys.modules.items() if key.startswith("photostrip")]:
         named = hasattr(module, name) and imported(module, home, name)

@@ -11,13 +11,14 @@ import time
 import warnings
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from photostrip.cli.jobs import batch as batch_job
 from photostrip.cli.main import main
 from photostrip.formats.output.batch import parsed_record
+from photostrip.formats.text import writing
 from photostrip.formats.text.source import digest
 from tests.batch.projects import Alone, command, environment, known, run, tree, write_projects
 
@@ -127,23 +128,25 @@ def test_killed_at_every_single_step_of_writing(here: Path, monkeypatch: pytest.
     steps = 0
 
     def dying(act: Callable[..., object], last: int) -> Callable[..., object]:
-        def step(*arguments: object) -> object:
+        def step(*arguments: Any) -> object:  # noqa: ANN401
             nonlocal steps
             steps += 1
             if steps > last:
-                if act is write and isinstance(arguments[0], Path) and isinstance(arguments[1], bytes):
-                    write(arguments[0], arguments[1][: len(arguments[1]) // 2])  # a half file
+                if act is write:
+                    path, content = arguments
+                    text = content if isinstance(content, bytes) else "".join(content).encode()
+                    write(path, text[: len(text) // 2])  # a half file
                 os.kill(os.getpid(), signal.SIGKILL)
             return act(*arguments)
 
         return step
 
-    write, rename = Path.write_bytes, Path.replace
+    write, rename = writing._write, Path.replace
     last, code = 0, -signal.SIGKILL
     while code:
         shutil.rmtree(here / "out", ignore_errors=True)
         with monkeypatch.context() as patch:
-            patch.setattr(Path, "write_bytes", dying(write, last))
+            patch.setattr(writing, "_write", dying(write, last))
             patch.setattr(Path, "replace", dying(rename, last))
             code = in_a_child(lambda: main(BATCH))
         check_nothing_half(here / "out", whole)

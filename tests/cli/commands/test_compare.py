@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -16,11 +15,15 @@ from photostrip.comparison.tolerances import SETS, UNITS
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.result_lines import line_finder
+from photostrip.formats.text import writing
 from photostrip.project.profiles.tolerances import load_tolerances
 from photostrip.report.page.junit import Case, to_junit
 from tests.loops import nonempty
 from tests.results import case
 from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
@@ -193,7 +196,7 @@ def test_a_baseline_that_cannot_be_written_stays_whole(files: Path, monkeypatch:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patched:
-        patched.setattr(Path, "write_bytes", full)
+        patched.setattr(writing, "_write", full)
         assert main(["compare", "result", "other.json", "--update"]) == 2
     assert (files / "other.json").read_bytes() == before
     assert sorted(path.name for path in files.iterdir()) == ["other.json", "result", "same.json"]
