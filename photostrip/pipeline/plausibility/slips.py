@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 CODE = "P406"
 LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)
-LEAST_OTHERS = 3  # given coordinates that tell how well the prediction is known
-LEFT_SHARE = 0.5  # of a slip, that a result leaves at least; of what a strip bends it leaves little
 MOST_SIGMA0 = 2.0  # of a bundle, over what is stated: a principal distance of another lens leaves 4 and more
 
 
@@ -43,7 +41,6 @@ class Predicted:
 
     off: Floats  # (c, 3): given minus predicted, metres along the axes of each point's frame; NaN where not known
     sigma: Floats  # (c, 3): standard deviation of that difference
-    left: Floats  # (c, 3): given minus adjusted, metres, of coordinates that took part too
     sound: Flags  # (c, 3): control coordinates that took part: the run tested them and found them right
 
     def agree(self, use: Flags) -> Flags:
@@ -56,7 +53,7 @@ class Predicted:
         columns = [2] if axis == control_slips.HEIGHT else [0, 1]
         ratio = np.abs(np.delete(self.off, row, axis=0) / np.delete(self.sigma, row, axis=0))[:, columns]
         known = ratio[np.isfinite(ratio)]
-        excess = max(SIGMA_FROM_MEDIAN * median(known), 1.0) if len(known) >= LEAST_OTHERS else 1.0
+        excess = max(SIGMA_FROM_MEDIAN * median(known), 1.0) if len(known) else 1.0
         return float(self.sigma[row, axis]) * excess
 
     def stands_out(self, row: int, axis: int) -> bool:
@@ -97,8 +94,7 @@ def predict(result: Result) -> Predicted:
         rows = locate(strip.control.ids, control.ids)
         rejected[rows] |= control.use[rows] & ~strip.control.use
     used = control.use & ~control.check[:, None] & ~rejected & (result.control_rows >= 0)[:, None]
-    left = -result.control_differences
-    off = np.where(used, np.nan, left)
+    off = np.where(used, np.nan, -result.control_differences)
     sigma = np.full(off.shape, np.nan)
     for number, frame in enumerate(result.frames):
         rows = np.flatnonzero((control.frame == number) & (result.control_rows >= 0))
@@ -108,7 +104,7 @@ def predict(result: Result) -> Predicted:
             with np.errstate(invalid="ignore"):  # a variance lost to rounding is not known
                 sigma[rows] = np.sqrt(np.einsum("nai,nij,naj->na", axes, precision.points[at], axes))
     sigma = np.hypot(sigma, np.where(control.sigma > 0, control.sigma, 0.0))
-    return Predicted(off=off, sigma=sigma, left=left, sound=used & _tested(result))
+    return Predicted(off=off, sigma=sigma, sound=used & _tested(result))
 
 
 def _tested(result: Result) -> Flags:
@@ -157,9 +153,7 @@ def of_models(result: Result, models: MeasuredModels, predicted: Predicted, cont
 def _confirmed(finding: Finding, row: int, predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
     """Test a slip by a prediction; it stands as it is where the adjustment has none."""
     axis = GROUND_AXES.index(str(finding.evidence["axis"]))
-    if predicted.sound[row, axis] or abs(predicted.left[row, axis]) < LEFT_SHARE * abs(
-        float(finding.evidence["off_m"])
-    ):
+    if predicted.sound[row, axis]:
         return
     off = float(predicted.off[row, axis])
     if not np.isfinite(off * predicted.sigma[row, axis]):
