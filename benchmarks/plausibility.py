@@ -657,6 +657,16 @@ def heights_in_feet(case: Case) -> Planted | None:
     return with_control(case, enu=case.inputs.control.enu * [1, 1, factor]), NOBODY
 
 
+def checks_shifted(case: Case) -> Planted | None:
+    """Give all check points in another frame: off by twenty to sixty times the noise, in plan or in height."""
+    control = case.inputs.control
+    if kind_of(case) in {"geocentric", "geographic"} or control.check.sum() < 3:
+        return None
+    shift = case.rng.uniform(20.0, 60.0, 3) * [*case.noise[:1] * 2, case.noise[1]] * case.rng.choice([-1, 1], 3)
+    shift[[2] if case.rng.random() < EVEN else [0, 1]] = 0.0
+    return with_control(case, enu=control.enu + shift * control.check[:, None]), NOBODY
+
+
 def slip_of_a_digit(case: Case, *, check: bool) -> Planted | None:
     """Change one digit of a given coordinate by one to nine."""
     control = case.inputs.control
@@ -1048,6 +1058,9 @@ MISTAKES = (
     Mistake("slip of a digit, check point", lambda case: slip_of_a_digit(case, check=True), ("P406",)),
     Mistake("a digit written twice", digit_too_many, ("P406",)),
     Mistake("slip of a digit, models", lambda case: slip_of_a_digit(case, check=False), ("P406",), of_models),
+    Mistake("all check points shifted", checks_shifted, ("P411",)),
+    Mistake("all check points shifted, bundle", checks_shifted, ("P411",), block, "bundle"),
+    Mistake("all check points shifted, models", checks_shifted, ("P411",), of_models),
     Mistake("two control points exchanged", exchanged, ("P408",)),
     Mistake("ids of given points in the next row", in_the_next_row, ("P409",)),
     Mistake("given points with coordinates of others", of_other_points, ("P409",)),

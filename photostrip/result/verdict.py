@@ -84,11 +84,13 @@ def _cure(document: Document) -> str:
 
 def _numbers(document: Document) -> Iterator[str]:
     """Say where differences, residuals and standard deviations do not go together."""
+    named = {point for each in (*_open_findings(document), *_on_control(document)) for point in each["points"]}
     yield from _control(document)
-    yield from _odd(document, "control")
-    yield from _odd(document, "check")
-    yield from _checks(document)
-    yield from _odd(document, "cross_validation")
+    yield from _odd(document, "control", named)
+    yield from _odd(document, "check", named)
+    if not named.issuperset(row["id"] for row in _rows(document, "check")):
+        yield from _checks(document)
+    yield from _odd(document, "cross_validation", named)
     yield from _cross_validation(document)
     yield from _sigma0(document)
     yield from _pairs(document)
@@ -148,8 +150,7 @@ def _whole(document: Document, role: str) -> Document:
 
 def _rows(document: Document, role: str) -> list[Document]:
     if role == "cross_validation":
-        found: list[Document] = document.get(role, {}).get("points", [])
-        return found
+        return list(document.get(role, {}).get("points", []))
     return [row for row in document["control"] if row["role"] == role]
 
 
@@ -198,9 +199,8 @@ def _without_rejected(row: Document) -> Document:
     return row | {"plan": plan, "height": None if "z" in out else row["height"]}
 
 
-def _odd(document: Document, role: str) -> Iterator[str]:
-    """Name the points that do not go with the others, in plan and in height, and that nothing else has named."""
-    named = {point for each in (*_open_findings(document), *_on_control(document)) for point in each["points"]}
+def _odd(document: Document, role: str, named: set[str]) -> Iterator[str]:
+    """Name the points that do not go with the others, in plan and in height, and that nothing else has `named`."""
     odd = [row for row in _rows(document, role) if row["stands_out"] and row["id"] not in named]
     if not odd:
         return

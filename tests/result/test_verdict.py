@@ -67,11 +67,11 @@ def test_what_is_to_be_looked_at_can_be_unverified_too() -> None:
 
 
 def moved(points: int, metres: float, axis: int = 0, adjustment: str = "polynomial") -> Document:
-    """Displace the first so many of eight check points."""
+    """Displace the first so many of eight check points, in turn forth and back."""
     wanted = spec("projected", 2)
     inputs = inputs_of(simulate(replace(wanted, control=replace(wanted.control, check=8))))
     enu = inputs.control.enu.copy()
-    enu[np.flatnonzero(inputs.control.check)[:points], axis] += metres
+    enu[np.flatnonzero(inputs.control.check)[:points], axis] += metres * (-1.0) ** np.arange(points)
     return solved(replace(inputs, control=replace(inputs.control, enu=enu)), Settings(adjustment=adjustment)).document
 
 

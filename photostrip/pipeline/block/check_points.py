@@ -40,4 +40,10 @@ def check_errors(
     difference = differences[rows].ravel()
     known = np.flatnonzero(np.isfinite(difference))
     covariance = turned[np.ix_(known, known)] + np.diag(given.sigma[rows].ravel()[known] ** 2)
-    return CheckErrors(ids=given.take(rows).ids, point=known // 3, difference=difference[known], covariance=covariance)
+    return CheckErrors(
+        ids=given.take(rows).ids,
+        point=known // 3,
+        axis=known % 3,
+        difference=difference[known],
+        covariance=covariance,
+    )

@@ -108,6 +108,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
             findings = [each for each in findings if each.code not in OF_LISTS]
         findings += of_groups
     findings += shared_control.find_shared_errors(stages, findings, joined=result.bundle is not None)
+    if not any(each.is_error for each in findings):
+        findings += shared_control.find_shifted_checks(result)
     return accepted(findings, settings.accept)
 
 
@@ -209,6 +211,8 @@ def _of_adjusted_models(result: Result, models: MeasuredModels, directory: Path 
     if result.precision is not None:
         findings = [each for each in findings if each.code != slips.CODE]
         findings += slips.of_models(result, models, slips.predict(result), control)
+        if not any(each.is_error for each in findings):
+            findings += shared_control.find_shifted_checks(result)
     return accepted(findings, result.settings.accept)
 
 

@@ -1,4 +1,4 @@
-"""What all control of a strip shares, or that of one list: another principal distance, another frame."""
+"""What all control of a strip shares, that of one list, or its check points: a principal distance, another frame."""
 
 from __future__ import annotations
 
@@ -6,21 +6,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
 from photostrip.triangulation.plausibility import found
-from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList
+from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, significant
 from photostrip.triangulation.plausibility.finding import ERROR
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from photostrip.arrays import Floats, Numbers
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Strip
-    from photostrip.pipeline.results import StripResult
+    from photostrip.pipeline.results import Result, StripResult
     from photostrip.points import ControlPoints
-    from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
+    from photostrip.triangulation.error_propagation.check_errors import CheckErrors
+    from photostrip.triangulation.plausibility.control.shared_by_control import Shared, StretchedHeights
     from photostrip.triangulation.plausibility.finding import Evidence
+
+OTHER_PLACE = "is its crs the right one: zone, datum, false easting?"
+OTHER_HEIGHTS = "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"
 
 
 def find_shared_errors(
@@ -51,27 +57,60 @@ def shifted_list(shared: ShiftedList, control: ControlPoints, whose: str, strips
 
     control: control that counts, of all lists.
     """
-    plan = GROUND_AXES[int(np.nanargmax(np.abs(shared.shift) / shared.sigma))] != "up"  # what stands out most
-    steps = [
-        f"{step:+.2f} m {axis} (standard deviation {sigma:.2g} m)"
-        for step, sigma, axis in zip(shared.shift, shared.sigma, GROUND_AXES, strict=True)
-        if np.isfinite(step)
-    ]
+    plan, steps, evidence = _described(shared.shift, shared.sigma)
     points = tuple(name for name, number in zip(control.ids, control.frame, strict=True) if number == shared.number)
     key = f"control[{shared.number}]"
-    message = f"{key} lies beside the other control of {whose}, all of it by {', '.join(steps)}{then}"
-    fix = (
-        "is its crs the right one: zone, datum, false easting?"
-        if plan
-        else "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"
-    )
-    evidence: Evidence = {
-        f"offset_{axis}_m": float(step)
-        for step, axis in zip(shared.shift, GROUND_AXES, strict=True)
-        if np.isfinite(step)
-    }
+    message = f"{key} lies beside the other control of {whose}, all of it by {steps}{then}"
+    fix = OTHER_PLACE if plan else OTHER_HEIGHTS
     code = "P407" if plan else "P404"
     return found(code, message, fix, evidence, points=points, strips=strips, key=key)
+
+
+def _described(shift: Floats, sigma: Floats) -> tuple[bool, str, Evidence]:
+    """Say whether a shift (3,) is most significant in plan, and what it is; NaN where nothing is given."""
+    plan = GROUND_AXES[int(np.nanargmax(np.abs(shift) / sigma))] != "up"
+    known = [each for each in zip(GROUND_AXES, shift.tolist(), sigma.tolist(), strict=True) if np.isfinite(each[1])]
+    steps = ", ".join(f"{step:+.2f} m {axis} (standard deviation {own:.2g} m)" for axis, step, own in known)
+    return plan, steps, {f"offset_{axis}_m": step for axis, step, _ in known}
+
+
+def find_shifted_checks(result: Result) -> Iterator[Finding]:
+    """Find lists whose check points all lie beside the result by one shift (P411): they must not look wrong one by one.
+
+    Strips that are adjusted one by one are tested together.
+    """
+    control = result.inputs.control
+    lists = dict(zip(control.ids, control.frame.tolist(), strict=True))
+    known = [each for each in (() if result.precision is None else result.precision.checks) if each is not None]
+    rows = [np.array([lists[each.ids[point]] for point in each.point]) for each in known]
+    for number in distinct(control.frame[control.check]).tolist():
+        of_list = [each.take(np.flatnonzero(own == number)) for each, own in zip(known, rows, strict=True)]
+        axes, shared = _common_shift([each for each in of_list if each.coordinates])
+        if shared is None:
+            continue
+        shift, sigma = np.full((2, 3), np.nan)
+        shift[axes], sigma[axes] = -shared.value, shared.sigma
+        plan, steps, evidence = _described(shift, sigma)
+        points = [control.ids[row] for row in np.flatnonzero(control.check & (control.frame == number)).tolist()]
+        key = f"control[{number}]"
+        message = f"the check points of {key} all lie {steps} from where the adjustment puts them"
+        fix = f"{OTHER_PLACE if plan else OTHER_HEIGHTS} The control may be off in place of them"
+        yield found("P411", message, fix, evidence, points=points, key=key)
+
+
+def _common_shift(checks: Sequence[CheckErrors]) -> tuple[Numbers, Shared | None]:
+    """Test one shift of all check points against none, and against one wrong point; along the axes that are given."""
+    axes = distinct(np.array([axis for each in checks for axis in each.axis], np.intp))
+    normal, pull, alone = np.zeros((len(axes), len(axes))), np.zeros(len(axes)), 0.0
+    for each in checks:
+        weight = np.linalg.inv(each.covariance)
+        columns, pulled = (each.axis[:, None] == axes).astype(float), weight @ each.difference
+        normal, pull = normal + columns.T @ weight @ columns, pull + columns.T @ pulled
+        for point in distinct(each.point):
+            rows = np.flatnonzero(each.point == point)
+            alone = max(alone, float(pulled[rows] @ np.linalg.solve(weight[np.ix_(rows, rows)], pulled[rows])))
+    count = sum(each.coordinates for each in checks)
+    return axes, significant(normal, pull, sum(each.squares for each in checks), count - len(axes), alone)
 
 
 def _stretched(strip: Strip, stretch: StretchedHeights, then: str) -> Finding:

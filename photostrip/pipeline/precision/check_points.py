@@ -109,6 +109,7 @@ def _errors(compared: CheckDifferences, covariance: Floats, factor: float) -> Ch
     return CheckErrors(
         ids=compared.checks.points.ids,
         point=compared.coordinates.point,
+        axis=compared.coordinates.axis,
         difference=compared.difference,
         covariance=covariance * factor + np.diag(compared.coordinates.variance),
     )

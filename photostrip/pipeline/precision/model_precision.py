@@ -134,6 +134,7 @@ def _check(
     sums = model_errors.sums(found, *model_misclosures.weights(at, checks.rows))
     sums = sums - model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, by_control))
     spread = model_errors.covariance_of_sums(found, sums) * factor + (by_control * control.variance) @ by_control.T
+    covariance = spread + np.diag(at.variance)
     return CheckErrors(
-        ids=checks.points.ids, point=at.point, difference=difference, covariance=spread + np.diag(at.variance)
+        ids=checks.points.ids, point=at.point, axis=at.axis, difference=difference, covariance=covariance
     )

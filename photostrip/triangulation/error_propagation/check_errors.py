@@ -22,17 +22,21 @@ class CheckErrors:
 
     ids: tuple[str, ...]  # the check points
     point: Numbers  # (w,): check point of each coordinate
+    axis: Numbers  # (w,): 0, 1, 2: along its first, second, third ground axis
     difference: Floats  # (w,): adjusted minus given, metres
     covariance: Floats  # (w, w): of the differences, the errors of the given coordinates included, metres^2
 
     def without(self, ids: Collection[str]) -> CheckErrors | None:
         """Leave points out; None when none is left."""
         rows = np.flatnonzero([self.ids[point] not in ids for point in self.point])
-        if not len(rows):
-            return None
+        return self.take(rows) if len(rows) else None
+
+    def take(self, rows: Numbers) -> CheckErrors:
+        """Give some of the coordinates."""
         return replace(
             self,
             point=self.point[rows],
+            axis=self.axis[rows],
             difference=self.difference[rows],
             covariance=self.covariance[np.ix_(rows, rows)],
         )

@@ -50,6 +50,7 @@ KINDS: dict[str, Kind] = {
     "P408": Kind("given points exchanged", WARNING),
     "P409": Kind("control of other points", ERROR),
     "P410": Kind("the same coordinates for several points", WARNING),
+    "P411": Kind("check points that share a shift", WARNING),
     "P501": Kind("control at one end of the strip", WARNING),
     "P502": Kind("control on one line", WARNING),
     "P503": Kind("points far beyond the control", WARNING),

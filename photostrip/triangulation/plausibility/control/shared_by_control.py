@@ -110,7 +110,7 @@ def _shifts(strip: StripAtControl, whole: JointAdjustment, alone: float) -> list
     return found
 
 
-class _Tested(NamedTuple):
+class Shared(NamedTuple):
     """Columns that are significant: their values, standard deviations, and what the sum of squares loses with them."""
 
     value: Floats
@@ -118,17 +118,25 @@ class _Tested(NamedTuple):
     gain: float
 
 
-def _tested(whole: JointAdjustment, columns: Floats, alone: float) -> _Tested | None:
+def _tested(whole: JointAdjustment, columns: Floats, alone: float) -> Shared | None:
     """Test columns (w, k) of the misclosures; None where chance, or a single point, explains as much."""
     count, unknowns = columns.shape
     scaled = columns * whole.size[:count, None]
     normal, pull = scaled.T @ whole.matrix[:count, :count] @ scaled, scaled.T @ whole.pull[:count]
-    rest = whole.freedom - unknowns
+    return significant(normal, pull, whole.squares, whole.freedom - unknowns, alone)
+
+
+def significant(normal: Floats, pull: Floats, squares: float, rest: int, alone: float) -> Shared | None:
+    """Test what normal equations (k, k) find of differences; None where chance, or a single point, explains as much.
+
+    squares, rest: their sum of squares, and the redundancy that is left with the columns.
+    """
+    unknowns = len(pull)
     if rest < 1 or np.linalg.matrix_rank(normal, hermitian=True) < unknowns:
         return None
     inverse = np.linalg.inv(normal)
     gain = float(pull @ inverse @ pull)
-    spread = max(1.0, (whole.squares - gain) / rest)
+    spread = max(1.0, (squares - gain) / rest)
     if gain <= MORE_THAN_ALONE * alone or f_p_value(gain / unknowns / spread, unknowns, rest) > FALSE_ALARM:
         return None
-    return _Tested(inverse @ pull, np.sqrt(np.diag(inverse) * spread), gain / spread)
+    return Shared(inverse @ pull, np.sqrt(np.diag(inverse) * spread), gain / spread)
