@@ -32,7 +32,7 @@ from photostrip.pipeline.given_points import measured_control  # noqa: E402
 from photostrip.pipeline.image_coordinates import correct, orient_interior  # noqa: E402
 from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust  # noqa: E402
-from photostrip.pipeline.strips.forming import form_strips  # noqa: E402
+from photostrip.pipeline.strips.forming import Stages, form_strips  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
 
@@ -165,8 +165,8 @@ def errors_of(cell: Cell, seed: int) -> tuple[dict[str, Floats], str]:
     simulation = simulate(cell.spec(seed))
     inputs, settings = spoiled(inputs_of(simulation), cell.error, seed), settings_of(simulation)
     ground, photo = tie_ground_frames(inputs, settings, None, None), orient_interior(inputs, settings)
-    observations = correct(photo, inputs, settings, ground).observations
-    (formed,) = form_strips(inputs, observations, settings)
+    observations = correct(photo, inputs, settings, ground, Stages()).observations
+    (formed,) = form_strips(inputs, observations, settings, Stages())
     oriented = orient_on_control(
         formed, measured_control(inputs.control, observations), ground.control, settings.absolute
     )

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Inputs, Result
     from photostrip.pipeline.frames import TiedFrames
+    from photostrip.pipeline.strips.forming import Stages
 
 Document = dict[str, Any]
 
@@ -84,14 +85,19 @@ _results: dict[bytes, Result] = {}
 
 
 def known(
-    inputs: Inputs, settings: Settings, *, directory: Path | None = None, tied: TiedFrames | None = None
+    inputs: Inputs,
+    settings: Settings,
+    *,
+    directory: Path | None = None,
+    tied: TiedFrames | None = None,
+    stages: Stages | None = None,
 ) -> Result:
     """Do as ``triangulate``, or give what the same data with the same settings gave before, far from any grid."""
     if directory is not None and any(path.suffix in GRIDS for path in directory.iterdir()):
-        return triangulate(inputs, settings, directory=directory, tied=tied)
+        return triangulate(inputs, settings, directory=directory, tied=tied, stages=stages)
     asked = pickle.dumps((inputs, settings))
     if asked not in _results:
-        _results[asked] = triangulate(inputs, settings, directory=directory, tied=tied)
+        _results[asked] = triangulate(inputs, settings, directory=directory, tied=tied, stages=stages)
     return _results[asked]
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from photostrip.formats.text.source import Source
     from photostrip.pipeline import Result as Computed
+    from photostrip.pipeline.strips.forming import Stages
     from photostrip.project.checks.check import Checked
     from photostrip.project.loading import Project as Loaded
 
@@ -35,10 +36,11 @@ class Project:
         assignments: Sequence[str] = (),
         source: Source | None = None,
         digests: Mapping[str, str] | None = None,
+        stages: Stages | None = None,
     ) -> None:
         self.loaded = loaded
         """What the pipeline takes: ``inputs`` and ``settings``, with the places of all values in the files."""
-        self._assignments, self._source, self._digests = assignments, source, digests or {}
+        self._assignments, self._source, self._digests, self._stages = assignments, source, digests or {}, stages
 
     @property
     def name(self) -> str:
@@ -72,7 +74,7 @@ class Project:
         from photostrip.result.document import document_of
 
         with reading_from(self._source):
-            computed = self.loaded.result(adjust_project(self.loaded))
+            computed = self.loaded.result(adjust_project(self.loaded, self._stages))
             document = document_of(computed, self.loaded.remarks)
             document["certificate"] = self._certificate(document, computed)
         return Result(document, computed=computed, resolved=self.loaded.resolved)
@@ -203,15 +205,17 @@ def assignments_of(overrides: Mapping[str, Any], above: str = "") -> list[str]:
     return found
 
 
-def loaded_from(path: Path, assignments: Sequence[str], source: Source | None = None) -> Project:
-    """Read a project from files, or from a source in memory."""
+def loaded_from(
+    path: Path, assignments: Sequence[str], source: Source | None = None, stages: Stages | None = None
+) -> Project:
+    """Read a project from files, or from a source in memory; stages are those that other runs of it have made."""
     from photostrip.formats.text.source import Source, current
     from photostrip.formats.text.source import reading_from as accounted
     from photostrip.project.loading import load_project
 
     with reading_from(source), accounted(current() or Source()) as account:
         loaded = load_project(path, assignments)
-        return Project(loaded, assignments, source, dict(account.digests))
+        return Project(loaded, assignments, source, dict(account.digests), stages)
 
 
 def _checked(path: Path, assignments: Sequence[str], source: Source | None) -> Check:

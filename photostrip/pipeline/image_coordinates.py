@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
+    from photostrip.pipeline.strips.forming import Stages
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
 
@@ -47,7 +48,9 @@ def orient_interior(inputs: Inputs, settings: Settings) -> PhotoCoordinates:
     return PhotoCoordinates(interior.transform(inputs.observations, orientation), orientation)
 
 
-def correct(photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground: GroundFrames) -> corrections.Refined:
+def correct(
+    photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground: GroundFrames, stages: Stages
+) -> corrections.Refined:
     """Image coordinates reduced to the principal point, free of distortion and refraction.
 
     Refraction and Earth curvature need heights; where they are not given, they are those of the strips without these
@@ -59,12 +62,14 @@ def correct(photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground:
     if wanted.needs_heights and (wanted.flying_height is None or wanted.ground_height is None):
         plain = replace(wanted, refraction=False, earth_radius=None)
         bent = corrections.refine(photo.observations, inputs.cameras, plain).observations
-        heights = heights_of(bent, inputs, settings, ground)
+        heights = heights_of(bent, inputs, settings, ground, stages)
         wanted = replace(wanted, flying_height=heights.flying, ground_height=heights.ground)
     return corrections.refine(photo.observations, inputs.cameras, wanted)
 
 
-def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, ground: GroundFrames) -> Heights:
+def heights_of(
+    observations: PhotoPoints, inputs: Inputs, settings: Settings, ground: GroundFrames, stages: Stages
+) -> Heights:
     """Mean heights of cameras and ground from the strips, adjusted as they will be, in the frames of the run."""
     # a check, which asks for no heights, does without the fifty modules of a strip
     from photostrip.pipeline.common_points import mean_points
@@ -73,7 +78,7 @@ def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, gr
     from photostrip.pipeline.strips.forming import form_photos
 
     control = measured_control(inputs.control, observations)
-    formed = form_photos(inputs, observations, settings)
+    formed = form_photos(inputs, observations, settings, stages)
     if settings.adjustment == "bundle":
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 

@@ -18,15 +18,16 @@ from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
 from photostrip.pipeline.results import AdjustedStrips, Result
-from photostrip.pipeline.strips.absolute import StripStage, orient_on_control, reject_wrong_control
+from photostrip.pipeline.strips.absolute import StripStage, on_control
 from photostrip.pipeline.strips.adjusting import adjust
-from photostrip.pipeline.strips.forming import form_strips
+from photostrip.pipeline.strips.forming import Stages, form_strips
 from photostrip.pipeline.unchecked_control import unchecked_control_notes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import Bundle
     from photostrip.pipeline.strips.photos import FormedPhotos
@@ -34,45 +35,64 @@ if TYPE_CHECKING:
 
 
 def triangulate(
-    inputs: Inputs, settings: Settings, *, directory: Path | None = None, tied: TiedFrames | None = None
+    inputs: Inputs,
+    settings: Settings,
+    *,
+    directory: Path | None = None,
+    tied: TiedFrames | None = None,
+    stages: Stages | None = None,
 ) -> Result:
     """Take a project through the whole strip method.
 
     directory: the project file's directory, where grids named by the frames are looked for first.
     tied: frames of these inputs that have been tied already; those of other inputs are not used.
+    stages: what runs with other settings have made, and what they may take over from this one.
     Raises InputError when the settings or frames contradict each other or the control is left-handed.
     Raises GeometryError when a pair, a junction or the absolute orientation cannot be determined.
 
     Either error carries in ``findings`` what the data say against themselves.
     """
     ground = photo = None
+    stages = stages or Stages("pairs")
     try:
         require_runnable(inputs, settings)
         ground = tie_ground_frames(inputs, settings, directory, tied)
         require_whole(inputs, ground.control)
         # 1 interior orientation
         photo = orient_interior(inputs, settings)
-        result = _walk(inputs, settings, ground, photo)
+        result = _walk(inputs, settings, ground, photo, stages)
     except (InputError, GeometryError) as error:
-        error.findings = gate.of_failure(inputs, settings, directory, photo, ground)
+        error.findings = _of_failure(inputs, settings, directory, photo, ground, stages)
         raise
     except np.linalg.LinAlgError as error:
         msg = f"the data contradict themselves so much that an equation cannot be solved ({str(error).lower()})"
         unsolvable = GeometryError(msg, code="singular")
-        unsolvable.findings = gate.of_failure(inputs, settings, directory, photo, ground)
+        unsolvable.findings = _of_failure(inputs, settings, directory, photo, ground, stages)
         raise unsolvable from error
     return replace(result, findings=gate.of_result(result, directory))
 
 
-def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates) -> Result:
+def _of_failure(
+    inputs: Inputs,
+    settings: Settings,
+    directory: Path | None,
+    photo: PhotoCoordinates | None,
+    ground: GroundFrames | None,
+    stages: Stages,
+) -> tuple[Finding, ...]:
+    find = partial(gate.of_failure, inputs, settings, directory, photo, ground, stages)
+    return stages.once("failure", find, inputs, replace(settings, adjustment=""), photo is None, ground is None)
+
+
+def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages) -> Result:
     """Every stage takes what the stages before it found."""
     # 1 lens distortion, refraction
-    refined = correct(photo, inputs, settings, ground)
+    refined = correct(photo, inputs, settings, ground, stages)
     # 2-5 relative orientation, base direction and orientation chain, space intersection, strip formation
-    formed = form_strips(inputs, refined.observations, settings)
+    formed = form_strips(inputs, refined.observations, settings, stages)
 
     def on_the_ground(inputs: Inputs, before: Bundle | None = None) -> Result:
-        adjusted = _adjusted(inputs, settings, ground, refined.observations, formed, before)
+        adjusted = _adjusted(inputs, settings, ground, refined.observations, formed, stages, before)
         # 9 residuals, check points
         rows, differences = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
         return Result(
@@ -113,6 +133,7 @@ def _adjusted(
     ground: GroundFrames,
     observations: PhotoPoints,
     formed: Sequence[StripStage[Any]],
+    stages: Stages,
     before: Bundle | None,
 ) -> AdjustedStrips:
     """Bring formed strips to the ground and adjust them, each by itself or all in a bundle."""
@@ -120,11 +141,17 @@ def _adjusted(
     if settings.adjustment == "bundle" and inputs.models is None:
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
-        stages = cast("Sequence[FormedPhotos]", formed)
-        return adjust_block(inputs, settings, observations, control, ground, stages, before)
-    # 6-7 intermediate frame, absolute orientation
-    oriented = [orient_on_control(strip, control, ground.control, settings.absolute) for strip in formed]
-    screened = [reject_wrong_control(strip, settings) for strip in oriented]
+        of_photos = cast("Sequence[FormedPhotos]", formed)
+        return adjust_block(inputs, settings, observations, control, ground, of_photos, before)
+    # 6-7 intermediate frame, absolute orientation, wrong control
+    frames = tuple((frame.spec, frame.origin) for frame in (*ground.control, ground.output))
+    wanted = replace(settings, adjustment="")
+    screened = [
+        stages.once(
+            "control", partial(on_control, strip, control, ground.control, settings), strip, control, frames, wanted
+        )
+        for strip in formed
+    ]
     # 8 polynomials, or the strip's own covariance
     level = settings.covariance.level / max(len(screened), 1)  # all strips together keep it
     settings = replace(settings, covariance=replace(settings.covariance, level=level))

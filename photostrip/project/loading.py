@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from photostrip.formats.text.findings import Findings
     from photostrip.notes import Finding, Note
     from photostrip.pipeline import Result
+    from photostrip.pipeline.strips.forming import Stages
 
 __all__ = ["Project", "adjust_project", "load_project"]
 
@@ -104,12 +105,17 @@ class Project:
             raise
 
 
-def adjust_project(project: Project) -> Result:
-    """Adjust a project; what is refused has its place in the project file."""
+def adjust_project(project: Project, stages: Stages | None = None) -> Result:
+    """Adjust a project; what is refused has its place in the project file.
+
+    stages: what runs of it by other methods have made.
+    """
     from photostrip.pipeline import triangulate  # what only reads a project does without
 
     with project.places():
-        return triangulate(project.inputs, project.settings, directory=project.grid_folder, tied=project.tied)
+        return triangulate(
+            project.inputs, project.settings, directory=project.grid_folder, tied=project.tied, stages=stages
+        )
 
 
 def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:

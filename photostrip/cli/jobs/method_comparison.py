@@ -11,6 +11,7 @@ from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripEr
 from photostrip.formats.text.writing import write_text
 from photostrip.library.project import loaded_from
 from photostrip.pipeline import AUTO, METHODS
+from photostrip.pipeline.strips.forming import Stages
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
 from photostrip.result.methods import methods_document
@@ -46,10 +47,14 @@ def compare_methods(
             from photostrip.report.html import check_html, methods_html
 
             check_html()
+        stages = Stages("pairs", "strip", "control", "failure")
         for adjustment in (*METHODS, AUTO):
             waiting.at(f"adjusting: {adjustment}")
+            # of auto only the choice is asked
+            more = ["processing.cross_validation=false"] if adjustment == AUTO else []
+            wanted = [*assignments, f"processing.adjustment={adjustment}", *more]
             try:
-                result = loaded_from(project, [*assignments, f"processing.adjustment={adjustment}"]).run()
+                result = loaded_from(project, wanted, stages=stages).run()
             except (GeometryError, InputError) as error:
                 found[adjustment] = error
                 continue

@@ -177,10 +177,9 @@ def _with_components(block: BlockProblem, screened: ScreenedBundle, settings: Se
         done = snooping.screen_bundle(chosen, screened.selection, quiet)
     block = replace(block, problem=problem)
     final = snooping.screen_bundle(problem, screened.selection, settings.bundle, block.kept)
-    before = {(each.kind, each.row): each for each in screened.rejections}
-    log = tuple(each for each in screened.rejections if each not in final.rejections)
-    again = tuple(each for each in final.rejections if (each.kind, each.row) not in before)
-    return _Estimated(block, replace(final, rejections=(*log, *again), common=screened.common), found)
+    before = {(each.kind, each.row) for each in screened.rejections}
+    again = (each for each in final.rejections if (each.kind, each.row) not in before)
+    return _Estimated(block, replace(final, rejections=(*screened.rejections, *again), common=screened.common), found)
 
 
 def _bundle(

@@ -18,8 +18,7 @@ from photostrip.points import locate
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.triangulation.plausibility.control.control_strip import Rays, StripPoints
 from photostrip.triangulation.plausibility.photos import mosaic
-from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, refuse_unusable
-from photostrip.triangulation.relative_orientation.pairs import collect_pairs
+from photostrip.triangulation.relative_orientation.orientation import refuse_unusable
 from photostrip.triangulation.strip_formation.strip import form_from_pairs, mean_points, model_points
 
 if TYPE_CHECKING:
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.pipeline.inputs import Settings, Strip
+    from photostrip.pipeline.strips.forming import Stages
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -115,16 +115,16 @@ def _mean_direction(axes: Floats) -> Floats:
     return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-12), float)
 
 
-def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> EvidenceStrip | None:
+def form(
+    strip: Strip, observations: PhotoPoints, settings: Settings, stages: Stages | None = None
+) -> EvidenceStrip | None:
     """Form a strip as far as that goes, for evidence alone; None when a pair or a junction cannot be determined."""
     if len(strip.photos) < 2:
         return None  # a single photo of a block has no pairs
-    from photostrip.triangulation.gross_errors.pairs import screening  # a check forms no strips
+    from photostrip.pipeline.strips.photos import screened_pairs  # a check forms no strips
 
     try:
-        pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
-        first, converged = orient_unchecked(pairs)
-        screened = screening.screen_pairs(first, settings.relative, strip.median_sigma(observations), converged)
+        screened, _ = screened_pairs(strip, observations, settings.relative, stages)
         refuse_unusable(screened.orientation, screened.converged, strip.photos)
         scatter = screened.scatter.by_pair
         formed = form_from_pairs(screened.orientation, settings.formation, strip.photos, scatter)

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
     from photostrip.pipeline.results import Result
+    from photostrip.pipeline.strips.forming import Stages
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.independent_models.formation import FormedModels
 
@@ -119,10 +120,11 @@ def of_failure(
     directory: Path | None,
     photo: PhotoCoordinates | None,
     ground: GroundFrames | None,
+    stages: Stages,
 ) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment having failed.
 
-    photo, ground: what the run had found before it failed.
+    photo, ground, stages: what the run had found before it failed.
     Returns nothing when the evidence cannot be put together either.
     """
     try:
@@ -130,7 +132,7 @@ def of_failure(
             return _of_unadjusted_models(inputs, inputs.models, settings, directory)
         images = of_images(inputs, settings, photo)
         points = evidence.ideal(images.observations, images.cameras, settings)
-        formed = [evidence.form(strip, points, settings) for strip in images.strips]
+        formed = [evidence.form(strip, points, settings, stages) for strip in images.strips]
         frames = () if ground is None else _plain_frames(settings, ground.control)
         control = _given_control(inputs, directory, frames)
         tried = dict.fromkeys([strip.id for strip in images.strips], True)

@@ -173,6 +173,13 @@ def orient_on_control(
     return oriented
 
 
+def on_control(
+    stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> ScreenedStrip[Errors]:
+    """Lay a strip on that of its control which nothing contradicts."""
+    return reject_wrong_control(orient_on_control(stage, control, frames, settings.absolute), settings)
+
+
 def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) -> ScreenedStrip[Errors]:
     """Take out control that the strip and all other control contradict, and lay the strip on what is left.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.pipeline.choice import COVARIANCE, POLYNOMIAL, Deformation
 from photostrip.pipeline.inputs import AUTO
-from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control
+from photostrip.pipeline.strips.absolute import on_control
 from photostrip.pipeline.strips.choosing import choose
 from photostrip.triangulation.polynomial import correction as polynomial
 
@@ -32,8 +32,7 @@ def adjust(screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:
 def adjust_formed(
     stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
 ) -> StripResult:
-    oriented = orient_on_control(stage, control, frames, settings.absolute)
-    return adjust(reject_wrong_control(oriented, settings), settings)
+    return adjust(on_control(stage, control, frames, settings), settings)
 
 
 def _deformation(oriented: OrientedStrip[Errors], settings: Settings) -> Deformation:

@@ -31,9 +31,11 @@ if TYPE_CHECKING:
     from photostrip.pipeline.choice import Deformation
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
+    from photostrip.pipeline.strips.forming import Stages
     from photostrip.points import PhotoPoints
     from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+    from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 
     Oriented = OrientedStrip[strip_errors.StripErrors]
     WithControlScreened = ScreenedStrip[strip_errors.StripErrors]
@@ -251,15 +253,28 @@ class _Rays:
     photo: Numbers  # (m,): place of the photo in the strip
 
 
-def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> FormedPhotos:
-    """Orient the pairs of a strip and form it, without any control."""
+def screened_pairs(
+    strip: Strip, observations: PhotoPoints, settings: RelativeSettings, stages: Stages | None = None
+) -> tuple[screening.ScreenedPairs, Floats]:
+    """Orient pairs, those among them that cannot be used, without what is wrong in them; and their weights before."""
+
+    def make() -> tuple[screening.ScreenedPairs, Floats]:
+        pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+        pairs = pairs.without(overruling.touched(settings.drop, observations, pairs.rows))
+        first, converged = orient_unchecked(pairs)
+        screened = screening.screen_pairs(first, settings, strip.median_sigma(observations), converged)
+        kept = overruling.touched(settings.keep, observations, pairs.rows)
+        return overruling.restored(screened, pairs.weight, kept), pairs.weight
+
+    return make() if stages is None else stages.once("pairs", make, strip, observations, settings)
+
+
+def form_strip(
+    strip: Strip, observations: PhotoPoints, settings: Settings, stages: Stages | None = None
+) -> FormedPhotos:
+    """Form a strip from its pairs, without any control."""
     sigma = strip.median_sigma(observations)
-    pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
-    pairs = pairs.without(overruling.touched(settings.relative.drop, observations, pairs.rows))
-    first, converged = orient_unchecked(pairs)
-    screened = screening.screen_pairs(first, settings.relative, sigma, converged)
-    kept = overruling.touched(settings.relative.keep, observations, pairs.rows)
-    screened = overruling.restored(screened, pairs.weight, kept)
+    screened, weight = screened_pairs(strip, observations, settings.relative, stages)
     oriented, scatter = screened.orientation, screened.scatter.by_pair
     refuse_unusable(oriented, screened.converged, strip.photos)
     wrong: tuple[Rejection, ...] = ()
@@ -275,7 +290,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
             observations=observations,
             position=strip.positions(observations),
             sigma=scatter,
-            weight=pairs.weight,
+            weight=weight,
             stated=sigma,
             kept=overruling.rows(settings.relative.keep, observations),
         )

@@ -68,28 +68,53 @@ def _form(v: list[Floats], m: dict[tuple[int, int], Floats]) -> tuple[Floats, Fl
     return a * aa + b * bb + c * cc, form
 
 
-def search(residuals: Floats, matrix: Floats, target: Floats) -> list[Numbers]:
+def search(residuals: Floats, basis: Floats, target: Floats) -> list[Numbers]:
     """Find for each adjustment the smallest set whose removal brings the sum of squares below its target.
 
-    Empty when no set does it. ``target`` (k,) is the largest sum allowed after one to k points are gone, -inf where so
-    many may not go; k is three at most.
+    Empty when no set does it. Only those points are formed into sets that may stand in one that does.
+
+    residuals: (g, n), as of ``gains``.
+    basis: (g, n, u), orthonormal columns Q of the design, M = I - Q Q^T.
+    target: (k,), k <= 3: the largest sum allowed after one to k points are gone, -inf where so many may not go.
     """
-    total = (residuals**2).sum(axis=1)
-    found = [np.zeros(0, np.intp) for _ in range(len(residuals))]
-    todo = np.arange(len(residuals))
-    for k in range(1, len(target) + 1):
-        if not len(todo) or residuals.shape[1] < k:
-            break
-        v, m = residuals[todo], matrix[todo]
-        sets = subsets(residuals.shape[1], k) if k < LARGEST else _triples(v, m)
+    squares, (groups, n) = residuals**2, residuals.shape
+    order = np.argsort(-squares, axis=1, kind="stable")
+    excess = squares.sum(axis=1)[:, None] - target
+    count = _possible(np.take_along_axis(squares, order, axis=1), -np.sort(-(basis**2).sum(axis=2), axis=1), excess)
+    found, missing = [np.zeros(0, np.intp)] * groups, np.ones(groups, bool)
+    for k in range(1, min(len(target), n) + 1):
+        todo = np.flatnonzero(missing & (count[:, k - 1] >= k))
+        if not len(todo):
+            continue
+        places = np.sort(order[todo, : count[todo, k - 1].max()], axis=1)
+        v = np.take_along_axis(residuals[todo], places, axis=1)
+        q = np.take_along_axis(basis[todo], places[:, :, None], axis=1)
+        m = np.eye(places.shape[1]) - q @ q.transpose(0, 2, 1)
+        sets = subsets(places.shape[1], k) if k < LARGEST else _triples(v, m)
         gain = gains(v, m, sets)
         best = gain.argmax(axis=1)
         rows = np.arange(len(todo))
-        enough = total[todo] - gain[rows, best] <= target[k - 1]
+        enough = gain[rows, best] >= excess[todo, k - 1]
         for row in np.flatnonzero(enough):
-            found[todo[row]] = sets[best[row]] if sets.ndim == 2 else sets[row, best[row]]
-        todo = todo[~enough]
+            found[todo[row]] = places[row, sets[best[row]] if sets.ndim == 2 else sets[row, best[row]]]
+        missing[todo] = ~enough
     return found
+
+
+def _possible(squares: Floats, shares: Floats, excess: Floats) -> Numbers:
+    """How many of the largest squared residuals may stand in sets of one to k that gain as much as needed, (g, k).
+
+    With q the share of an observation in the elements, the smallest eigenvalue of M_KK is at least 1 - sum of q_K, so
+    that a set gains v_K^T v_K / (1 - sum of q_K) at most.
+
+    squares, shares: (g, n), each in descending order.
+    excess: (g, k), what the sets have to gain.
+    """
+    most = excess.shape[1]
+    before = np.cumsum(squares[:, :most], axis=1)[:, : squares.shape[1]] - squares[:, :most]
+    needed = np.maximum(1.0 - np.cumsum(shares[:, :most], axis=1), 0.0) * excess[:, : squares.shape[1]]
+    # the others of a set are the largest at best
+    return np.asarray((squares[:, :, None] >= (needed - before)[:, None]).sum(axis=1), np.intp)
 
 
 def _triples(residuals: Floats, matrix: Floats) -> Numbers:

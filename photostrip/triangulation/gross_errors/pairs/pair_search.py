@@ -12,7 +12,7 @@ Source: derived; the order of work is chosen here, see docs/sources.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 # of the principal distance: y parallaxes that scatter by more are no measurements of the same points
 LARGEST_SCATTER = 0.01
+# of what was taken out as the worst for each one more that goes at a time: the work grows with its logarithm
+OUT_TO_ONE_MORE = 8
 AT_ONCE = 64  # pairs, or points to decide on, for the sake of memory; it changes no result
 
 
@@ -76,7 +78,7 @@ def search(
     if not len(failed):
         scatter = ParallaxScatter.of(given, stated, spoiled)
         return PairSearch(orientation=given, removed=(), scatter=scatter, test=GlobalTest.of(scatter.by_pair))
-    part, part_test, log = given.take(failed), test.take(failed), _Log([], np.zeros(len(failed), bool))
+    part, part_test, log = given.take(failed), test.take(failed), _Log.of(len(failed))
     found = orient_robustly(part.pairs, part_test.sigma, deletion.LARGEST)
     robust = assess_pairs(found.elements, part.pairs, part.iterations)
     if start:
@@ -113,6 +115,11 @@ class _Log:
 
     removed: list[Rejection]
     lost: Flags  # (p,): pairs that were solved from nothing once, which is worth no second attempt within a search
+    worst: Numbers  # (p,): points that went because they were the worst
+
+    @classmethod
+    def of(cls, pairs: int) -> Self:
+        return cls([], np.zeros(pairs, bool), np.zeros(pairs, np.intp))
 
     def without_sets(
         self,
@@ -132,19 +139,21 @@ class _Log:
         for some in _alike(todo, count):
             number = int(count[some[0]])
             rows = np.flatnonzero(np.isin(pairs, some) & part.used).reshape(len(some), number)
-            residual, matrix = _studentised(part, jacobian, rows, test.sigma[some])
+            residual, basis = _studentised(part, jacobian, rows, test.sigma[some])
             left = number - np.arange(1, largest + 1)
             target = np.where(left >= MINIMUM_LEFT, test.limits(left), -np.inf)
-            found = deletion.search(residual, matrix, target)
+            found = deletion.search(residual, basis, target)
             total, limit = (residual**2).sum(axis=1), test.limits(np.array([number]))[0]
             for place, (pair, chosen) in enumerate(zip(some.tolist(), found, strict=True)):
                 gone = rows[place, chosen]
                 if len(gone):
                     self._remove(weight, gone, "deletion", float(total[place]), float(limit))
-                elif worst and number > MINIMUM_LEFT:
-                    row = rows[place, size[rows[place]].argmax()]
-                    if size[row] > most[pair]:
-                        self._remove(weight, np.array([row]), "residual", float(size[row]), float(most[pair]))
+                elif worst:
+                    most_at_once = min(1 + int(self.worst[pair]) // OUT_TO_ONE_MORE, max(number - MINIMUM_LEFT, 0))
+                    for row in rows[place, np.argsort(-size[rows[place]], kind="stable")[:most_at_once]].tolist():
+                        if size[row] > most[pair]:
+                            self._remove(weight, np.array([row]), "residual", float(size[row]), float(most[pair]))
+                            self.worst[pair] += 1
         changed = distinct(pairs[weight != part.pairs.weight])
         return orient_again(part, weight, changed, self.lost)
 
@@ -187,9 +196,9 @@ def _agreeing(part: Orientation, found: RobustElements) -> Orientation:
 
 
 def _studentised(part: Orientation, jacobian: Floats, rows: Numbers, sigma: Floats) -> tuple[Floats, Floats]:
-    """Residuals over sigma and M = I - J (J^T J)^-1 J^T of pairs with equal numbers of points, by rows (g, n)."""
+    """Residuals over sigma and orthonormal columns of the design of pairs with equal numbers of points, (g, n)."""
     root = np.sqrt(part.pairs.weight[rows]) / sigma[:, None]
     design = np.nan_to_num(np.moveaxis(jacobian[:, rows], 0, 2) * root[:, :, None], posinf=0.0, neginf=0.0)
     q, _ = np.linalg.qr(design)
-    matrix = np.eye(rows.shape[1]) - q @ q.transpose(0, 2, 1)
-    return (matrix @ np.nan_to_num(part.parallax[rows] * root)[:, :, None])[:, :, 0], matrix
+    parallax = np.nan_to_num(part.parallax[rows] * root)[:, :, None]
+    return (parallax - q @ (q.transpose(0, 2, 1) @ parallax))[:, :, 0], q

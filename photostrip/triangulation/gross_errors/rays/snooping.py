@@ -28,6 +28,7 @@ from photostrip.triangulation.bundle.quality.reliability import CONTROL, IMAGE
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
+from photostrip.triangulation.gross_errors.pairs.pair_search import OUT_TO_ONE_MORE
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
     SEVERAL_RAYS,
     Decision,
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 
-OUT_TO_ONE_MORE = 8
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 

@@ -76,6 +76,41 @@ def test_a_set_that_empties_a_parameter_gains_nothing() -> None:
     assert deletion.gains(np.zeros((1, 4)), matrix[None], np.array([[3]]))[0, 0] == -np.inf
 
 
+def adjusted(rng: np.random.Generator, n: int, wrong: int) -> tuple[Floats, Floats]:
+    """Residuals of one adjustment of n observations with five unknowns, and orthonormal columns of its design."""
+    basis = np.linalg.qr(rng.normal(size=(n, 5)))[0]
+    error = rng.normal(size=n)
+    error[rng.choice(n, wrong, replace=False)] += rng.normal(0, 15, wrong)
+    return (error - basis @ (basis.T @ error))[None], basis[None]
+
+
+@given(seed=st.integers(0, 10**6), n=st.integers(9, 24), wrong=st.integers(0, 4))
+def test_the_search_finds_the_best_of_all_sets(seed: int, n: int, wrong: int) -> None:
+    residual, basis = adjusted(np.random.default_rng(seed), n, wrong)
+    target = np.array([chi2_quantile(0.9995, n - 5 - k) if n - k >= 6 else -np.inf for k in (1, 2, 3)])
+    matrix = np.eye(n) - basis @ basis.transpose(0, 2, 1)
+    (found,) = deletion.search(residual, basis, target)
+    total = float((residual**2).sum())
+    for k in (1, 2, 3):
+        sets = deletion.subsets(n, k)
+        gain = deletion.gains(residual, matrix, sets)[0]
+        if total - gain.max() <= target[k - 1]:
+            assert found.tolist() == sets[gain.argmax()].tolist()
+            return
+    assert not len(found)
+
+
+@pytest.mark.parametrize(("wrong", "most"), [(2, 500), (200, 0)])
+def test_of_many_points_few_are_formed_into_sets(wrong: int, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All sets of two of 800 points are 319 600; none is formed where not even the largest residuals would do."""
+    residual, basis = adjusted(np.random.default_rng(8), 800, wrong)
+    formed, gains = list[int](), deletion.gains
+    monkeypatch.setattr(deletion, "gains", lambda v, m, sets: (formed.append(len(sets)), gains(v, m, sets))[1])
+    (found,) = deletion.search(residual, basis, np.array([chi2_quantile(0.9995, 795 - k) for k in (1, 2, 3)]))
+    assert len(found) == (2 if wrong == 2 else 0)
+    assert sum(formed) <= most
+
+
 # -------------------------------------------------------------------------------------------- printed results
 
 
@@ -220,6 +255,21 @@ def test_what_no_search_can_put_right_is_given_up(wrong: float, monkeypatch: pyt
 
 
 # --------------------------------------------------------------------------------------------- what can be seen
+
+
+def test_the_work_grows_with_the_logarithm_of_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More than half of the 120 points of one pair are wrong, so that the robust start is of no use."""
+    flown = level(8, 8, (20,) * 6)
+    rng = np.random.default_rng(9)
+    errors = np.zeros((8, 120))
+    errors[3] = np.where(rng.random(120) < 0.7, rng.normal(0.0, 5.0, 120), 0.0)
+    rounds, again = [], pair_search.orient_again
+    monkeypatch.setattr(pair_search, "orient_again", lambda *given: (rounds.append(1), again(*given))[1])
+    found = examined(spoiled(flown, errors))
+    gone = int((~found.orientation.used).sum())
+    assert found.masked.tolist() == [number == 3 for number in range(8)]
+    assert gone > 40
+    assert len(rounds) < gone / 2
 
 
 def test_redundancy_and_detectable_errors_of_standard_points_are_those_of_the_literature() -> None:
