@@ -12,10 +12,11 @@ import pytest
 from photostrip.errors import GeometryError
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import METHODS, Settings, triangulate
-from photostrip.pipeline.strips import absolute, forming, photos
+from photostrip.pipeline.strips import absolute, forming
 from photostrip.pipeline.strips.forming import Stages, alike
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
+from photostrip.triangulation.gross_errors.pairs import screening
 from tests.loops import nonempty
 from tests.results import spec
 
@@ -34,9 +35,14 @@ def count(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
     def counted(place: Any, name: str) -> None:  # noqa: ANN401 (a module)
         function = getattr(place, name)
-        monkeypatch.setattr(place, name, lambda *given: (found.update([name]), function(*given))[1])
 
-    counted(photos.screening, "screen_pairs")
+        def noted(*given: object) -> object:
+            found[name] += 1
+            return function(*given)
+
+        monkeypatch.setattr(place, name, noted)
+
+    counted(screening, "screen_pairs")
     counted(forming, "form_strip")
     counted(absolute, "reject_wrong_control")
     return found

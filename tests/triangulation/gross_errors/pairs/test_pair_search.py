@@ -105,7 +105,12 @@ def test_of_many_points_few_are_formed_into_sets(wrong: int, most: int, monkeypa
     """All sets of two of 800 points are 319 600; none is formed where not even the largest residuals would do."""
     residual, basis = adjusted(np.random.default_rng(8), 800, wrong)
     formed, gains = list[int](), deletion.gains
-    monkeypatch.setattr(deletion, "gains", lambda v, m, sets: (formed.append(len(sets)), gains(v, m, sets))[1])
+
+    def counted(residuals: Floats, matrix: Floats, sets: NDArray[np.intp]) -> Floats:
+        formed.append(len(sets))
+        return gains(residuals, matrix, sets)
+
+    monkeypatch.setattr(deletion, "gains", counted)
     (found,) = deletion.search(residual, basis, np.array([chi2_quantile(0.9995, 795 - k) for k in (1, 2, 3)]))
     assert len(found) == (2 if wrong == 2 else 0)
     assert sum(formed) <= most
@@ -263,8 +268,13 @@ def test_the_work_grows_with_the_logarithm_of_what_is_wrong(monkeypatch: pytest.
     rng = np.random.default_rng(9)
     errors = np.zeros((8, 120))
     errors[3] = np.where(rng.random(120) < 0.7, rng.normal(0.0, 5.0, 120), 0.0)
-    rounds, again = [], pair_search.orient_again
-    monkeypatch.setattr(pair_search, "orient_again", lambda *given: (rounds.append(1), again(*given))[1])
+    rounds, again = list[int](), orient_again
+
+    def counted(*given: Any) -> Orientation:  # noqa: ANN401 (as they are)
+        rounds.append(1)
+        return again(*given)
+
+    monkeypatch.setattr(pair_search, "orient_again", counted)
     found = examined(spoiled(flown, errors))
     gone = int((~found.orientation.used).sum())
     assert found.masked.tolist() == [number == 3 for number in range(8)]
