@@ -19,7 +19,7 @@ from photostrip.triangulation.bundle.common_errors import taken_up
 from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.correlations import Correlation, correlations
-from photostrip.triangulation.bundle.selection import LEAST_RAYS, restarted, selected, supported
+from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.rays import snooping
 
@@ -51,7 +51,7 @@ def adjust_block(
     """Adjust all strips of a project together.
 
     stages: strips of two photos or more, which give the start.
-    before: the same block with more control: this one starts from it, without the rays that it rejected.
+    before: the same block with more control: this one starts from it, without what it rejected.
     Raises GeometryError when a strip, a photo or the datum cannot be determined, by name.
     """
     known = known_of(inputs, control, ground)
@@ -61,7 +61,7 @@ def adjust_block(
         start = _start_from(before, observations, known.control)
     block = block_problem.build(inputs, settings, observations, control, ground, start)
     if before is not None:
-        block = _with_rays_of(before, block, len(observations))
+        block = _begin_from(before, block, len(observations))
     try:
         block = _refilled(block, control, ground.control)
         screened = snooping.screen_bundle(block.problem, block.begin, settings.bundle, block.kept)
@@ -93,14 +93,22 @@ def _start_from(before: Bundle, observations: PhotoPoints, control: ControlPoint
     return replace(before.start, centers=solution.centers + origin, rotations=solution.rotations, points=points)
 
 
-def _with_rays_of(before: Bundle, block: BlockProblem, measured: int) -> BlockProblem:
-    """Leave out the rays that an adjustment with more control rejected, but those of points that have none now."""
+def _begin_from(before: Bundle, block: BlockProblem, measured: int) -> BlockProblem:
+    """Begin without what an adjustment with more control rejected, but for rays of points that have none now."""
+    held, whole = before.screened.selection, before.block.problem
     inside = np.zeros(measured, bool)
-    inside[before.block.rows[before.screened.selection.images]] = True
+    inside[before.block.rows[held.images]] = True
+    used = np.ones((whole.points, 3), bool)
+    used[whole.control.point] = held.control
     lost = np.setdiff1d(before.block.problem.control.point, block.problem.control.point)
     left, again = inside[block.rows], np.isin(block.problem.images.point, lost)
     rows = left | again
-    begin = replace(block.begin, images=np.where(again, block.begin.images, left)[rows])
+    begin = Selection(
+        images=np.where(again, block.begin.images, left)[rows],
+        control=block.begin.control & used[block.problem.control.point],
+        positions=held.positions,
+        attitudes=held.attitudes,
+    )
     problem = replace(block.problem, images=block.problem.images.take(rows))
     return replace(block, problem=problem, begin=begin, kept=block.kept[rows], rows=block.rows[rows])
 
