@@ -32,7 +32,8 @@ from photostrip.pipeline.given_points import measured_control  # noqa: E402
 from photostrip.pipeline.image_coordinates import correct, orient_interior  # noqa: E402
 from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust  # noqa: E402
-from photostrip.pipeline.strips.forming import Stages, form_strips  # noqa: E402
+from photostrip.pipeline.strips.forming import form_strips  # noqa: E402
+from photostrip.pipeline.strips.stages import Stages  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Inputs, Result
     from photostrip.pipeline.frames import TiedFrames
-    from photostrip.pipeline.strips.forming import Stages
+    from photostrip.pipeline.strips.stages import Stages
 
 Document = dict[str, Any]
 

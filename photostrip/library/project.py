@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from photostrip.formats.text.source import Source
     from photostrip.pipeline import Result as Computed
-    from photostrip.pipeline.strips.forming import Stages
+    from photostrip.pipeline.strips.stages import Stages
     from photostrip.project.checks.check import Checked
     from photostrip.project.loading import Project as Loaded
 

@@ -20,7 +20,8 @@ from photostrip.pipeline.refusals import require_runnable, require_whole
 from photostrip.pipeline.results import AdjustedStrips, Result
 from photostrip.pipeline.strips.absolute import StripStage, on_control
 from photostrip.pipeline.strips.adjusting import adjust
-from photostrip.pipeline.strips.forming import Stages, form_strips
+from photostrip.pipeline.strips.forming import form_strips
+from photostrip.pipeline.strips.stages import Stages
 from photostrip.pipeline.unchecked_control import unchecked_control_notes
 
 if TYPE_CHECKING:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from photostrip.formats.text.findings import Findings
     from photostrip.notes import Finding, Note
     from photostrip.pipeline import Result
-    from photostrip.pipeline.strips.forming import Stages
+    from photostrip.pipeline.strips.stages import Stages
 
 __all__ = ["Project", "adjust_project", "load_project"]
 

@@ -12,7 +12,7 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.pipeline.frames import tie_ground_frames
 from photostrip.pipeline.image_coordinates import heights_of, orient_interior
-from photostrip.pipeline.strips.forming import Stages
+from photostrip.pipeline.strips.stages import Stages
 from photostrip.simulation import simulate
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 from tests.geodesy.frames import write_gtx

@@ -13,7 +13,7 @@ from photostrip.errors import GeometryError
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import METHODS, Settings, triangulate
 from photostrip.pipeline.strips import absolute, forming
-from photostrip.pipeline.strips.forming import Stages, alike
+from photostrip.pipeline.strips.stages import Stages, alike
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.triangulation.gross_errors.pairs import screening

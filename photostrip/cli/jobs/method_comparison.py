@@ -11,7 +11,7 @@ from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripEr
 from photostrip.formats.text.writing import write_text
 from photostrip.library.project import loaded_from
 from photostrip.pipeline import AUTO, METHODS
-from photostrip.pipeline.strips.forming import Stages
+from photostrip.pipeline.strips.stages import Stages
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
 from photostrip.result.methods import methods_document

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.pipeline.inputs import Settings, Strip
-    from photostrip.pipeline.strips.forming import Stages
+    from photostrip.pipeline.strips.stages import Stages
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip

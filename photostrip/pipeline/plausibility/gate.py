@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
     from photostrip.pipeline.results import Result
-    from photostrip.pipeline.strips.forming import Stages
+    from photostrip.pipeline.strips.stages import Stages
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.independent_models.formation import FormedModels
 

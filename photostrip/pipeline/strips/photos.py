@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.choice import Deformation
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-    from photostrip.pipeline.strips.forming import Stages
+    from photostrip.pipeline.strips.stages import Stages
     from photostrip.points import PhotoPoints
     from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
