@@ -170,7 +170,7 @@ def changes() -> dict[str, Callable[[], None]]:
 
 
 def put_to(text: str) -> None:
-    """Give a constant a value: ``control_fit.PLAN_REFITS=0``."""
+    """Give a constant a value: ``plan_fit.PLAN_REFITS=0``."""
     what, _, value = text.partition("=")
     for module, name, before in constants():
         if f"{module.rpartition('.')[2]}.{name}" == what:

@@ -44,7 +44,7 @@ from photostrip.pipeline.plausibility import gate  # noqa: E402
 from photostrip.pipeline.precision import photo_precision  # noqa: E402
 from photostrip.project.loading import load_project  # noqa: E402
 from photostrip.report.page import console  # noqa: E402
-from photostrip.report.sections.document import chosen_sections, title_of  # noqa: E402
+from photostrip.report.sections.accuracy_report import chosen_sections, title_of  # noqa: E402
 from photostrip.result.document import document_of  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, Points, Spec  # noqa: E402

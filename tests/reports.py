@@ -16,7 +16,7 @@ from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.report.page.text import to_markdown, to_text
-from photostrip.report.sections.document import sections_of, title_of
+from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import GrossError
 from tests.results import solved, spec

@@ -17,7 +17,7 @@ from photostrip.project.yaml.merging import override, path_of, read_tree
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from photostrip.project.yaml.document import Node
+    from photostrip.project.yaml.tree import Node
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photostrip.cli.stdout import Format
-from photostrip.report.sections.document import SectionName
+from photostrip.report.sections.accuracy_report import SectionName
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from photostrip.report.page.parts import Section
-    from photostrip.report.sections.document import SectionName
+    from photostrip.report.sections.accuracy_report import SectionName
 
     Document = dict[str, Any]
 
@@ -123,7 +123,7 @@ def report_text(
 
 def _report(document: Document, parts: Parts, width: int) -> tuple[str, tuple[Section, ...]]:
     """Return title and sections; the title stands over whole reports only."""
-    from photostrip.report.sections.document import chosen_sections, title_of
+    from photostrip.report.sections.accuracy_report import chosen_sections, title_of
 
     sections = chosen_sections(document, quiet=parts.quiet, everything=parts.verbose, names=parts.names, width=width)
     return "" if parts.quiet or parts.names else title_of(document), sections

@@ -175,7 +175,7 @@ class Result:
         """
         from photostrip.errors import faults_instead
         from photostrip.report.page import layout, text
-        from photostrip.report.sections.document import SectionName, chosen_sections, require_complete, title_of
+        from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, require_complete, title_of
 
         _require_form(form, get_args(ReportForm))
         if form == "json":
@@ -211,7 +211,7 @@ class Result:
         Raises InputError with every reason why nothing can be stated.
         """
         from photostrip.errors import faults_instead
-        from photostrip.result.statement.document import statement_document
+        from photostrip.result.statement.accuracy_statement import statement_document
 
         classes = None
         if profile is not None:

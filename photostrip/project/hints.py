@@ -12,7 +12,7 @@ from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
 from photostrip.project.conversion import certificate_of
 from photostrip.project.tables import Tables, alike, rays
-from photostrip.project.yaml.document import Node, key_path
+from photostrip.project.yaml.tree import Node, key_path
 from photostrip.triangulation.image_coordinates.certificate import POOR_FIT, Certificate
 
 if TYPE_CHECKING:

@@ -25,9 +25,9 @@ from photostrip.project.schema.ground import CameraPositions as CameraPositionsB
 from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
 from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.tables import Tables, check_tables, in_one_zone, read_tables
-from photostrip.project.yaml.document import NO_FILES, Node, at_own_key
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.references import check_references
+from photostrip.project.yaml.tree import NO_FILES, Node, at_own_key
 from photostrip.project.yaml.validation import valid_section
 
 if TYPE_CHECKING:

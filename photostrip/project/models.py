@@ -13,8 +13,8 @@ from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import listed
 from photostrip.pipeline import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
-from photostrip.project.yaml.document import Node, fault_at
 from photostrip.project.yaml.references import listed_photos
+from photostrip.project.yaml.tree import Node, fault_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from photostrip.camera import Camera
     from photostrip.formats.measured.measurements import Measurements
     from photostrip.project.schema.project_file import ProjectFile
-    from photostrip.project.yaml.document import Node
+    from photostrip.project.yaml.tree import Node
 
 PIXELS = "px"
 

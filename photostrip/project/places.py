@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import replace
-from photostrip.project.yaml.document import Node, steps
+from photostrip.project.yaml.tree import Node, steps
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

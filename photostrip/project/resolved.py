@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from photostrip.project.schema.project_file import ProjectFile
-    from photostrip.project.yaml.document import Node
+    from photostrip.project.yaml.tree import Node
 
 HEADER = (
     "# A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.\n"

@@ -22,8 +22,8 @@ from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, listed
 from photostrip.project.conversion import ground_columns
 from photostrip.project.models import ModelTables, model_tables, read_model_points
-from photostrip.project.yaml.document import Node, fault_at
 from photostrip.project.yaml.references import ListedPhoto, listed_photos, marks_of
+from photostrip.project.yaml.tree import Node, fault_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

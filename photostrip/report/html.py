@@ -20,7 +20,7 @@ from photostrip.report.page.links import link
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
 from photostrip.report.pictures.batch_map import batch_maps
 from photostrip.report.pictures.result.pictures import SECTIONS, pictures_of
-from photostrip.report.sections.document import named_sections, title_of
+from photostrip.report.sections.accuracy_report import named_sections, title_of
 from photostrip.visible import visible
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.formats.output.result_json import to_json
 from photostrip.formats.text import writing
-from photostrip.report.sections.document import SectionName, sections_of
+from photostrip.report.sections.accuracy_report import SectionName, sections_of
 from photostrip.report.sections.overview import MOST_LINES
 from tests.results import spec, write_project
 from tests.source_tree import ROOT

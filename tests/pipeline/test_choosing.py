@@ -13,7 +13,7 @@ from photostrip.pipeline import AUTO, METHODS, Result, triangulate
 from photostrip.pipeline.choice import POLYNOMIAL, Witness, method_of
 from photostrip.pipeline.strips import choosing
 from photostrip.report.page.text import to_text
-from photostrip.report.sections.document import sections_of
+from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from photostrip.triangulation.covariance_adjustment.settings import BETTER

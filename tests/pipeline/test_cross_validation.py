@@ -13,7 +13,7 @@ from photostrip.pipeline import Inputs, Settings
 from photostrip.pipeline.cross_validation import FOLDS
 from photostrip.pipeline.strips import forming
 from photostrip.pipeline.strips.photos import form_strip
-from photostrip.report.sections.document import sections_of
+from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.verdict import GOOD, LOOK, UNVERIFIED
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Models

@@ -24,7 +24,7 @@ from photostrip.report.pictures.ground.plan import LONGEST
 from photostrip.report.pictures.ground.plan_view import plan_of
 from photostrip.report.pictures.result.pictures import picture_files, pictures_of
 from photostrip.report.pictures.svg import Axis, nice
-from photostrip.report.sections.document import sections_of
+from photostrip.report.sections.accuracy_report import sections_of
 from tests.loops import nonempty
 from tests.reports import saved
 from tests.results import FRAMES, case, spec, write_project

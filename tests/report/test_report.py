@@ -16,7 +16,7 @@ from photostrip.formats.output.result_json import to_json
 from photostrip.report.page.layout import cells
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
 from photostrip.report.page.text import to_markdown, to_text
-from photostrip.report.sections.document import chosen_sections, require_complete, sections_of, title_of
+from photostrip.report.sections.accuracy_report import chosen_sections, require_complete, sections_of, title_of
 from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN
 from photostrip.result.records import Records
 from tests.loops import nonempty

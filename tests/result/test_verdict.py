@@ -10,7 +10,7 @@ import pytest
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.report.page.text import to_text
-from photostrip.report.sections.document import chosen_sections
+from photostrip.report.sections.accuracy_report import chosen_sections
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, verdict_of
 from photostrip.simulation.simulation import simulate

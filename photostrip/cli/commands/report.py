@@ -38,7 +38,7 @@ def report(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.errors import EXIT_DONE, faults_instead
     from photostrip.formats.output.result_json import read_result
     from photostrip.formats.text.writing import write_files, write_text
-    from photostrip.report.sections.document import require_complete
+    from photostrip.report.sections.accuracy_report import require_complete
     from photostrip.result.verdict import exit_code
 
     page = output is not None and form is None and output.suffix.lower() == HTML

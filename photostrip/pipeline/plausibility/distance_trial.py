@@ -15,7 +15,7 @@ from photostrip.arrays import median
 from photostrip.frozen import NamedTuple, replace
 from photostrip.pipeline.plausibility import evidence
 from photostrip.triangulation.plausibility import found
-from photostrip.triangulation.plausibility.control import control_heights
+from photostrip.triangulation.plausibility.control import wrong_heights
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.plausibility.control.control_heights import HeightStretch
+    from photostrip.triangulation.plausibility.control.wrong_heights import HeightStretch
     from photostrip.triangulation.plausibility.finding import Evidence
 
     Compare = Callable[[EvidenceStrip], HeightStretch | None]
@@ -78,7 +78,7 @@ def find_wrong_distance(
         return []
     # of a badly wrong distance, most control may have been dropped
     first = as_given or compare(formed) or compare(formed.whole)
-    if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
+    if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < wrong_heights.LEAST_SCALE_ERROR:
         return []
     sigma0, stated = _middle_sigma0(formed), formed.strip.median_sigma(observations)
     no_bend = first.misfit > len(formed.strip.photos) ** BEND_POWER
@@ -156,13 +156,13 @@ def other_distance(
 ) -> Finding:
     """Name the principal distance that would fit: a small difference (P107) or a wrong one (P105)."""
     given = camera.principal_distance
-    code = "P107" if abs(would_fit / given - 1.0) < control_heights.LEAST_SCALE_ERROR else "P105"
+    code = "P107" if abs(would_fit / given - 1.0) < wrong_heights.LEAST_SCALE_ERROR else "P105"
     evidence_ = numbers | {"principal_distance_mm": given, "would_fit_mm": would_fit}
     return found(code, message, fix, evidence_, strips=strips, key=f"cameras.{camera.name}.principal_distance")
 
 
 def _finding(strip: Strip, ratio: float, how: str, numbers: Evidence) -> list[Finding]:
-    if abs(ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
+    if abs(ratio - 1.0) < wrong_heights.LEAST_SCALE_ERROR:
         return []
     given = strip.camera.principal_distance
     message = f"strip {strip.id} {how} with a principal distance of {given * ratio:.1f} mm; {given:g} mm is given"

@@ -16,7 +16,7 @@ from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.points import locate
 from photostrip.triangulation.image_coordinates import corrections
-from photostrip.triangulation.plausibility.control.control_strip import Rays, StripPoints
+from photostrip.triangulation.plausibility.control.straightening import Rays, StripPoints
 from photostrip.triangulation.plausibility.photos import mosaic
 from photostrip.triangulation.relative_orientation.orientation import refuse_unusable
 from photostrip.triangulation.strip_formation.strip import form_from_pairs, mean_points, model_points

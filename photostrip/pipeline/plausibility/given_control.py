@@ -9,10 +9,10 @@ from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.crs import area_of_use
 from photostrip.pipeline.plausibility import distance_trial, evidence
 from photostrip.triangulation.plausibility.control import (
-    control_heights,
-    control_place,
-    control_reading,
     given_points,
+    wrong_heights,
+    wrong_place,
+    wrong_readings,
 )
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
     from photostrip.points import ControlPoints
-    from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, StripPoints
+    from photostrip.triangulation.plausibility.control.straightening import GivenPoints, StripPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class GivenControl:
         """Find out where given points lie on the Earth, list by list."""
         control = inputs.control
         places = [
-            control_place.find_wrong_place(
+            wrong_place.find_wrong_place(
                 frame,
                 area_of_use(inputs.frames[number], directory=directory),
                 control.enu[(control.frame == number) & control.use[:, 0]],
@@ -61,19 +61,19 @@ class GivenControl:
             axes_are_right=sure.pop() if len(sure) == 1 else None,
         )
 
-    def compared(self, rows: Numbers, on_strip: StripPoints) -> control_reading.Reading:
+    def compared(self, rows: Numbers, on_strip: StripPoints) -> wrong_readings.Reading:
         """Compare the given points of some rows with the same points in a strip."""
         points = self.points.take(rows)
         given = given_points.level(points, self.frames, as_written=self.as_written)
         if given is None:
-            return control_reading.Reading([])
+            return wrong_readings.Reading([])
 
         def exchanged() -> GivenPoints | None:
             order = [1, 0, 2]
             other = replace(points, enu=points.enu[:, order], use=points.use[:, order])
             return given_points.level(other, self.frames)
 
-        return control_reading.find_wrong_readings(
+        return wrong_readings.find_wrong_readings(
             given, on_strip, axes_are_right=self.axes_are_right, exchanged=exchanged
         )
 
@@ -98,7 +98,7 @@ def by_strip(
         if strip.id in tried and not any(finding.is_error for finding in of_strip):
             whole = readings[0].heights if len(readings) == 1 and not control.as_written else None
             # where the distance is wrong, single points prove nothing
-            stretch = control_heights.stretch_of(whole)
+            stretch = wrong_heights.stretch_of(whole)
             of_strip = _of_distance(strip, each, stretch, images, control, stretched=tried[strip.id]) or of_strip
         findings += of_strip
     return findings
@@ -106,7 +106,7 @@ def by_strip(
 
 def _of_strip(
     strip: Strip, formed: EvidenceStrip | None, images: ImageEvidence, control: GivenControl
-) -> list[control_reading.Reading]:
+) -> list[wrong_readings.Reading]:
     if formed is None:
         held = evidence.mosaic_points(strip, images.observations, control.points, images.steps)
         return [] if held is None else [control.compared(*held)]
@@ -117,7 +117,7 @@ def _of_strip(
 def _of_distance(
     strip: Strip,
     formed: EvidenceStrip | None,
-    stretch: control_heights.HeightStretch | None,
+    stretch: wrong_heights.HeightStretch | None,
     images: ImageEvidence,
     control: GivenControl,
     *,
@@ -135,7 +135,7 @@ def _of_distance(
 
 def _compared_in_height(
     formed: EvidenceStrip, images: ImageEvidence, control: GivenControl
-) -> control_heights.HeightStretch | None:
+) -> wrong_heights.HeightStretch | None:
     rows, on_strip = evidence.strip_points(formed, images.observations, control.points, images.steps)
     given = given_points.level(control.points.take(rows), control.frames)
-    return None if given is None else control_heights.height_stretch(given, on_strip)
+    return None if given is None else wrong_heights.height_stretch(given, on_strip)

@@ -11,7 +11,7 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.strips.models import form_models
-from photostrip.triangulation.plausibility.control.control_strip import StripPoints
+from photostrip.triangulation.plausibility.control.straightening import StripPoints
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -17,8 +17,8 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.pipeline.given_points import rejected_control, rows_of_given
 from photostrip.points import locate
 from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
-from photostrip.triangulation.plausibility.control import control_slips, given_points
-from photostrip.triangulation.plausibility.control.control_fit import ODD_PROBABILITY
+from photostrip.triangulation.plausibility.control import given_points, point_slips
+from photostrip.triangulation.plausibility.control.plan_fit import ODD_PROBABILITY
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -50,7 +50,7 @@ class Predicted:
 
     def spread(self, row: int, axis: int) -> float:
         """Give the standard deviation of a difference, larger where the others are predicted worse than by theirs."""
-        columns = [2] if axis == control_slips.HEIGHT else [0, 1]
+        columns = [2] if axis == point_slips.HEIGHT else [0, 1]
         ratio = np.abs(np.delete(self.off, row, axis=0) / np.delete(self.sigma, row, axis=0))[:, columns]
         known = ratio[np.isfinite(ratio)]
         excess = max(SIGMA_FROM_MEDIAN * median(known), 1.0) if len(known) else 1.0
@@ -161,7 +161,7 @@ def _confirmed(finding: Finding, row: int, predicted: Predicted, control: GivenC
         return
     found = _slip(row, axis, finding.strips[0], predicted, control)
     if found is not None:
-        doubt = control_slips.DOUBT if control_slips.DOUBT in finding.message else ""
+        doubt = point_slips.DOUBT if point_slips.DOUBT in finding.message else ""
         yield replace(found, message=f"{found.message}{doubt}")
 
 
@@ -172,6 +172,6 @@ def _slip(row: int, axis: int, strip: str, predicted: Predicted, control: GivenC
         return None
     spread, off = predicted.spread(row, axis), float(predicted.off[row, axis])
     frame = control.frames[int(control.points.frame[row])]
-    if frame.kind == "projected" and axis != control_slips.HEIGHT:  # by map coordinates: a map has a scale of its own
+    if frame.kind == "projected" and axis != point_slips.HEIGHT:  # by map coordinates: a map has a scale of its own
         off *= float(given.steps.unit[0, axis]) / frame.plan_factor
-    return control_slips.slip_in(given, 0, axis, off, (spread, LIMIT * spread), strip)
+    return point_slips.slip_in(given, 0, axis, off, (spread, LIMIT * spread), strip)

@@ -31,7 +31,7 @@ from photostrip.project.checks.models import (
 )
 from photostrip.project.checks.table_rows import gaps_of, observations_used, table_rows
 from photostrip.project.loading import Project, load_project
-from photostrip.project.yaml.document import fault_at
+from photostrip.project.yaml.tree import fault_at
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.units import MILLIMETRES
 

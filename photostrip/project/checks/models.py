@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import distinct
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.project.yaml.document import fault_at, key_path
+from photostrip.project.yaml.tree import fault_at, key_path
 from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from photostrip.project.schema.sections import After, Rule, Section, key, wrong
 from photostrip.project.schema.values import Positive, Range, Triple, Words, bounded
 from photostrip.project.simulation import SimulatedCamera
 from photostrip.project.terrestrial.ranges import IMAGE_SIGMA_UM
-from photostrip.project.yaml.document import COMMAND_LINE, Node, Place
 from photostrip.project.yaml.reading import Reading
+from photostrip.project.yaml.tree import COMMAND_LINE, Node, Place
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

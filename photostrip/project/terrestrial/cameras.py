@@ -16,7 +16,7 @@ from photostrip.project.yaml.validation import checked
 from photostrip.terrestrial.frame import Phototheodolite
 
 if TYPE_CHECKING:
-    from photostrip.project.yaml.document import Node
+    from photostrip.project.yaml.tree import Node
 
 OWN_LIST = "phototheodolites.yaml"
 SCHEMA_NUMBER = "1"

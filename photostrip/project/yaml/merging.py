@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import shown
 from photostrip.frozen import replace
-from photostrip.project.yaml.document import NO_FILES, OVERRIDE, Node, Path, Place, at_key, fault_at, place_of, steps
 from photostrip.project.yaml.parsing import parse, read_document
+from photostrip.project.yaml.tree import NO_FILES, OVERRIDE, Node, Path, Place, at_key, fault_at, place_of, steps
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,7 +16,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import BYTE_ORDER_MARK, MEGABYTE, decode, read_bytes
 from photostrip.formats.text.numbers import shown
 from photostrip.notes import Note
-from photostrip.project.yaml.document import Node, Place, type_names
+from photostrip.project.yaml.tree import Node, Place, type_names
 
 if TYPE_CHECKING:
     from photostrip.formats.text.findings import Findings

@@ -10,8 +10,8 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.frozen import replace
 from photostrip.project.schema.sections import Section
-from photostrip.project.yaml.document import Node, Path, at_own_key, fault_at
 from photostrip.project.yaml.merging import override, path_of, read_tree, where_named
+from photostrip.project.yaml.tree import Node, Path, at_own_key, fault_at
 from photostrip.project.yaml.validation import checked
 
 if TYPE_CHECKING:

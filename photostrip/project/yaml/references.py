@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.frozen import dataclass
-from photostrip.project.yaml.document import NO_FILES, Node, Path, fault_at
+from photostrip.project.yaml.tree import NO_FILES, Node, Path, fault_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from photostrip.errors import InputError
 from photostrip.project.schema.sections import Problem, Section, bare, read_section, types
-from photostrip.project.yaml.document import Node, Path, fault_at, key_path
+from photostrip.project.yaml.tree import Node, Path, fault_at, key_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

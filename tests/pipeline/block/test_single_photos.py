@@ -13,7 +13,7 @@ from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import Inputs, Strip, triangulate
 from photostrip.report.html import to_html
-from photostrip.report.sections.document import sections_of
+from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
 from photostrip.result.trace.trace import trace_of
 from photostrip.simulation import Control, Flight, Ground, Simulation, Spec

@@ -14,7 +14,7 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, StripResult, triangulate
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.models import form_models, link_strip
-from photostrip.report.sections.document import sections_of
+from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
 from photostrip.triangulation.gross_errors.control import strip_at_control

@@ -19,8 +19,8 @@ from tests.pipeline.blocks import orientations, positions, with_control
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
     from photostrip.simulation import Simulation
-    from photostrip.triangulation.plausibility.control.control_reading import Reading
-    from photostrip.triangulation.plausibility.control.control_strip import StripPoints
+    from photostrip.triangulation.plausibility.control.straightening import StripPoints
+    from photostrip.triangulation.plausibility.control.wrong_readings import Reading
 
 BLOCK = Spec(
     seed=4, flight=Flight(photos=6, strips=4, side_lap_percent=40.0), control=Control(per_band=1, check=4), gnss=Gnss()

@@ -12,7 +12,7 @@ import pytest
 
 from photostrip.report.page.console import has_colours, page_width, print_report, speaks_unicode
 from photostrip.report.page.text import to_text
-from photostrip.report.sections.document import sections_of, title_of
+from photostrip.report.sections.accuracy_report import sections_of, title_of
 from tests.reports import saved
 from tests.source_tree import ROOT
 

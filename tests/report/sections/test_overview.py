@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.report.page.parts import Facts, Section, Table, Words
 from photostrip.report.page.text import to_text
-from photostrip.report.sections.document import SectionName, chosen_sections, sections_of, title_of
+from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, sections_of, title_of
 from photostrip.report.sections.overview import MOST_LINES, overview
 from tests.loops import nonempty
 from tests.reports import saved

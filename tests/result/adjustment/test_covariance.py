@@ -10,7 +10,7 @@ import pytest
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.report.page.text import to_text
-from photostrip.report.sections.document import sections_of, title_of
+from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import GrossError
 from photostrip.statistics import gamma_cdf

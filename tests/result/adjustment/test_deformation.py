@@ -11,7 +11,7 @@ from scipy import stats
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
-from photostrip.report.sections.document import sections_of
+from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.adjustment.deformation import model_deformations
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Points, Spec, Terrain, simulate

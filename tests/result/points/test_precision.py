@@ -14,7 +14,7 @@ from photostrip.formats.output.result_files import result_files
 from photostrip.geometry.rotation import SYSTEMS, angle_rates, angles, from_angles, from_vector
 from photostrip.pipeline import Precision, Settings
 from photostrip.report.page.text import to_text
-from photostrip.report.sections.document import sections_of, title_of
+from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.result.document import document_of
 from photostrip.result.points.precision import ellipses
 from tests.loops import nonempty

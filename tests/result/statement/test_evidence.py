@@ -11,8 +11,8 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.result.points.given import differences
+from photostrip.result.statement.accuracy_statement import exit_code, statement_document
 from photostrip.result.statement.certificate import result_hash
-from photostrip.result.statement.document import exit_code, statement_document
 from photostrip.result.statement.evidence import statement_of
 from photostrip.result.statement.stating import stated
 from tests.results import Case, case

@@ -15,9 +15,9 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec, Terrain
 from photostrip.triangulation.plausibility.control import layout
-from photostrip.triangulation.plausibility.control.control_fit import fit_robustly, fit_similarity, upright
-from photostrip.triangulation.plausibility.control.control_strip import Rays
 from photostrip.triangulation.plausibility.control.digits import slip
+from photostrip.triangulation.plausibility.control.plan_fit import fit_robustly, fit_similarity, upright
+from photostrip.triangulation.plausibility.control.straightening import Rays
 from photostrip.triangulation.plausibility.photos import flight, flight_order, rotations
 
 if TYPE_CHECKING:

@@ -113,7 +113,7 @@ class Delivery:
 
 def _by_option(fault: Fault, names: dict[str, str]) -> Fault:
     """Name the option in place of ``--set`` and the key that it stands for."""
-    from photostrip.project.yaml.document import COMMAND_LINE
+    from photostrip.project.yaml.tree import COMMAND_LINE
 
     key = fault.key.replace('"', "")
     found = [name for each, name in names.items() if key and (key.startswith(each) or each.startswith(f"{key}."))]

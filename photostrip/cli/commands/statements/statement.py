@@ -56,7 +56,7 @@ def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.errors import faults_instead
     from photostrip.formats.output.result_json import read_result
     from photostrip.project.profiles.classes import load_classes
-    from photostrip.result.statement.document import exit_code, statement_document
+    from photostrip.result.statement.accuracy_statement import exit_code, statement_document
 
     if require and profile is None:
         raise typer.BadParameter("a class is one of a profile: give --profile as well", param_hint="--require")

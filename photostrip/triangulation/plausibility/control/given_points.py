@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import column_medians, distinct, median
 from photostrip.errors import GeometryError, InputError
-from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, WrittenAxes
+from photostrip.triangulation.plausibility.control.straightening import GivenPoints, WrittenAxes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -12,7 +12,7 @@ import numpy as np
 
 from photostrip.arrays import median
 from photostrip.frozen import NamedTuple, dataclass
-from photostrip.triangulation.plausibility.control.control_strip import LEAST_REDUNDANCY, fit_simplest
+from photostrip.triangulation.plausibility.control.straightening import LEAST_REDUNDANCY, fit_simplest
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:

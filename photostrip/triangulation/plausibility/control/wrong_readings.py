@@ -1,8 +1,8 @@
 """What given coordinates say against themselves, compared with a strip whose own coordinates are known.
 
-The strip is laid on its control (``control_fit``) as it is and as a mirror image, then its bending is taken out
-(``control_strip``); what is left says which list (``control_lists``), which kind of heights
-(``control_heights``) and which point (``control_slips``) does not go with the others. Points are tested by what
+The strip is laid on its control (``plan_fit``) as it is and as a mirror image, then its bending is taken out
+(``straightening``); what is left says which list (``foreign_lists``), which kind of heights
+(``wrong_heights``) and which point (``point_slips``) does not go with the others. Points are tested by what
 the others predict, check points too, but no check point ever takes part in a fit.
 """
 
@@ -14,15 +14,15 @@ import numpy as np
 
 from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.triangulation.plausibility.control import control_heights, control_lists, control_slips
-from photostrip.triangulation.plausibility.control.control_fit import (
+from photostrip.triangulation.plausibility.control import foreign_lists, point_slips, wrong_heights
+from photostrip.triangulation.plausibility.control.plan_fit import (
     LEAST_POINTS,
     PlanSimilarity,
     fit_similarity,
     upright,
 )
-from photostrip.triangulation.plausibility.control.control_slips import Misclosures
-from photostrip.triangulation.plausibility.control.control_strip import (
+from photostrip.triangulation.plausibility.control.point_slips import Misclosures
+from photostrip.triangulation.plausibility.control.straightening import (
     GivenPoints,
     LevelStrip,
     StripPoints,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags
     from photostrip.notes import Finding
-    from photostrip.triangulation.plausibility.control.control_heights import HeightComparison
+    from photostrip.triangulation.plausibility.control.wrong_heights import HeightComparison
     from photostrip.triangulation.plausibility.finding import Evidence
 
     Complex = NDArray[np.complex128]
@@ -95,7 +95,7 @@ def find_wrong_readings(
     level = turn_level(
         given, LevelStrip(w=w, z=s[:, 2], similarity=best, turn=turn, depth=on_strip.depth), on_strip.floor[1], in_fit
     )
-    wrong_lists, lists = control_lists.find_foreign_lists(given, on_strip, level, in_fit)
+    wrong_lists, lists = foreign_lists.find_foreign_lists(given, on_strip, level, in_fit)
     findings += lists
     if wrong_lists:
         in_fit = in_fit & ~np.isin(given.group, wrong_lists)
@@ -105,14 +105,14 @@ def find_wrong_readings(
         level = replace(level, similarity=again)
     fitted = straighten(given, level, on_strip.floor, in_fit)
     consistent = ~np.isin(given.group, wrong_lists)
-    heights = control_heights.compare_heights(given, fitted, consistent)
+    heights = wrong_heights.compare_heights(given, fitted, consistent)
     if heights is None:
         left = Misclosures(fitted.plan, height=None, usable=np.zeros(len(consistent), bool), consistent=consistent)
-        return Reading([*findings, *control_slips.find_plan_slips(given, on_strip, fitted, left)])
+        return Reading([*findings, *point_slips.find_plan_slips(given, on_strip, fitted, left)])
     left = Misclosures(plan=fitted.plan, height=heights.as_given, usable=heights.usable, consistent=consistent)
-    findings += control_slips.find_plan_slips(given, on_strip, fitted, left)
-    whole = list(control_heights.find_wrong_heights(given, on_strip, heights, fitted.floor[1]))
-    return Reading(findings + (whole or list(control_slips.find_height_slips(given, on_strip, fitted, left))), heights)
+    findings += point_slips.find_plan_slips(given, on_strip, fitted, left)
+    whole = list(wrong_heights.find_wrong_heights(given, on_strip, heights, fitted.floor[1]))
+    return Reading(findings + (whole or list(point_slips.find_height_slips(given, on_strip, fitted, left))), heights)
 
 
 def _mirror(

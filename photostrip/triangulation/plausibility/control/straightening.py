@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.frozen import NamedTuple, dataclass, replace
-from photostrip.triangulation.plausibility.control.control_fit import (
+from photostrip.triangulation.plausibility.control.plan_fit import (
     LEAST_POINTS,
     TINY,
     PlanSimilarity,

@@ -8,8 +8,8 @@ import numpy as np
 
 from photostrip.arrays import median
 from photostrip.frozen import replace
-from photostrip.triangulation.plausibility.control.control_fit import PlanSimilarity, fit_similarity
-from photostrip.triangulation.plausibility.control.control_strip import (
+from photostrip.triangulation.plausibility.control.plan_fit import PlanSimilarity, fit_similarity
+from photostrip.triangulation.plausibility.control.straightening import (
     FEET_TOLERANCE,
     FOOT,
     KINDS_OF_FEET,

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats
     from photostrip.notes import Finding
-    from photostrip.triangulation.plausibility.control.control_fit import RobustFit
-    from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, StraightenedStrip, StripPoints
+    from photostrip.triangulation.plausibility.control.plan_fit import RobustFit
+    from photostrip.triangulation.plausibility.control.straightening import GivenPoints, StraightenedStrip, StripPoints
     from photostrip.triangulation.plausibility.finding import Evidence
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from photostrip.arrays import column_medians, median
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import NamedTuple
-from photostrip.triangulation.plausibility.control.control_strip import FOOT, KINDS_OF_FEET
+from photostrip.triangulation.plausibility.control.straightening import FOOT, KINDS_OF_FEET
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:

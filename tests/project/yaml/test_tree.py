@@ -7,8 +7,8 @@ import yaml
 
 from photostrip.formats.text.findings import Findings
 from photostrip.project.yaml import parsing
-from photostrip.project.yaml.document import Node, Place, fault_at, key_path
 from photostrip.project.yaml.parsing import parse
+from photostrip.project.yaml.tree import Node, Place, fault_at, key_path
 
 LOADERS = [pytest.param(yaml.BaseLoader, id="python"), pytest.param(parsing.LOADER, id="c")]
 TEXT = """\

@@ -11,7 +11,7 @@ from photostrip.arrays import distinct, median
 from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.statistics import t_quantile
-from photostrip.triangulation.plausibility.control.control_fit import (
+from photostrip.triangulation.plausibility.control.plan_fit import (
     KEPT_SIGMAS,
     LEAST_POINTS,
     RobustFit,
@@ -19,7 +19,7 @@ from photostrip.triangulation.plausibility.control.control_fit import (
     fit_similarity,
     upright,
 )
-from photostrip.triangulation.plausibility.control.control_strip import (
+from photostrip.triangulation.plausibility.control.straightening import (
     FEET_TOLERANCE,
     FOOT,
     LEAST_REDUNDANCY,
