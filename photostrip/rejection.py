@@ -5,6 +5,9 @@ from __future__ import annotations
 from photostrip.frozen import dataclass
 
 NAN = float("nan")
+UNCONTROLLED = 0.01  # redundancy number below which an observation cannot be tested
+WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
+"""What was found at a point: its wrong rays; two rays that contradict each other; several of which any may be wrong."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import replace
 from photostrip.pipeline.common_points import join_strips
-from photostrip.pipeline.cross_validation import cross_validate
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
 from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
@@ -125,6 +124,8 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     # 10 what the result says of control that it has not seen
     if not settings.cross_validation:
         return result
+    from photostrip.pipeline.cross_validation import cross_validate
+
     return replace(result, folds=cross_validate(result, partial(on_the_ground, before=result.bundle)))
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output import json_encoder
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
-from photostrip.result.reading import faults_of, located
 from photostrip.result.records import Records
 from photostrip.visible import visible_json
 
@@ -122,6 +121,8 @@ def checked(document: Any, file: str) -> Document:  # noqa: ANN401 (any JSON)
             expected=str(SCHEMA),
             fix="run the project again with this version of photostrip",
         )
+    from photostrip.result.reading import faults_of, located
+
     try:
         faults = faults_of(document, file)
     except RecursionError:

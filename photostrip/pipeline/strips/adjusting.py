@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from photostrip.pipeline.choice import COVARIANCE, POLYNOMIAL, Deformation
 from photostrip.pipeline.inputs import AUTO
 from photostrip.pipeline.strips.absolute import on_control
-from photostrip.pipeline.strips.choosing import choose
 from photostrip.triangulation.polynomial import correction as polynomial
 
 if TYPE_CHECKING:
@@ -42,6 +41,8 @@ def _deformation(oriented: OrientedStrip[Errors], settings: Settings) -> Deforma
     covariance = oriented.stage.by_covariance(oriented, settings) if asked in {COVARIANCE, AUTO} else None
     if fitted is None or covariance is None:
         return Deformation(fitted, covariance)
+    from photostrip.pipeline.strips.choosing import choose
+
     choice = choose(oriented, fitted, covariance)
     return Deformation(fitted, covariance if choice.taken == COVARIANCE else None, choice)
 

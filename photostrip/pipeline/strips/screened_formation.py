@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.arrays import distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, replace
-from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS
+from photostrip.rejection import SEVERAL_RAYS
 from photostrip.triangulation.relative_orientation.orientation import orient_again
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.strip_formation import non_neighbours

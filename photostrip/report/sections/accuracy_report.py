@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 from photostrip.errors import faults_instead
 from photostrip.report.page.layout import USUAL
 from photostrip.report.page.parts import Document, Section, Words
-from photostrip.report.sections.bundle import bundle_sections
 from photostrip.report.sections.check_points import check_section, cross_validation_section
-from photostrip.report.sections.covariance import covariance_section
 from photostrip.report.sections.decisions import decisions_section, weights_section
 from photostrip.report.sections.findings import findings_sections
 from photostrip.report.sections.models import deformation_section, links_section, models_section, of_models
@@ -23,7 +21,6 @@ from photostrip.report.sections.points import (
     rejected_section,
     ties_section,
 )
-from photostrip.report.sections.precision import precision_section
 from photostrip.report.sections.project import counts_section, fiducials_section, project_section
 from photostrip.report.sections.strip import (
     absolute_section,
@@ -101,7 +98,11 @@ def _of_the_strips(document: Document, *, everything: bool) -> Iterator[tuple[Se
     if document.get("polynomials"):
         yield SectionName.POLYNOMIAL, polynomial_section(document, everything=everything)
     if "covariance" in document:
+        from photostrip.report.sections.covariance import covariance_section
+
         yield SectionName.COVARIANCE, covariance_section(document, everything=everything)
+    from photostrip.report.sections.bundle import bundle_sections
+
     yield from ((SectionName.BUNDLE, each) for each in bundle_sections(document, everything=everything))
 
 
@@ -109,6 +110,8 @@ def _of_the_accuracy(document: Document, *, everything: bool) -> Iterator[tuple[
     if "bundle" not in document:
         yield SectionName.WEIGHTS, weights_section(document, everything=everything)
     if "precision" in document:
+        from photostrip.report.sections.precision import precision_section
+
         yield SectionName.PRECISION, precision_section(document, everything=everything)
     if document.get("deformations"):
         yield SectionName.DEFORMATIONS, deformation_section(document)

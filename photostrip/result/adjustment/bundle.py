@@ -11,6 +11,7 @@ import numpy as np
 from photostrip.arrays import median
 from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.rejection import UNCONTROLLED
 from photostrip.result.numbers import PER_RADIAN, Document, rms
 from photostrip.result.quantities import grouped, record, records
 from photostrip.result.records import Records, as_records
@@ -194,7 +195,7 @@ def image_fit(found: Bundle) -> Document:
 def _group(group: reliability.Group, shift: float, kind: Kind) -> Document:
     """Sum up the redundancy of one kind of observations; effects of errors of those that others check."""
     given = np.isfinite(group.sigma)
-    controlled = group.redundancy[given] >= reliability.UNCONTROLLED
+    controlled = group.redundancy[given] >= UNCONTROLLED
     share = group.redundancy[given] if given.any() else np.zeros(1)  # where all of the group was rejected
     nothing = np.array([np.nan])
     detectable = group.detectable(shift)[given][controlled] * kind.factor if controlled.any() else nothing
@@ -257,7 +258,7 @@ def _observed(found: Bundle, group: reliability.Group, at: Numbers, shift: float
     """Return columns of everything about observed coordinates, (n, 2): row and axis."""
     count, problem, (row, axis) = len(at), found.screened.problem, at.T
     names = [names_of_observation(problem, group.kind, each) for each in row.tolist()]
-    checked = group.redundancy[row, axis] >= reliability.UNCONTROLLED
+    checked = group.redundancy[row, axis] >= UNCONTROLLED
     external = np.where(checked, group.external(shift)[row, axis], np.nan)
     return {
         "kind": [group.kind] * count,

@@ -10,7 +10,6 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import Document, rms
 from photostrip.result.quantities import grouped, record, records
-from photostrip.triangulation.independent_models.model_errors import far_ends
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
@@ -75,6 +74,8 @@ def _links(result: Result, strip: StripResult) -> list[Document]:
 
     formed, names = strip.of_models.formed, strip.of_models.strip.models
     links, models, shared, solved = formed.links, formed.models, formed.links.shared, formed.links.solved
+    from photostrip.triangulation.independent_models.model_errors import far_ends
+
     gap, far, smallest, found = discrepancies(strip), far_ends(formed), detectable(shared, links), []
     for number in range(shared.count):
         rows = np.flatnonzero(shared.link == number)

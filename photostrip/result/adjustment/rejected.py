@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
+from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.result.adjustment.bundle import Kind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
 from photostrip.result.numbers import Document, natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
-from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation.scale_transfer import depths
 from photostrip.units import MICROMETRES
 

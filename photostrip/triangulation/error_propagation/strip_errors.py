@@ -34,7 +34,6 @@ from photostrip.triangulation.error_propagation.derivatives import (
     ImagePoints,
     PlacedStrip,
 )
-from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
 from photostrip.triangulation.resection.resection import runs
 
 if TYPE_CHECKING:
@@ -96,6 +95,8 @@ def differentiate_strip(
     )
     points = _point_rows(strip)
     if len(formed.bridging):
+        from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
+
         points = with_bridges(points, strip)
     return StripErrors(
         images=strip.images,

@@ -12,6 +12,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass
+from photostrip.rejection import UNCONTROLLED
 from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"
-UNCONTROLLED = 0.01  # redundancy number below which an observation cannot be tested
 SIGMA0_LEVEL = 0.05  # probability that the test of sigma0 fails with right standard deviations
 
 

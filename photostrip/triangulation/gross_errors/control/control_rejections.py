@@ -11,7 +11,6 @@ from photostrip.frozen import NamedTuple, replace
 from photostrip.rejection import Rejection
 from photostrip.statistics import f_quantile, normal_quantile
 from photostrip.triangulation.gross_errors.control.control_deletion import ALPHA, Deletion, adjust
-from photostrip.triangulation.gross_errors.rays.point_decisions import LIKELIER
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
@@ -124,6 +123,8 @@ def _wrong_image(
     moved = max(others.deletions([(column,) for column in columns]), key=lambda each: each.gain)
     if _beside(everything, moved).probability <= (level if part == point else ALPHA):
         return "", -1
+    from photostrip.triangulation.gross_errors.rays.point_decisions import LIKELIER
+
     photo, ahead = strip.rays[moved.columns[0] - others.first_ray].photo, (moved.gain - alone.gain) / everything.spread
     if part == point or _beside(everything, alone).probability <= ALPHA or ahead > LIKELIER:
         return WRONG_IMAGE, photo

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
+from photostrip.rejection import UNCONTROLLED
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers

@@ -11,8 +11,8 @@ import numpy as np
 
 from photostrip.arrays import median
 from photostrip.frozen import dataclass, replace
+from photostrip.rejection import UNCONTROLLED
 from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, normal_quantile
-from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.robust import MEDIAN_SPREAD
 

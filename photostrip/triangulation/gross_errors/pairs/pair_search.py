@@ -22,7 +22,6 @@ from photostrip.rejection import Rejection
 from photostrip.triangulation.gross_errors.pairs import deletion
 from photostrip.triangulation.gross_errors.pairs.global_test import FIFTH_WRONG, GlobalTest, ParallaxScatter
 from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again
-from photostrip.triangulation.relative_orientation.robust import RobustElements, orient_robustly
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes
 from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT
 from photostrip.triangulation.robust import TUNING, scales
@@ -30,6 +29,7 @@ from photostrip.triangulation.robust import TUNING, scales
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.relative_orientation.robust import RobustElements
 
 
 # of the principal distance: y parallaxes that scatter by more are no measurements of the same points
@@ -78,6 +78,8 @@ def search(
     if not len(failed):
         scatter = ParallaxScatter.of(given, stated, spoiled)
         return PairSearch(orientation=given, removed=(), scatter=scatter, test=GlobalTest.of(scatter.by_pair))
+    from photostrip.triangulation.relative_orientation.robust import orient_robustly
+
     part, part_test, log = given.take(failed), test.take(failed), _Log.of(len(failed))
     found = orient_robustly(part.pairs, part_test.sigma, deletion.LARGEST)
     robust = assess_pairs(found.elements, part.pairs, part.iterations)

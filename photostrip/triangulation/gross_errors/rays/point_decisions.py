@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.frozen import NamedTuple, dataclass
+from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST, subsets
 from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
 
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
 ROUNDING = 1e-9  # keeps a point that holds its photos alone from stopping the others
-WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
-"""What was found at a point: its wrong rays; two rays that contradict each other; several of which any may be wrong."""
 
 
 @dataclass(frozen=True, eq=False)

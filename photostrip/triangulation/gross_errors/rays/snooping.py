@@ -17,7 +17,7 @@ import numpy as np
 from photostrip.arrays import distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
-from photostrip.rejection import Rejection
+from photostrip.rejection import SEVERAL_RAYS, Rejection
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up
 from photostrip.triangulation.bundle.normal_equations.defects import refuse_endless
@@ -30,7 +30,6 @@ from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, res
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.pairs.pair_search import OUT_TO_ONE_MORE
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
-    SEVERAL_RAYS,
     Decision,
     PointRays,
     alike,

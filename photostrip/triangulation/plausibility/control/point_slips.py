@@ -10,7 +10,6 @@ import numpy as np
 from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.triangulation.plausibility.control.digits import slip
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -235,6 +234,8 @@ def slip_in(
     if not nowhere and not moved and axis != HEIGHT:
         near += SCALE_CHANGE * abs(off)
     exact = np.spacing(abs(written)) * unit < spread[0]  # whether the computer holds digits that could be compared
+    from photostrip.triangulation.plausibility.control.digits import slip
+
     fits = slip(written, predicted, spread[0] / unit, near / unit) if exact else None
     role = "check" if given.check[row] else "control"
     evidence: Evidence = {"axis": GROUND_AXES[axis], "given": written, "off_m": off, "standard_deviation_m": spread[0]}

@@ -11,15 +11,13 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import from_vector
+from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.statistics import chi2_quantile, normal_quantile
 from photostrip.triangulation.bundle.quality.reliability import Limit
 from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
 from photostrip.triangulation.gross_errors.rays import point_decisions
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
     LIKELIER,
-    SEVERAL_RAYS,
-    TWO_RAYS,
-    WRONG_RAY,
     Decision,
     PointRays,
 )

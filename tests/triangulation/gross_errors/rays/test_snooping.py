@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.rejection import Rejection
+from photostrip.rejection import WRONG_RAY, Rejection
 from photostrip.simulation import Flight, Points, Spec
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle.normal_equations.defects import MOST_FAILED
@@ -18,7 +18,6 @@ from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.bundle.solve import solve as solve_once
 from photostrip.triangulation.gross_errors.rays import snooping, strip_network
-from photostrip.triangulation.gross_errors.rays.point_decisions import WRONG_RAY
 from tests.pipeline.blocks import adjusted, simulate
 
 if TYPE_CHECKING:

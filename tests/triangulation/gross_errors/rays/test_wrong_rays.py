@@ -10,9 +10,9 @@ import pytest
 from hypothesis import strategies as st
 
 from photostrip.pipeline import Settings, triangulate
+from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.result.document import document_of
 from photostrip.triangulation.gross_errors.rays import point_decisions, snooping, strip_network
-from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation import non_neighbours
 from tests.strips import MICROMETRE, control_points, fly, project
 
