@@ -36,7 +36,7 @@ def of_photos(
     if strip.of_photos.covariance is not None:
         return _of_covariance(strip, strip.of_photos.covariance, checks, oriented.frames)
     found = propagation(strip, oriented, observations)
-    errors, operator = found.errors, found.fit.operator
+    errors, fit, xyz, operator = found.errors, found.fit, oriented.xyz, found.fit.operator
     stated = strip.of_photos.sigma
     factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
@@ -49,7 +49,7 @@ def of_photos(
     return StripPrecision(
         points=axes @ points @ axes.T,
         photos=_turned(strip, photos),
-        by_control=lambda rows, columns: axes @ found.influence[rows] @ operator[:, columns],
+        by_control=lambda rows, columns: axes @ fit.influence(xyz[rows]) @ operator[:, columns],
         control=np.column_stack([strip.formed.point[strip.control_rows][found.control.point], found.control.axis]),
         variance=found.control.variance,
         sigma=stated * float(np.sqrt(factor)),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.frozen import dataclass, replace
@@ -286,38 +287,38 @@ def _decoded(project: Project, frame: GroundFrame, rows: Numbers) -> Document:
 
 def _control(project: Project) -> Iterator[Document]:
     """Return the standard deviation of every control coordinate, in the user's order, and where it comes from."""
-    photos = {name: set[str]() for name in project.inputs.observations.point_ids}
-    observations = project.inputs.observations
     if project.inputs.models is not None:
-        photos = photos_of_points(project.inputs.models)
-    for photo, point in zip(observations.photo.tolist(), observations.point.tolist(), strict=True):
-        photos[observations.point_ids[point]].add(observations.photo_ids[photo])
+        photos = {name: len(each) for name, each in photos_of_points(project.inputs.models).items()}
+    else:
+        measured = project.inputs.observations
+        count, total = len(measured.photo_ids), len(measured.point_ids)
+        times = np.bincount(distinct(measured.point * count + measured.photo) // count, minlength=total)
+        photos = dict(zip(measured.point_ids, times.tolist(), strict=True))
     for number, read in enumerate(project.tables.control):
         if read is not None:
             yield from _of_list(project, number, read, photos)
 
 
-def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str, set[str]]) -> Iterator[Document]:
+def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str, int]) -> Iterator[Document]:
     frame = project.inputs.frames[number]
-    default = project.tree.find("control", number, "sigma")
-    values = [] if default is None else [float(each.text) for each in default.elements]
+    given = project.tree.find("control", number, "sigma")
+    default = [None] * 3 if given is None else [float(each.text) for each in given.elements] or [None] * 3
     source = source_of(project, ("control", number, "sigma"))
-    for row, name in enumerate(read.ids):
-        stated = ~np.isnan(read.sigma[row])
-        usual = values or (None, None, None)
-        sigma = [float(read.sigma[row, axis]) if stated[axis] else usual[axis] for axis in range(3)]
-        line = {"source": "row", "file": read.table.file, "line": int(read.table.lines[row]), "key": ""}
-        use = read.use[row].tolist()
+    columns = (read.check, read.table.lines, read.use, read.sigma, ~np.isnan(read.sigma))
+    for name, check, line, use, sigma, stated in zip(read.ids, *(each.tolist() for each in columns), strict=True):
+        here = {"source": "row", "file": read.table.file, "line": line, "key": ""}
+        found = [
+            (value, here) if its else (usual, source) for value, its, usual in zip(sigma, stated, default, strict=True)
+        ]
+        used = [each if counts else (None, None) for each, counts in zip(found, use, strict=True)]
         yield {
             "id": name,
-            "role": "check" if read.check[row] else "control",
+            "role": "check" if check else "control",
             "file": read.table.file,
-            "line": int(read.table.lines[row]),
+            "line": line,
             "axes": list(frame.axes),
             "counts": use,
-            "sigma": [value if counts else None for value, counts in zip(sigma, use, strict=True)],
-            "sigma_from": [
-                None if not counts else line if its else source for its, counts in zip(stated, use, strict=True)
-            ],
-            "photos": len(photos.get(name, ())),
+            "sigma": [value for value, _ in used],
+            "sigma_from": [place for _, place in used],
+            "photos": photos.get(name, 0),
         }

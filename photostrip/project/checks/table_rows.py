@@ -85,12 +85,13 @@ def table_rows(project: Project) -> list[Document]:
     bundle = project.settings.adjustment == "bundle"
     apart = set() if bundle else set(gaps_of(inputs))  # a bundle takes points of any two photos
     control = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if use.all()}
+    count: dict[str, int] = {}
     if tables.observations is not None:
-        found.append(_measured(tables.observations, photos, apart, control if bundle else set()))
+        count = rays(tables.observations, photos)
+        found.append(_measured(tables.observations, photos, count, apart, control if bundle else set()))
     if (marks := tables.fiducials) is not None:
         reasons = [_outside(IN_NO_STRIP, marks.photo_ids, photos, marks.photo)]
         found.append(_block(marks.table, reasons, marks.times))
-    count = {} if tables.observations is None else rays(tables.observations, photos)
     if bundle:  # and control of a single one
         count = {name: max(number, 2) for name, number in count.items()}
     found += [_given(read, count, apart) for read in tables.control if read is not None]
@@ -133,10 +134,9 @@ def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: b
     return _block(read.table, reasons)
 
 
-def _measured(read: Measurements, photos: set[str], gaps: set[str], whole: set[str]) -> Document:
+def _measured(read: Measurements, photos: set[str], count: dict[str, int], gaps: set[str], whole: set[str]) -> Document:
     """Sort the rows of measured points by what becomes of them."""
     outside = _outside(IN_NO_STRIP, read.photo_ids, photos, read.photo)
-    count = rays(read, photos)
     once = np.array([count.get(name) == 1 and name not in whole for name in read.target_ids], bool)[read.target]
     apart = np.array([name in gaps for name in read.target_ids], bool)[read.target]
     names = np.array(read.target_ids, object)[read.target]

@@ -32,9 +32,10 @@ class ListedPhoto:
 def listed_photos(root: Node) -> Iterator[ListedPhoto]:
     """Return every photo of every strip."""
     for i, strip in enumerate(root.list_at("strips")):
+        camera = strip.word("camera")
         for j, photo in enumerate(strip.list_at("photos")):
             if photo.text:
-                yield ListedPhoto(photo.text, ("strips", i, "photos", j), strip.word("camera"))
+                yield ListedPhoto(photo.text, ("strips", i, "photos", j), camera)
 
 
 def check_references(root: Node) -> Iterator[Fault]:
