@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,9 @@ import numpy as np
 from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator
 
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, DTypeLike
 
     from photostrip.arrays import Floats, Numbers
 
@@ -37,7 +38,34 @@ def rounded(values: ArrayLike | float, decimals: int) -> Plain:
     if isinstance(values, float):  # as numpy does it, in a tenth of the time
         scaled = float(values) * 10.0**decimals
         return round(scaled) / 10.0**decimals + 0.0 if isfinite(scaled) else None
-    return plain(np.round(np.asarray(values, float), decimals) + 0.0)
+    return plain(to_decimals(values, decimals))
+
+
+def to_decimals(values: ArrayLike, decimals: int) -> Floats:
+    """Round numbers to decimals, never to -0."""
+    return np.asarray(np.round(np.asarray(values, float), decimals) + 0.0)
+
+
+class RoundedColumn(Sequence[Plain]):
+    """Rounded numbers, or rows of them, kept as an array in a quarter of the memory; None for what is no number."""
+
+    def __init__(self, values: Floats) -> None:
+        self.values = values
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, place: int | slice) -> Plain:
+        return RoundedColumn(self.values[place]) if isinstance(place, slice) else plain(self.values[place])
+
+    def __iter__(self) -> Iterator[Plain]:
+        return iter(plain(self.values))
+
+    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> Floats:  # noqa: FBT001 (numpy asks so)
+        return np.asarray(self.values, dtype, copy=copy)
+
+    def taken(self, order: Numbers) -> RoundedColumn:
+        return RoundedColumn(self.values[order])
 
 
 def plain(values: Floats) -> Plain:

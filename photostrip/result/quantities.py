@@ -10,7 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.result.description import Quantity, Table, table_at
-from photostrip.result.numbers import DEGREES, GEOGRAPHIC, GROUND, IMAGE, RADIANS, Document, Plain, rounded, significant
+from photostrip.result.numbers import (
+    DEGREES,
+    GEOGRAPHIC,
+    GROUND,
+    IMAGE,
+    RADIANS,
+    Document,
+    Plain,
+    RoundedColumn,
+    rounded,
+    significant,
+    to_decimals,
+)
 from photostrip.result.records import Records, as_records
 
 if TYPE_CHECKING:
@@ -23,12 +35,16 @@ DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES, "
 
 def rounded_as(entry: Quantity, value: ArrayLike, unit: str = "") -> Plain:
     """Return a value, or an array of them, as its key is written; None for a number that is not finite."""
-    decimals = DECIMALS_BY_UNIT[unit] if entry.unit_key else entry.decimals
+    decimals = _decimals(entry, unit)
     if decimals is not None:
         return rounded(value, decimals)
     if entry.digits is not None:
         return significant(value, entry.digits)
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def _decimals(entry: Quantity, unit: str) -> int | None:
+    return DECIMALS_BY_UNIT[unit] if entry.unit_key else entry.decimals
 
 
 def coordinate_decimals(kind: str, axes: Sequence[str]) -> list[int]:
@@ -76,11 +92,15 @@ def _cells(
     beside: Mapping[str, Any] = MappingProxyType({}),
 ) -> Sequence[Plain]:
     if isinstance(column, Mapping) and isinstance(entry, dict):
-        return as_records({key: _cells(entry[key], part, size) for key, part in column.items()})
+        return Records({key: _cells(entry[key], part, size) for key, part in column.items()})
     if not isinstance(column, list | tuple | np.ndarray):
         return [column] * size
     if isinstance(entry, Quantity):
-        cells: Sequence[Plain] = rounded_as(entry, column, next(iter(beside.get(entry.unit_key, ())), ""))
+        unit = next(iter(beside.get(entry.unit_key, ())), "")
+        decimals = _decimals(entry, unit)
+        if decimals is not None and isinstance(column, np.ndarray):
+            return RoundedColumn(to_decimals(column, decimals))
+        cells: Sequence[Plain] = rounded_as(entry, column, unit)
         return cells
     return [None if each is None else _record(entry, each) for each in column]
 
@@ -90,6 +110,6 @@ def grouped(block: str, heads: Mapping[str, Any], columns: Mapping[str, Any], en
     table = table_at(block)
     cells = {key: _cells(table[key], column, len(ends) - 1) for key, column in heads.items()}
     for key, column in columns.items():
-        values = _cells(table[key], column, 0)
+        values = list(_cells(table[key], column, 0))
         cells[key] = [values[start:end] for start, end in pairwise(ends)]
     return as_records(cells)

@@ -22,7 +22,7 @@ class Records(Sequence[dict[str, Any]]):
         return len(next(iter(self.columns.values()), ()))
 
     def __iter__(self) -> Iterator[Document]:
-        return iter(as_records(self.columns))
+        return (dict(zip(self.columns, row, strict=True)) for row in zip(*self.columns.values(), strict=True))
 
     @overload
     def __getitem__(self, place: int) -> Document: ...
@@ -39,12 +39,19 @@ class Records(Sequence[dict[str, Any]]):
 
     def taken(self, order: Numbers) -> Records:
         places = order.tolist()
-        return Records({key: [column[place] for place in places] for key, column in self.columns.items()})
+        taken = {
+            key: [column[place] for place in places] if isinstance(column, list) else column.taken(order)
+            for key, column in self.columns.items()
+        }
+        return Records(taken)
 
     @classmethod
     def joined(cls, parts: Iterable[Records]) -> Records:
         columns: dict[str, list[Plain]] = {}
-        for part in parts:
+        tables = list(parts)
+        if len(tables) == 1:
+            return tables[0]
+        for part in tables:
             for key, column in part.columns.items():
                 columns.setdefault(key, []).extend(column)
         return cls(columns)

@@ -25,6 +25,7 @@ from photostrip.report.pictures.ground.plan_view import plan_of
 from photostrip.report.pictures.result.pictures import picture_files, pictures_of
 from photostrip.report.pictures.svg import Axis, nice
 from photostrip.report.sections.accuracy_report import sections_of
+from photostrip.result.records import as_lists
 from tests.loops import nonempty
 from tests.reports import saved
 from tests.results import FRAMES, case, spec, write_project
@@ -166,7 +167,7 @@ def test_pictures_in_files_have_the_colours_of_the_page() -> None:
 
 
 def test_ids_cannot_become_elements() -> None:
-    document = copy.deepcopy(case().document)
+    document = copy.deepcopy(dict(as_lists(case().document)))
     name = "<b>&\"'</script>"
     for block in ("points", "control"):
         for row in document[block]:

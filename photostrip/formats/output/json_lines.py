@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.text import number_columns
+from photostrip.result.numbers import RoundedColumn
+from photostrip.result.records import Records
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -41,6 +43,10 @@ def _objects(columns: Mapping[str, Sequence[Plain]], encode: Encoder) -> list[Ce
 
 
 def _cells(column: Sequence[Plain], encode: Encoder) -> Cells:
+    if isinstance(column, RoundedColumn) and column.values.ndim == 1:
+        return number_columns.as_repr(np.where(np.isfinite(column.values), column.values, np.nan), "null")
+    if isinstance(column, Records):
+        return np.concatenate(_objects(column.columns, encode))
     kinds = set(map(type, column))
     if _of_numbers(kinds):
         return _numbers(column, kinds, encode)

@@ -190,7 +190,7 @@ def _expected(result: Result, held: Flags) -> Floats:
     return np.asarray(sigma, float)
 
 
-def control_of(result: Result, found: Differences) -> list[Document]:
+def control_of(result: Result, found: Differences) -> Records:
     """Return the list ``control``: every given point with what is left there, in natural order of the ids."""
     control = result.inputs.control
     columns = {
@@ -207,7 +207,7 @@ def control_of(result: Result, found: Differences) -> list[Document]:
         "list": control.frame + 1,
         "strips": [list(strips) for strips in found.strips],
     }
-    return list(records("control", columns).taken(np.argsort(natural_rank(control.ids))))
+    return records("control", columns).taken(np.argsort(natural_rank(control.ids)))
 
 
 def _in_list_order(result: Result, enu: Floats) -> Floats:

@@ -9,6 +9,7 @@ import pytest
 
 from photostrip.report.page.parts import Facts, Table
 from photostrip.report.sections.decisions import WEIGHTS_SHOWN, decisions_section, weights_section
+from photostrip.result.records import as_lists
 from tests.loops import nonempty
 from tests.results import case
 
@@ -68,7 +69,7 @@ def test_a_weight_is_that_of_the_fit() -> None:
 
 
 def test_coordinates_that_do_not_count_weigh_nothing() -> None:
-    document = copy.deepcopy(case("projected").document)
+    document = copy.deepcopy(dict(as_lists(case("projected").document)))
     row = next(each for each in document["control"] if each["role"] == "control")
     row["use"] = "xy"
     first = weights(document).rows[0]
