@@ -61,7 +61,7 @@ class RoundedColumn(Sequence[Plain]):
     def __iter__(self) -> Iterator[Plain]:
         return iter(plain(self.values))
 
-    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> Floats:  # noqa: FBT001 (numpy asks so)
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:  # noqa: FBT001 (numpy asks so)
         return np.asarray(self.values, dtype, copy=copy)
 
     def taken(self, order: Numbers) -> RoundedColumn:

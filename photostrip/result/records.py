@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, cast, overload
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -38,10 +38,10 @@ class Records(Sequence[dict[str, Any]]):
     __hash__ = None  # type: ignore[assignment]
 
     def taken(self, order: Numbers) -> Records:
-        places = order.tolist()
+        places, columns = order.tolist(), cast("dict[str, Any]", self.columns)
         taken = {
             key: [column[place] for place in places] if isinstance(column, list) else column.taken(order)
-            for key, column in self.columns.items()
+            for key, column in columns.items()
         }
         return Records(taken)
 

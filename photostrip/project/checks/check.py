@@ -302,7 +302,9 @@ def _control(project: Project) -> Iterator[Document]:
 def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str, int]) -> Iterator[Document]:
     frame = project.inputs.frames[number]
     given = project.tree.find("control", number, "sigma")
-    default = [None] * 3 if given is None else [float(each.text) for each in given.elements] or [None] * 3
+    default: list[float | None] = (
+        [None] * 3 if given is None else [float(each.text) for each in given.elements] or [None] * 3
+    )
     source = source_of(project, ("control", number, "sigma"))
     columns = (read.check, read.table.lines, read.use, read.sigma, ~np.isnan(read.sigma))
     for name, check, line, use, sigma, stated in zip(read.ids, *(each.tolist() for each in columns), strict=True):
