@@ -64,6 +64,7 @@ class Targets:
     control: ControlPoints  # the points, none of them a check point
     frames: Sequence[GroundFrame]  # ground frames the points refer to
     intermediate: IntermediateFrame  # the frame in which the strip is oriented
+    directions: Floats | None = None  # (n, 3, 3): of the axes compared, where they are known already
 
     def of(self, xyz: Floats) -> Floats:
         """Targets of the control points: their present positions, with all given coordinates put in."""
@@ -101,6 +102,8 @@ class Targets:
         Rows are unit vectors in the intermediate frame: the point's ground axes; east, north and up for geocentric
         points, whose coordinates come three together.
         """
+        if self.directions is not None:
+            return self.directions
         cartesian = self.intermediate.cartesian_from_intermediate(xyz)
         return self._by_frame(cartesian, lambda frame, points: frame.level_axes_at(points)) @ self.intermediate.axes
 
