@@ -124,12 +124,13 @@ def _cells(quantity: Quantity, values: Sequence[Any]) -> Cells:
     return number_columns.as_texts(["" if value is None else str(value) for value in values])
 
 
-def _texts(values: Sequence[str | Sequence[str] | None]) -> list[str]:
+def _texts(values: Sequence[str | Sequence[str] | None]) -> Sequence[Any]:
     """Quote ids where CSV needs it; all are looked at together first."""
-    known = {value: value for value in values if isinstance(value, str)}
-    if "" in known or ODD.search("".join(known)):
-        known = {value: _cell(value) for value in known}
-    return [known[value] if isinstance(value, str) else _cell(value) for value in values]
+    known = {value for value in values if isinstance(value, str)}
+    if set(map(type, values)) == {str} and "" not in known and not ODD.search("".join(known)):
+        return values
+    written = {value: _cell(value) for value in known}
+    return [written[value] if isinstance(value, str) else _cell(value) for value in values]
 
 
 def _cell(text: str | Sequence[str] | None) -> str:

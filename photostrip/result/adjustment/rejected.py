@@ -264,6 +264,8 @@ def _other_point(strip: StripResult, row: int, size: float) -> str:
 
 def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
     """Mark as re-admitted what the strip method had taken out and the bundle adjustment uses after all."""
+    if not rejected:  # the names of all rays take longer than the adjustment
+        return rejected
     problem, selection = found.block.problem, found.screened.selection
     images, control = problem.images, problem.control
     inside = np.flatnonzero(selection.images).tolist()

@@ -56,7 +56,7 @@ def base_rays(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
     rotations = (from_alpha_omega_kappa(al1, 0.0, ka1), from_alpha_omega_kappa(al2, om2, ka2))
     turned: list[Floats] = []
     for rotation, xy in zip(rotations, (pairs.left, pairs.right), strict=True):
-        a = rotation.transpose(1, 2, 0)[:, :, pairs.pair]  # 3 x 3 x m
+        a = rotation.reshape(-1, 9).T.take(pairs.pair, axis=1).reshape(3, 3, -1)
         turned.append(a[:, 0] * xy[:, 0] + a[:, 1] * xy[:, 1] - a[:, 2] * pairs.focal)  # eq. 137
     return turned[0], turned[1]
 
