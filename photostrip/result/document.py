@@ -74,7 +74,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "junctions": junctions.junctions_of(result),
         "photos": photos.photos_of(result, images),
         "points": ground.points_of(result, photos.point_rms(result, images), rank),
-        "residuals": bundle.with_reliability(result, photos.residuals_of(result, images)),
+        "residuals": bundle.with_reliability(result, images, photos.residuals_of(result, images)),
         "parallaxes": pairs.parallaxes_of(result, rank),
         **({"link_residuals": links.residuals_of(result, rank)} if result.model_strips else {}),
     }

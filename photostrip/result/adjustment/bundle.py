@@ -19,11 +19,12 @@ from photostrip.triangulation.bundle.quality import reliability
 from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline import Result
     from photostrip.pipeline.results import Bundle
+    from photostrip.result.points.photos import ImageResiduals
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.settings import BundleSettings
 
@@ -215,7 +216,7 @@ def _group(group: reliability.Group, shift: float, kind: Kind) -> Document:
     }
 
 
-def with_reliability(result: Result, residuals: list[Document]) -> list[Document]:
+def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals: list[Document]) -> list[Document]:
     """Add to the list ``residuals`` how well each ray is checked by the others; None for rays that took no part.
 
     Without a bundle adjustment the list stays as it is.
@@ -227,12 +228,9 @@ def with_reliability(result: Result, residuals: list[Document]) -> list[Document
     (group,) = (each for each in found.groups if each.kind == reliability.IMAGE)
     values = np.column_stack([group.redundancy, group.standardised, group.detectable(shift) * MICROMETRES])
     values = np.vstack([values, np.full(len(RELIABILITY), np.nan)])  # the last row: a ray that took no part
-    problem, images = found.screened.problem, found.screened.problem.images
-    names = zip(
-        map(problem.photo_name, images.photo.tolist()), map(problem.point_name, images.point.tolist()), strict=True
-    )
-    row_of = {name: row for row, name in enumerate(names)}
-    at = [row_of.get((each["photo"], point), -1) for each in residuals for point in each["points"]]
+    row_of = np.full(len(result.refined.observations), -1)
+    row_of[found.block.rows] = np.arange(len(found.block.rows))
+    at = row_of[np.concatenate([image.rows for image in images])]
     ends = [0, *accumulate(len(each["points"]) for each in residuals)]
     added = grouped("residuals", {}, dict(zip(RELIABILITY, values[at].T, strict=True)), ends)
     return [each | more for each, more in zip(residuals, added, strict=True)]
