@@ -29,7 +29,9 @@ def measured_control(control: ControlPoints, observations: PhotoPoints) -> Contr
 
 def rows_of_given(ids: Sequence[str], numbers: Numbers, point_ids: Sequence[str]) -> Numbers:
     """Row of each given point among points that have numbers in a list of ids; -1 for those that are not there."""
-    return locate(ids, [point_ids[number] for number in numbers])
+    place = np.full(len(point_ids) + 1, -1)  # the last for ids that are not there
+    place[numbers] = np.arange(len(numbers))
+    return np.asarray(place[locate(ids, point_ids)], np.intp)
 
 
 def cartesian_of(control: ControlPoints, frames: Sequence[GroundFrame]) -> Floats:

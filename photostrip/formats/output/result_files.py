@@ -126,11 +126,13 @@ def _cells(quantity: Quantity, values: Sequence[Any]) -> Cells:
 
 def _texts(values: Sequence[str | Sequence[str] | None]) -> Sequence[Any]:
     """Quote ids where CSV needs it; all are looked at together first."""
-    known = {value for value in values if isinstance(value, str)}
-    if set(map(type, values)) == {str} and "" not in known and not ODD.search("".join(known)):
+    if set(map(type, values)) != {str}:
+        return list(map(_cell, values))
+    known = set(values)
+    if "" not in known and not ODD.search("".join(known)):
         return values
     written = {value: _cell(value) for value in known}
-    return [written[value] if isinstance(value, str) else _cell(value) for value in values]
+    return [written[value] for value in values]
 
 
 def _cell(text: str | Sequence[str] | None) -> str:
