@@ -229,7 +229,8 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     values = np.column_stack([group.redundancy, group.standardised, group.detectable(shift) * MICROMETRES])
     values = np.vstack([values, np.full(len(RELIABILITY), np.nan)])  # the last row: a ray that took no part
     row_of = np.full(len(result.refined.observations), -1)
-    row_of[found.block.rows] = np.arange(len(found.block.rows))
+    used = found.block.rows[found.screened.selection.images]
+    row_of[used] = np.arange(len(used))
     at = row_of[np.concatenate([image.rows for image in images])]
     ends = [0, *accumulate(len(each["points"]) for each in residuals)]
     added = grouped("residuals", {}, dict(zip(RELIABILITY, values[at].T, strict=True)), ends)
