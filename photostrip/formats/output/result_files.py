@@ -124,7 +124,7 @@ def _cells(quantity: Quantity, values: Sequence[Any]) -> Cells:
     return number_columns.as_texts(["" if value is None else str(value) for value in values])
 
 
-def _texts(values: Sequence[str | Sequence[str] | None]) -> Sequence[Any]:
+def _texts(values: Sequence[Any]) -> Sequence[Any]:
     """Quote ids where CSV needs it; all are looked at together first."""
     if set(map(type, values)) != {str}:
         return list(map(_cell, values))
