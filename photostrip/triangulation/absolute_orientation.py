@@ -305,8 +305,7 @@ def _start(strip: Floats, targets: Targets, weight: Floats) -> Similarity:
 def _start_apart(strip: Floats, targets: Targets) -> Similarity:
     """Four parameters from the plan, then three from the heights, for a strip that is nearly level."""
     plan, height = targets.control.use[:, 0], targets.control.use[:, HEIGHT]
-    at_sea = np.zeros_like(strip)
-    target = targets.of(at_sea)[plan]
+    target = targets.of(np.zeros_like(strip))[plan]  # at sea
     z = strip[plan, 0] + 1j * strip[plan, 1]
     t = target[:, 0] + 1j * target[:, 1]
     dz = z - z.mean()
@@ -326,8 +325,7 @@ def _start_apart(strip: Floats, targets: Targets) -> Similarity:
     center = np.array([xyz[height, 0].mean(), xyz[height, 1].mean(), 0.0])
     rotation = tilt @ level.rotation
     middle = level.inverse(center[None, :])[0]
-    lift = np.array([0.0, 0.0, up])
-    return Similarity(scale, rotation, center + lift - scale * rotation @ middle)
+    return Similarity(scale, rotation, center + np.array([0.0, 0.0, up]) - scale * rotation @ middle)
 
 
 def _design(xyz: Floats, targets: Targets, axes: Floats, half: float) -> tuple[Floats, Floats]:
@@ -372,10 +370,9 @@ def _refuse_deficient(design: Floats, root: Floats, xyz: Floats, targets: Target
     _, values, vt = np.linalg.svd(np.linalg.qr(scaled, mode="r") if len(scaled) > PARAMETERS else scaled)
     if len(values) == PARAMETERS and values[-1] > RANK_LIMIT * values[0]:
         return
-    points = targets.control.ids
     free = free_motion(np.linalg.solve(root.T, vt[-1]), xyz, targets.control, half)
     msg = f"absolute orientation: the control does not determine {free}"
-    raise GeometryError(msg, points=points, code="control-deficient")
+    raise GeometryError(msg, points=targets.control.ids, code="control-deficient")
 
 
 def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: float) -> str:
