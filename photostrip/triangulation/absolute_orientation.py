@@ -64,7 +64,6 @@ class Targets:
     control: ControlPoints  # the points, none of them a check point
     frames: Sequence[GroundFrame]  # ground frames the points refer to
     intermediate: IntermediateFrame  # the frame in which the strip is oriented
-    directions: Floats | None = None  # (n, 3, 3): of the axes compared, where they are known already
 
     def of(self, xyz: Floats) -> Floats:
         """Targets of the control points: their present positions, with all given coordinates put in."""
@@ -102,8 +101,6 @@ class Targets:
         Rows are unit vectors in the intermediate frame: the point's ground axes; east, north and up for geocentric
         points, whose coordinates come three together.
         """
-        if self.directions is not None:
-            return self.directions
         cartesian = self.intermediate.cartesian_from_intermediate(xyz)
         return self._by_frame(cartesian, lambda frame, points: frame.level_axes_at(points)) @ self.intermediate.axes
 
@@ -177,6 +174,7 @@ def lay(
     weight: Floats,
     reach: Floats | None = None,
     watch: Callable[[Similarity, Floats], None] | None = None,
+    known: Floats | None = None,
 ) -> Laid:
     """Similarity of the strip on its control.
 
@@ -187,6 +185,7 @@ def lay(
         the control's length counts.
     watch: called at every step with the similarity before it, and shifts, rotations and scale of the step, metres at
         the end of the strip.
+    known: (n, 3, 3), optional, axes along which strip and control are compared (``Targets.axes``).
     Raises GeometryError when the control does not determine seven parameters; the free motion is named.
     Raises InputError when the strip comes out upside down: the control is left-handed.
 
@@ -196,10 +195,10 @@ def lay(
     similarity = _start(strip, targets, weight)
     _refuse_given_on_line(strip, targets.of(similarity(strip)), targets.control)
     half = max(float(np.ptp(similarity(strip), axis=0).max()) / 2, 1e-6)
-    axes = targets.axes(similarity(strip))
+    axes = targets.axes(similarity(strip)) if known is None else known
     for iteration in range(1, ITERATIONS + 1):
         xyz = similarity(strip)
-        if iteration == LAST_AXES_UPDATE:
+        if iteration == LAST_AXES_UPDATE and known is None:
             axes = targets.axes(xyz)
         plain, free = _design(xyz, targets, axes, half)
         root = _motion(None if reach is None else similarity(reach), xyz.mean(axis=0), half)

@@ -130,16 +130,23 @@ def _pairs(rays: SortedRays, photos: int) -> tuple[Numbers, Numbers]:
 
 def _narrower(rows: Numbers, columns: Numbers, photos: int) -> Numbers | None:
     """Return the rank of the photos in the reverse Cuthill-McKee order, or None when that is not narrower."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
-
-    ones = np.ones(2 * len(rows), np.int8)
-    graph = coo_array(
-        (ones, (np.concatenate([rows, columns]), np.concatenate([columns, rows]))), shape=(photos, photos)
-    )
-    order = reverse_cuthill_mckee(graph.tocsr(), symmetric_mode=True)
+    near: list[list[int]] = [[] for _ in range(photos)]
+    for one, other in zip(rows.tolist(), columns.tolist(), strict=True):
+        near[one].append(other)
+        near[other].append(one)
+    degree = list(map(len, near))
+    order: list[int] = []
+    seen: set[int] = set()
+    for seed in sorted(range(photos), key=degree.__getitem__):  # one for each connected part
+        waiting = [seed] if seed not in seen else []
+        seen.add(seed)
+        for photo in waiting:  # grows
+            order.append(photo)
+            new = sorted(set(near[photo]) - seen, key=lambda each: (degree[each], each))
+            seen.update(new)
+            waiting += new
     rank = np.empty(photos, np.intp)
-    rank[order] = np.arange(photos)
+    rank[order[::-1]] = np.arange(photos)
     narrower = np.abs(rank[rows] - rank[columns]).max() < np.abs(rows - columns).max()
     return rank if narrower else None
 

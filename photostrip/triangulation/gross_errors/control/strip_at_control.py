@@ -84,8 +84,8 @@ class StripAtControl:
         """Lay the strip on what is kept: a wrong point of 200 m turns it, and its rays, by a hundredth."""
         found, axes = self.coordinates, np.zeros((*kept.shape, 3))
         axes[found.point, found.axis] = found.direction  # PROJ would take half of the time of the screening for them
-        used = Targets(replace(self.control, use=kept), self.frames, self.intermediate, axes)
-        laid = absolute_orientation.lay(self.xyz, used, np.where(kept, self.weight, 0.0))
+        used = Targets(replace(self.control, use=kept), self.frames, self.intermediate)
+        laid = absolute_orientation.lay(self.xyz, used, np.where(kept, self.weight, 0.0), known=axes)
         return replace(self, similarity=laid.similarity)
 
     def misclosures(self, control: ControlPoints | None = None) -> Floats:
