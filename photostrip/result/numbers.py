@@ -30,6 +30,7 @@ ROTATION = 12  # decimals of direction cosines
 SIGNIFICANT = 4  # digits of what has no natural size
 EXACT = 12  # digits of what others compute with
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}  # units of angles
+AT_ONCE = 2000  # numbers of a column that are read together, for the sake of memory
 DIGITS = re.compile("([0-9]+)")
 
 
@@ -59,7 +60,8 @@ class RoundedColumn(Sequence[Plain]):
         return RoundedColumn(self.values[place]) if isinstance(place, slice) else plain(self.values[place])
 
     def __iter__(self) -> Iterator[Plain]:
-        return iter(plain(self.values))
+        for start in range(0, len(self), AT_ONCE):
+            yield from plain(self.values[start : start + AT_ONCE])
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:  # noqa: FBT001 (numpy asks so)
         return np.asarray(self.values, dtype, copy=copy)

@@ -14,7 +14,7 @@ from photostrip.notes import before, listed
 from photostrip.statistics import SECOND_LOOK, TEST_LEVEL, chi2_quantile, f_p_value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from photostrip.result.numbers import Document
 
@@ -148,29 +148,30 @@ def _whole(document: Document, role: str) -> Document:
     return found
 
 
-def _rows(document: Document, role: str) -> list[Document]:
+def _rows(document: Document, role: str) -> Iterator[Document]:
     if role == "cross_validation":
-        return list(document.get(role, {}).get("points", []))
-    return [row for row in document["control"] if row["role"] == role]
+        return iter(document.get(role, {}).get("points", []))
+    return (row for row in document["control"] if row["role"] == role)
 
 
 def headline_rms(document: Document, role: str, part: str) -> Document:
     """Return count and rms of the differences in plan or height without those that stand out, metres and µm."""
-    out = _standing_out(document, role, part)
+    out = set(_standing_out(document, role, part))
     if not out:
         whole: Document = _whole(document, role)[part]
         return whole
-    kept = [_without_rejected(row) for row in _rows(document, role) if row["id"] not in out]
-    kept = [row for row in kept if row[part] is not None]
-    return {"count": len(kept), "rms": _rms(kept, part), "rms_um": _rms(kept, f"{part}_um")}
+    rows = (_without_rejected(row) for row in _rows(document, role) if row["id"] not in out)
+    kept = [(row[part], row[f"{part}_um"]) for row in rows if row[part] is not None]
+    metres, micrometres = zip(*kept, strict=True)
+    return {"count": len(kept), "rms": _rms(metres), "rms_um": _rms(micrometres)}
 
 
 def _standing_out(document: Document, role: str, part: str) -> list[str]:
     return [row["id"] for row in _rows(document, role) if part in row["stands_out"]]
 
 
-def _rms(rows: list[Document], key: str) -> float:
-    return float((sum(row[key] ** 2 for row in rows) / len(rows)) ** 0.5)
+def _rms(values: Sequence[float]) -> float:
+    return float((sum(value**2 for value in values) / len(values)) ** 0.5)
 
 
 def _tolerances(document: Document) -> Iterator[str]:

@@ -38,13 +38,15 @@ class Propagation:
     errors: StripErrors
     control: control_errors.Misclosures  # control coordinates that count
     fit: control_errors.FitOperator
-    influence: Floats  # (q, 3, t): points by the parameters of the fit
+    xyz: Floats  # (q, 3): points after the similarity, where the fit takes away its influence
     sightings: Sightings  # of the points on the photos
     resection: Resection
 
     def photos(self) -> Iterator[PhotoErrors]:
         """Rows of the photos that could be oriented, some at a time."""
-        return differentiate_photos(self.errors, self.sightings, self.resection, self.influence)
+        return differentiate_photos(
+            self.errors, self.sightings, self.resection, lambda rows: self.fit.influence(self.xyz[rows])
+        )
 
 
 class CheckPoints(NamedTuple):
@@ -93,7 +95,7 @@ def by_fit(
     factor: variance factor of the image coordinates.
     """
     at = compared.coordinates
-    influence = np.einsum("wi,wit->wt", at.direction, found.influence[compared.checks.rows][at.point])
+    influence = np.einsum("wi,wit->wt", at.direction, found.fit.influence(found.xyz[compared.checks.rows])[at.point])
     return _errors(compared, after_fit(found.errors, at.rows, parameters, influence), factor)
 
 

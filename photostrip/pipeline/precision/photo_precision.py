@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
+AT_ONCE = 4096  # points, for the sake of memory
+
+
 def of_photos(
     strip: StripResult, oriented: OrientedStrip[StripErrors], observations: PhotoPoints, given: ControlPoints
 ) -> StripPrecision:
@@ -40,7 +43,10 @@ def of_photos(
     stated = strip.of_photos.sigma
     factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
-    points = covariances.covariances(errors, errors.points, parameters, found.influence) * factor
+    points = np.empty((len(xyz), 3, 3))
+    for start in range(0, len(xyz), AT_ONCE):
+        part, influence = errors.points.part(start, start + AT_ONCE), fit.influence(xyz[start : start + AT_ONCE])
+        points[start : start + AT_ONCE] = covariances.covariances(errors, part, parameters, influence) * factor
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
     for some in found.photos():
         photos[some.photos] = covariances.covariances(errors, some.rows, parameters, some.influence) * factor
@@ -88,7 +94,6 @@ def propagation(strip: StripResult, oriented: OrientedStrip[StripErrors], observ
     errors, found = oriented.errors, oriented.misclosures
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
     fit = control_errors.fit_operator(found, oriented.weights, oriented.at_control, terms, errors.origin)
-    influence = fit.influence(oriented.xyz)
     rows, flown = strip.of_photos.rows, strip.of_photos.strip
     point = np.searchsorted(strip.formed.point, observations.point[rows])
     sightings = photo_errors.Sightings(
@@ -102,7 +107,7 @@ def propagation(strip: StripResult, oriented: OrientedStrip[StripErrors], observ
         errors=errors,
         control=found,
         fit=fit,
-        influence=influence,
+        xyz=oriented.xyz,
         sightings=sightings,
         resection=strip.of_photos.resection,
     )

@@ -17,7 +17,7 @@ from photostrip.triangulation.resection.collinearity import partials
 from photostrip.triangulation.resection.resection import runs
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
@@ -50,11 +50,11 @@ class PhotoErrors:
 
 
 def differentiate_photos(
-    errors: StripErrors, sightings: Sightings, resection: Resection, point_influence: Floats
+    errors: StripErrors, sightings: Sightings, resection: Resection, influence: Callable[[Numbers], Floats]
 ) -> Iterator[PhotoErrors]:
     """Differentiate the resections, some photos at a time: all their rows together are the largest table of a run.
 
-    point_influence: (q, 3, t), what the fit takes away from the points.
+    influence: (n, 3, t), what the fit takes away from n of the points.
 
     The points carry the photo with them, and its measurements move it once more: do = sum by_point dX + by_image dl.
     """
@@ -63,11 +63,15 @@ def differentiate_photos(
     ends = np.searchsorted(sightings.photo, np.arange(len(resection.centers) + 1))
     for low, high in runs(ends, SIGHTINGS):
         some = sightings.take(np.arange(ends[low], ends[high]))
-        yield _some_photos(errors, some, resection, point_influence, distance)
+        yield _some_photos(errors, some, resection, influence, distance)
 
 
 def _some_photos(
-    errors: StripErrors, sightings: Sightings, resection: Resection, point_influence: Floats, distance: float
+    errors: StripErrors,
+    sightings: Sightings,
+    resection: Resection,
+    influence: Callable[[Numbers], Floats],
+    distance: float,
 ) -> PhotoErrors:
     """Differentiate the resections of the photos that have sightings."""
     photos, starts, item = np.unique(sightings.photo, return_index=True, return_inverse=True)
@@ -106,7 +110,7 @@ def _some_photos(
         image=image,
         by_image=by_image,
     )
-    return PhotoErrors(rows, flat @ point_influence[point].reshape(count, 3 * most, -1), photos)
+    return PhotoErrors(rows, flat @ influence(point.ravel()).reshape(count, 3 * most, -1), photos)
 
 
 class _Resected(NamedTuple):

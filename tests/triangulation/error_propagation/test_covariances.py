@@ -59,7 +59,7 @@ def test_derivatives_are_those_of_the_whole_run(
     found = errors_of(result)
     images, operator = found.errors.images, found.fit.operator
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
-    points = written_out(found.errors.points, found.errors) - found.influence @ operator @ misclosures
+    points = written_out(found.errors.points, found.errors) - found.fit.influence(found.xyz) @ operator @ misclosures
     (of_photos,) = found.photos()
     photos = written_out(of_photos.rows, found.errors) - of_photos.influence @ operator @ misclosures
     rng = np.random.default_rng(2)
@@ -80,7 +80,7 @@ def test_the_fit_passes_on_errors_of_the_control(adjustment: str, use: dict[str,
     inputs, wanted = without_noise(spec(7, use=use)), settings(adjustment)
     result = triangulate(inputs, wanted)
     found = errors_of(result)
-    by_control = found.influence @ found.fit.operator
+    by_control = found.fit.influence(found.xyz) @ found.fit.operator
     names = [inputs.control.ids.index(name) for name in result.strips[0].control.ids]
     for column in nonempty(range(0, len(found.control.point), 5)):
         row, axis = names[found.control.point[column]], int(found.control.axis[column])
@@ -100,7 +100,7 @@ def test_sums_along_the_strip_equal_the_whole_matrices(photos: int, lap: float, 
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
     (of_photos,) = found.photos()
     for rows, influence in (
-        (found.errors.points, found.influence),
+        (found.errors.points, found.fit.influence(found.xyz)),
         (of_photos.rows, of_photos.influence),
     ):
         by_control = influence @ found.fit.operator
@@ -127,7 +127,7 @@ def test_the_operator_makes_the_correction_that_was_made() -> None:
     found = errors_of(result)
     similar = strip.absolute.similarity(strip.formed.xyz)
     given = strip.absolute.misclosures[found.control.point, found.control.axis]
-    moved = similar - found.influence @ (found.fit.operator @ given)
+    moved = similar - found.fit.influence(found.xyz) @ (found.fit.operator @ given)
     assert moved == pytest.approx(strip.xyz, abs=1e-6)
 
 
@@ -163,7 +163,10 @@ def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
     found = errors_of(result)
     place = int(np.searchsorted(formed.point, point))
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
-    by_image = written_out(found.errors.points, found.errors) - found.influence @ found.fit.operator @ misclosures
+    by_image = (
+        written_out(found.errors.points, found.errors)
+        - found.fit.influence(found.xyz) @ found.fit.operator @ misclosures
+    )
     for row in (rows[0], rows[2], int(np.flatnonzero(observations.photo == 3)[2])):
         by_points, _ = differenced(result, (int(row), 1), 2e-4)
         image = int(np.flatnonzero(found.errors.images.row == row)[0])
