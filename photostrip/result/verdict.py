@@ -162,8 +162,7 @@ def headline_rms(document: Document, role: str, part: str) -> Document:
         return whole
     rows = (_without_rejected(row) for row in _rows(document, role) if row["id"] not in out)
     kept = [(row[part], row[f"{part}_um"]) for row in rows if row[part] is not None]
-    metres, micrometres = zip(*kept, strict=True)
-    return {"count": len(kept), "rms": _rms(metres), "rms_um": _rms(micrometres)}
+    return {"count": len(kept), **dict(zip(("rms", "rms_um"), map(_rms, zip(*kept, strict=True)), strict=True))}
 
 
 def _standing_out(document: Document, role: str, part: str) -> list[str]:

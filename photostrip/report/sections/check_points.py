@@ -48,20 +48,23 @@ def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
 def _tested(document: Document, given: Sequence[Document], *, everything: bool, most: int) -> Table:
     check = document["precision"]["check"]
     tested = {row["id"]: row for row in check["points"]}
-    points = {row["id"]: row for row in document["points"]}
-    rows = []
-    for row in given:
+    where = ("points", "check", "control")
+    worst, note = worst_first(
+        given, lambda row: _unlikely(tested.get(row["id"], UNKNOWN)), where, everything=everything, most=most
+    )
+    names = {row["id"] for row in worst}
+    points = {row["id"]: row for row in document["points"] if row["id"] in names}
+    shown = []
+    for row in worst:
         point, z = points.get(row["id"], UNKNOWN), tested.get(row["id"], UNKNOWN)
         sigma = {key: point[key] for key in ("sigma_x", "sigma_y", "sigma_z")}
         likely = {"z_plan": z["plan"], "z_height": z["height"], "p_plan": z["p_plan"], "p_height": z["p_height"]}
-        rows.append({**row, **sigma, **likely})
+        shown.append({**row, **sigma, **likely})
     more = (words("use", "use", rank=2), words("strips", lambda row: ", ".join(row["strips"]), rank=3))
     seen = _Seen([check[part]["rms"] for part in PARTS], [_inside(check[part]) for part in PARTS])
     odd = [row["id"] for row in given if row.get("stands_out")]
     without = f"rms of z without {listed(odd, IDS_NAMED)}" if odd else ""
-    where = ("points", "check", "control")
-    shown, note = worst_first(rows, _unlikely, where, everything=everything, most=most)
-    return _table(document, rows, shown, more, seen, joined(note, MEANING, without))
+    return _table(document, given, shown, more, seen, joined(note, MEANING, without))
 
 
 def cross_validation_section(document: Document, *, everything: bool, most: int = ALL_SHOWN) -> Section:
