@@ -38,6 +38,7 @@ from photostrip.simulation import (
     Film,
     Flight,
     Gnss,
+    GrossError,
     Ground,
     Image,
     Models,
@@ -423,6 +424,14 @@ def dense(seed: int) -> Sound:
     return sound_of(made(rng, seed, draw), "bundle")
 
 
+def wrong_images(seed: int) -> Sound:
+    """Make blocks of two strips with eight image coordinates that are wrong by up to a millimetre along the base."""
+    size = float(np.random.default_rng([26, seed]).uniform(100, 1000))
+    spec = plausibility.with_ties(2)(seed).spec
+    simulation = simulate(replace(spec, gross_errors=(GrossError("image", count=8, size_um=size, axis="x"),)))
+    return Sound(inputs_of(simulation), settings_of(simulation), simulation.spec)
+
+
 def large_block(seed: int) -> Sound:
     """Make blocks of ten strips of forty photos, held by GNSS and control in the corners."""
     rng = np.random.default_rng([25, seed])
@@ -457,6 +466,7 @@ LAYOUTS: dict[str, Callable[[int], Sound]] = {
     "two lists in two zones": two_lists,
     "given orientations": given_orientations,
     "dense points": dense,
+    "blocks with wrong image coordinates": wrong_images,
     "GNSS blocks of 10 strips of 40 photos": large_block,
 }
 

@@ -162,6 +162,18 @@ def of_models(seed: int) -> Case:
     raise SystemExit(f"no models can be made of seed {seed}")
 
 
+def with_ties(strips: int) -> Callable[[int], Case]:
+    """Simulate blocks of so many strips with many points, without a mistake."""
+
+    def make(seed: int) -> Case:
+        rng = np.random.default_rng([24, seed])
+        flight, points = Flight(photos=6, strips=strips), Points(extra_per_model=20)
+        simulation = simulate(Spec(seed=seed, flight=flight, control=Control(bands=3), points=points))
+        return Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
+
+    return make
+
+
 def holds_both_ends(case: Case) -> bool:
     """Whether neither end lies farther beyond the control than a third of what it spans: to leave one out is a mistake.
 
@@ -831,9 +843,7 @@ def same_id_in_two_strips(case: Case) -> Planted | None:
     """Give a point of one strip the id of a point of another, a quarter of a base away at least."""
     o, truth = case.inputs.observations, case.simulation.truth
     given = set(case.inputs.control.ids)
-    strip_of = {photo: number for number, strip in enumerate(case.inputs.strips) for photo in strip.photos}
-    owner = np.array([strip_of[photo] for photo in o.photo_ids])[o.photo]
-    rays = np.array([np.bincount(o.point[owner == k], minlength=len(o.point_ids)) for k in (0, 1)])
+    rays, _ = rays_by_strip(case)
     free = np.array([name not in given for name in o.point_ids])
     ones, others = (np.flatnonzero(free & (rays[k] > 1) & (rays[1 - k] == 0)) for k in (0, 1))
     if not len(ones) or not len(others):
@@ -844,6 +854,47 @@ def same_id_in_two_strips(case: Case) -> Planted | None:
         return None
     changed = replace(o, point=np.where(o.point == other, one, o.point))
     return replace(case.inputs, observations=changed), frozenset({o.point_ids[one]})
+
+
+def rays_by_strip(case: Case) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Count the rays (s, p) that each strip has of each point; in which strip each image point is."""
+    o = case.inputs.observations
+    strip_of = {photo: number for number, strip in enumerate(case.inputs.strips) for photo in strip.photos}
+    owner = np.array([strip_of[photo] for photo in o.photo_ids])[o.photo]
+    counts = [np.bincount(o.point[owner == k], minlength=len(o.point_ids)) for k in range(len(case.inputs.strips))]
+    return np.array(counts), owner
+
+
+def same_id_nearby(case: Case) -> Planted | None:
+    """Take two ties of two strips, 0.2 to 1 % of the flying height apart, for one: each strip shows one of them."""
+    o, truth, wanted = case.inputs.observations, case.simulation.truth, case.rng.uniform(0.002, 0.01)
+    rays, owner = rays_by_strip(case)
+    free = np.array([name in truth.points.ids and name not in case.inputs.control.ids for name in o.point_ids])
+    ties = np.flatnonzero((rays > 1).all(axis=0) & free)
+    places = np.array([truth.points.xyz[truth.points.ids.index(o.point_ids[each])] for each in ties])
+    apart = np.linalg.norm(places[:, None] - places, axis=2) + np.diag(np.full(len(ties), np.inf))
+    pair = np.unravel_index(int(np.abs(apart - wanted * case.spec.flying_height).argmin()), apart.shape)
+    one, other = ties[list(pair)].tolist()
+    keep = ~((o.point == one) & (owner == 1)) & ~((o.point == other) & (owner == 0))
+    point = np.where(o.point == other, one, o.point)[keep]
+    changed = replace(o, photo=o.photo[keep], point=point, xy=o.xy[keep], sigma=o.sigma[keep])
+    return replace(case.inputs, observations=changed), frozenset({o.point_ids[one]})
+
+
+def same_id_far_away(case: Case) -> Planted | None:
+    """Give a point of the third strip the id of one of the first, which it does not overlap."""
+    o, (rays, _) = case.inputs.observations, rays_by_strip(case)
+    free = np.array([name not in case.inputs.control.ids for name in o.point_ids])
+    ones = np.flatnonzero(free & (rays[0] > 1) & (rays[2] == 0))
+    others = np.flatnonzero(free & (rays[2] > 1) & (rays[:2] == 0).all(axis=0))
+    one, other = int(case.rng.choice(ones)), int(case.rng.choice(others))
+    changed = replace(o, point=np.where(o.point == other, one, o.point))
+    return replace(case.inputs, observations=changed), frozenset({o.point_ids[one]})
+
+
+def sigma_of_given(case: Case) -> Planted | None:
+    """State standard deviations of given points in millimetres."""
+    return with_control(case, sigma=case.inputs.control.sigma * 1000.0), NOBODY
 
 
 def lies_there(case: Case, crs: str) -> bool:
@@ -1038,6 +1089,8 @@ MISTAKES = (
     Mistake("one id for two points", same_id, ("P301",)),
     Mistake("one id for two points of two strips", same_id_in_two_strips, ("P301",), block),
     Mistake("one id for two points of two strips, bundle", same_id_in_two_strips, ("P301",), block, "bundle"),
+    Mistake("one id for two points nearby in two strips", same_id_nearby, ("P301",), with_ties(2)),
+    Mistake("one id in strips that do not overlap", same_id_far_away, ("P301",), with_ties(3)),
     Mistake("two ids for one point", two_ids, ("P302",)),
     Mistake("ids of one photo in the next row", ids_in_the_next_row, ("P303",)),
     Mistake("points in another order on each photo", numbered_anew, ("P303",)),
@@ -1069,6 +1122,7 @@ MISTAKES = (
     Mistake("all heights zero", heights_of_nothing, ("P410",)),
     Mistake("heights in millimetres", heights_in_millimetres, ("P405",)),
     Mistake("standard deviation of images in micrometres", sigma_in_micrometres, ("P108",)),
+    Mistake("standard deviation of control in millimetres", sigma_of_given, ("P108",)),
     Mistake("image coordinates from a corner", counted_from_a_corner, ("P101",)),
     Mistake("one photo from a corner", one_from_a_corner, ("P101",)),
     Mistake("control at one end", at_one_end, ("P501",)),
