@@ -80,9 +80,9 @@ def find_wrong_distance(
     first = as_given or compare(formed) or compare(formed.whole)
     if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < wrong_heights.LEAST_SCALE_ERROR:
         return []
-    sigma0, stated = _middle_sigma0(formed), formed.strip.median_sigma(observations)
+    sigma0 = _middle_sigma0(formed)
     no_bend = first.misfit > len(formed.strip.photos) ** BEND_POWER
-    if not (stretched or no_bend or sigma0 > ASKING_SIGMA0 * stated):
+    if not (stretched or no_bend or pairs_ask(formed, observations)):
         return []
     for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(observations)]:
         trial = _followed(formed.strip, observations, settings, compare, start)
@@ -117,6 +117,11 @@ def find_distance_without_pairs(
 def _most_starts(observations: PhotoPoints) -> int:
     """Count the starts that a project with so many points allows each of its strips."""
     return max(MOST_POINTS // (TRIALS * max(len(observations.point), 1)), 1)
+
+
+def pairs_ask(formed: EvidenceStrip, observations: PhotoPoints) -> bool:
+    """Whether the pairs of a strip fit so badly that another principal distance may be the reason."""
+    return _middle_sigma0(formed) > ASKING_SIGMA0 * formed.strip.median_sigma(observations)
 
 
 def _middle_sigma0(formed: EvidenceStrip) -> float:

@@ -95,7 +95,14 @@ def by_strip(
     for strip, each in zip(strips, formed, strict=True):
         readings = _of_strip(strip, each, images, control)
         of_strip = [finding for reading in readings for finding in reading.findings]
-        if strip.id in tried and not any(finding.is_error for finding in of_strip):
+        errors = {finding.code for finding in of_strip if finding.is_error}
+        if (
+            errors == {wrong_readings.NO_FIT}
+            and each is not None
+            and distance_trial.pairs_ask(each, images.observations)
+        ):
+            errors = set()  # a strip that a wrong distance tears apart fits no control
+        if strip.id in tried and not errors:
             whole = readings[0].heights if len(readings) == 1 and not control.as_written else None
             # where the distance is wrong, single points prove nothing
             stretch = wrong_heights.stretch_of(whole)

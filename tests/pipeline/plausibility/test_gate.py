@@ -655,6 +655,26 @@ def test_mistakes_of_whole_columns_and_rows_are_told(
     assert not ids or ids & named[code]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("plant", "seed", "code", "other"),
+    [
+        (plausibility.ten_distances_without_format, 7500239, "P105", "P409"),
+        (plausibility.of_other_points, 7630004, "P409", "P105"),
+    ],
+)
+def test_a_strip_that_a_wrong_distance_tears_apart_is_not_taken_for_control_of_other_points(
+    plant: Callable[[plausibility.Case], plausibility.Planted | None], seed: int, code: str, other: str
+) -> None:
+    """Its bases came out 0.2 to 7 times as long as their neighbours; heights of other points fit no distance."""
+    case = plausibility.sound(seed)
+    planted = plant(case)
+    assert planted is not None
+    named = set(plausibility.told(planted[0], case.settings).after)
+    assert code in named
+    assert other not in named
+
+
 def test_every_kind_of_mistake_is_planted_in_the_benchmark() -> None:
     assert {code for mistake in plausibility.MISTAKES for code in mistake.codes} == set(KINDS)
 

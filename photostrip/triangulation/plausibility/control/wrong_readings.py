@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
     Complex = NDArray[np.complex128]
 
+NO_FIT = "P409"
 MIRRORED_SHARE = 0.15  # of the misclosure of the strip as it is, left when it is mirrored
 FIT_SHARE = 0.1  # of the extent of the control: a misclosure above it is no fit
 LEAST_FAR, ROWS_SHARE = 3, 0.2  # points that are so far off, of all: their coordinates may stand in the next row
@@ -208,7 +209,7 @@ def _rows(
             )
             evidence: Evidence = {"misclosure_as_given_m": normal.median, "misclosure_m": fit.median}
             fix = "put the ids into the rows of their coordinates"
-            return [found("P409", message, fix, evidence, strips=(on_strip.strip,), key="control")]
+            return [found(NO_FIT, message, fix, evidence, strips=(on_strip.strip,), key="control")]
     return []
 
 
@@ -222,4 +223,4 @@ def _of_other_points(on_strip: StripPoints, normal: PlanSimilarity, extent: floa
     )
     evidence: Evidence = {"misclosure_m": normal.median, "extent_of_control_m": extent}
     fix = "do its ids and coordinates belong to these photos, and to the points that were measured?"
-    return [found("P409", message, fix, evidence, strips=(on_strip.strip,), key="control")]
+    return [found(NO_FIT, message, fix, evidence, strips=(on_strip.strip,), key="control")]
