@@ -49,6 +49,22 @@ def test_no_line_is_wider_than_the_page_or_ends_in_a_blank(
     assert [line for line in lines if line != line.rstrip() or "\n" in line] == []
 
 
+@given(st.lists(st.tuples(st.booleans(), st.integers(0, 3), st.integers(3, 30)), min_size=5, max_size=14))
+def test_a_table_gives_way_as_soon_as_it_is_one_cell_too_wide(columns: list[tuple[bool, int, int]]) -> None:
+    """The pages that its own lines just fill, and those a cell narrower."""
+    row = tuple("x" * size for _, _, size in columns)
+    table = Table(tuple(Column("d", "", left, rank) for left, rank, _ in columns), (row,))
+
+    def widest(page: int) -> int:
+        return max(cells(line.text) for line in lay_out("", [Section("", (table,))], page))
+
+    width = widest(WIDEST)
+    while NARROWEST < width <= WIDEST:
+        assert widest(width) == width
+        width, wider = widest(width - 1), width
+        assert width < wider
+
+
 @given(WORDS, st.integers(20, 200))
 def test_wrapping_keeps_every_word(text: str, width: int) -> None:
     lines = wrapped(text, width)
