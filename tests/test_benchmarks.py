@@ -249,3 +249,16 @@ def test_verdict_prints_what_is_seen() -> None:
     assert rows[0][2] == rows[1][2] == "1"  # the sound ones are good
     assert rows[4][2] == rows[5][2] == "0"  # those with control ten times worse than stated are not
     assert rows[5][6] == "1"  # seen in each of ten strips; by check points in seven
+
+
+@pytest.mark.slow
+def test_variance_components_prints_a_row_for_each_group() -> None:
+    out = printed("variance_components.py", "1", "--workers", "1")
+    assert (
+        len(
+            re.findall(
+                r"^(?:image|control|positions)[a-z ]* +\d\.00 +\d\.\d{3} +nan(?: +\d\.\d{3}){2}$", out, re.MULTILINE
+            )
+        )
+        == 5
+    )
