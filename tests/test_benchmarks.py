@@ -97,7 +97,7 @@ def test_batch_prints_overhead_and_speed_up() -> None:
 
 @pytest.mark.slow
 def test_planning_prints_predicted_and_actual_deviations() -> None:
-    options = ("--repeat", "60", "--models", "4", "--layouts", "3 bands", "--methods", "similarity", "bundle")
+    options = ("--repeat", "30", "--models", "4", "--layouts", "3 bands", "--methods", "similarity", "bundle")
     out = printed("planning.py", "--part", "model", "strip", "reliability", *options)
     assert len(found := re.findall(r"^3 bands +(?:along|across|up) +\d\.\d{3} +(\d+\.\d) %$", out, re.MULTILINE)) == 3
     assert all(60 < float(share) < 97 for share in nonempty(found))
