@@ -230,7 +230,7 @@ class Stopwatch:
 pipeline = import_module("photostrip.pipeline.run")  # the module; the package gives the function
 # functions imported by name are timed where they are called
 of_strips = import_module("photostrip.pipeline.strips.photos")
-adjusting = import_module("photostrip.pipeline.strips.adjusting")
+choosing = import_module("photostrip.pipeline.strips.choosing")
 by_covariance = import_module("photostrip.triangulation.covariance_adjustment.adjust")
 common = import_module("photostrip.pipeline.common_points")
 screened_formation = import_module("photostrip.pipeline.strips.screened_formation")
@@ -247,7 +247,7 @@ STAGES = (
     ("absolute orientation", absolute_orientation, "orient"),
     ("polynomial", correction, "fit"),
     ("adjustment by the covariance", by_covariance, "adjust"),
-    ("choice of the method", adjusting, "choose"),
+    ("choice of the method", choosing, "choose"),
     ("resection", of_strips, "resect"),
     ("points of all strips", common, "_joined"),
     ("differences at given points", pipeline, "compare_with_given"),
