@@ -193,13 +193,14 @@ def test_ablation_changes_constants_where_they_are_imported_and_everything_it_sw
     program = """
 import sys
 from benchmarks import ablation
+from photostrip import rejection
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.gross_errors.pairs import deletion, global_test, pair_search
 from photostrip.triangulation.gross_errors.rays import point_decisions
 from photostrip.triangulation.bundle.settings import BundleSettings
 names = [f"{module.rpartition('.')[2]}.{name}" for module, name, _ in ablation.constants()]
 assert {"settings:BundleSettings.level", "strip_network.LEVEL", "point_decisions.LIKELIER"} < set(names)
-ablation.put(reliability.__name__, "UNCONTROLLED", 0.25)
+ablation.put(rejection.__name__, "UNCONTROLLED", 0.25)
 assert point_decisions.UNCONTROLLED == reliability.UNCONTROLLED == 0.25
 ablation.put(global_test.__name__, "FIFTH_WRONG", 2.5)  # the default of a class method, and of a named argument
 assert global_test.ParallaxScatter.of.__defaults__ == (2.5,)
