@@ -47,7 +47,14 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
     believed = excess <= MOST_EXCESS or len(distinct(_bands(oriented))) < TELLING
     if left_out is not None and not believed and left_out.ratio > 1 / BETTER:
         taken = POLYNOMIAL
-    return Choice(taken=taken, predicted=predicted, left_out=left_out, left_out_by=by, excess=excess)
+    return Choice(
+        taken=taken,
+        predicted=predicted,
+        left_out=left_out,
+        left_out_by=by,
+        excess=excess,
+        distances=covariance.tested.distances,
+    )
 
 
 def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Witness:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Floats, Numbers
+    from photostrip.pipeline.choice import Deformation
     from photostrip.pipeline.inputs import ModelStrip, Strip
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.rejection import Rejection
@@ -228,24 +229,31 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
         yield Note("covariance-proposed", text, severity="note", strip=strip.id)
 
 
-def covariance_notes(
-    strip: Strip, control: ControlPoints, formed: FormedStrip, adjusted: CovarianceAdjustment | None
-) -> Iterator[Note]:
-    """Say what the tests of the adjustment with the covariance of the strip found, and what it could not take.
+def distance_notes(strip: Strip, formed: FormedStrip, found: Deformation) -> Iterator[Note]:
+    """Say what the adjustment with the covariance did not take, also where it was only compared with the polynomial."""
+    used, joined = 0, formed.junctions
+    if found.choice is not None:
+        used = found.choice.distances
+    elif found.covariance is not None:
+        used = found.covariance.tested.distances
+    known = int(joined.used.sum()) - len(distinct(joined.junction[joined.used]))
+    if 0 < used < known:
+        text = (
+            f"strip {strip.id}: its points lie on so many photos that the adjustment with the covariance used "
+            f"{used} of {known} distances at the junctions; a bundle uses all, and takes less time"
+        )
+        yield Note("distances-left-out", text, severity="note", strip=strip.id)
+
+
+def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceAdjustment | None) -> Iterator[Note]:
+    """Say what the tests of the adjustment with the covariance of the strip found.
 
     Returns doubtful control, the worst point only: it raises the test values of its neighbours; and a failed test of
         the whole.
     """
     if adjusted is None:
         return
-    tested, joined = adjusted.tested, formed.junctions
-    known = int(joined.used.sum()) - len(distinct(joined.junction[joined.used]))
-    if 0 < tested.distances < known:
-        text = (
-            f"strip {strip.id}: its points lie on so many photos that the adjustment with the covariance used "
-            f"{tested.distances} of {known} distances at the junctions; a bundle uses all, and takes less time"
-        )
-        yield Note("distances-left-out", text, severity="note", strip=strip.id)
+    tested = adjusted.tested
     worst = tested.doubtful[:1]
     for row in worst.tolist():
         name, axis = control.ids[adjusted.control.point[row]], GROUND_AXES[adjusted.control.axis[row]]

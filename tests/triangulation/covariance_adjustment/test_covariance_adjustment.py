@@ -342,5 +342,14 @@ def test_points_on_many_photos_leave_so_many_distances_to_each_junction(monkeypa
     notes = triangulate(result.inputs, COVARIANCE).notes
     (note,) = (each for each in notes if each.code == "distances-left-out")
     assert f"{len(left)} of {len(every)} distances" in note.message
+    auto = Settings(relative=UNSCREENED)
+    compared = triangulate(result.inputs, auto)
+    assert [each for each in compared.notes if each.code == note.code] == [note]
+    monkeypatch.setattr("photostrip.pipeline.strips.choosing.method_of", lambda _: "polynomial")
+    taken = triangulate(result.inputs, auto)
+    choice = taken.strips[0].choice
+    assert choice is not None
+    assert choice.taken == "polynomial"
+    assert [each for each in taken.notes if each.code == note.code] == [note]
     monkeypatch.undo()
     assert note.code not in {each.code for each in triangulate(result.inputs, COVARIANCE).notes}
