@@ -30,11 +30,13 @@ def cross_validate(result: Result, adjust: Callable[[Inputs], Result]) -> tuple[
 
     adjust: adjusts the formed strips with other control.
     """
-    control = result.inputs.control
-    folds = []
+    control, folds = result.inputs.control, []
+    # the search in a strip need not find again what the whole rejected; a bundle begins without it by itself
+    use = control.use & ~rejected_control(result) if result.bundle is None else control.use
+    taken = np.flatnonzero(~control.check & use.any(axis=1))
     for group in _groups(result):
         left_out = np.isin(np.arange(len(control)), group)
-        given = replace(control, check=left_out).take(np.flatnonzero(~control.check))
+        given = replace(control, check=left_out, use=use).take(taken)
         ids = tuple(control.ids[row] for row in np.sort(group))
         try:
             folds.append(Fold(ids, adjust(replace(result.inputs, control=given))))
@@ -46,7 +48,7 @@ def cross_validate(result: Result, adjust: Callable[[Inputs], Result]) -> tuple[
 def _groups(result: Result) -> list[Numbers]:
     """Return rows of the control to be left out together: single points, or points as far apart as can be.
 
-    Control that was found wrong says nothing about the result and stays where it is.
+    Control that was found wrong says nothing about the result and is not among them.
     """
     control = result.inputs.control
     used = control.use.any(axis=1) & ~control.check & ~rejected_control(result).any(axis=1)

@@ -91,8 +91,9 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     # 2-5 relative orientation, base direction and orientation chain, space intersection, strip formation
     formed = form_strips(inputs, refined.observations, settings, stages)
 
-    def on_the_ground(inputs: Inputs, before: Bundle | None = None) -> Result:
-        adjusted = _adjusted(inputs, settings, ground, refined.observations, formed, stages, before)
+    def on_the_ground(inputs: Inputs, whole: Result | None = None) -> Result:
+        strips, before = (formed, None) if whole is None else (_as_left_by(whole, formed), whole.bundle)
+        adjusted = _adjusted(inputs, settings, ground, refined.observations, strips, stages, before)
         # 9 residuals, check points
         rows, differences = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
         return Result(
@@ -126,7 +127,18 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
         return result
     from photostrip.pipeline.cross_validation import cross_validate
 
-    return replace(result, folds=cross_validate(result, partial(on_the_ground, before=result.bundle)))
+    return replace(result, folds=cross_validate(result, partial(on_the_ground, whole=result)))
+
+
+def _as_left_by(whole: Result, formed: Sequence[StripStage[Any]]) -> Sequence[StripStage[Any]]:
+    """Give strips of photos without the wrong images of control that the whole adjustment found in them."""
+    if whole.bundle is not None or whole.inputs.models is not None:
+        return formed
+    of_photos = zip(cast("Sequence[FormedPhotos]", formed), whole.strips, strict=True)
+    return [
+        replace(stage, formed=strip.of_photos.formed, wrong_rays=strip.of_photos.wrong_rays)
+        for stage, strip in of_photos
+    ]
 
 
 def _adjusted(

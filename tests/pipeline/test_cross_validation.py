@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -17,8 +18,17 @@ from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.verdict import GOOD, LOOK, UNVERIFIED
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Models
+from photostrip.triangulation.bundle.solve import solve
+from photostrip.triangulation.gross_errors.control import control_screening
+from photostrip.triangulation.gross_errors.control.control_components import candidates
+from photostrip.triangulation.gross_errors.rays import snooping
 from tests.loops import nonempty
 from tests.results import solved, spec
+
+if TYPE_CHECKING:
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution
+    from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
 
 ADJUSTMENTS = ("similarity", "polynomial", "covariance", "bundle")
 TURNED = Settings(cross_validation=True)
@@ -143,3 +153,37 @@ def test_without_standard_deviations_nothing_is_predicted_but_differences_are_th
     assert 0.0 < block["plan"]["rms"] < 1.0
     assert document["verdict"]["verified"] is True
     assert any(each.title == "Cross-validation" for each in sections_of(document))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("adjustment", ["covariance", "bundle"])
+def test_control_that_the_whole_rejected_is_not_searched_for_again(
+    adjustment: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fifth of the control 30 m off: after the whole, each fold needs one round of tests, not one for each point."""
+    inputs = without_checks(bands=5)
+    enu, rng = inputs.control.enu.copy(), np.random.default_rng(2)
+    wrong = rng.choice(len(enu), len(enu) // 5, replace=False)
+    enu[wrong] += rng.choice([-30.0, 30.0], (len(wrong), 3))
+    searched, of_variances = list[int](), candidates
+    adjusted, of_bundle = list[int](), solve
+
+    def counted_search(whole: JointAdjustment) -> Columns:
+        searched.append(1)
+        return of_variances(whole)
+
+    def counted_adjustment(problem: BundleProblem, *, rough: bool = False) -> BundleSolution:
+        adjusted.append(1)
+        return of_bundle(problem, rough=rough)
+
+    monkeypatch.setattr(control_screening, "candidates", counted_search)
+    monkeypatch.setattr(snooping, "solve", counted_adjustment)
+    given = replace(inputs, control=replace(inputs.control, enu=enu))
+    document = solved(given, Settings(adjustment=adjustment)).document
+    alone = len(searched), len(adjusted)
+    again = solved(given, replace(TURNED, adjustment=adjustment)).document
+    rejected = {each["point"] for each in document["rejected"] if each["stage"] in {"control", "bundle"}}
+    assert rejected >= {given.control.ids[row] for row in wrong}
+    assert not rejected & {row["id"] for row in nonempty(again["cross_validation"]["points"])}
+    assert len(searched) == 2 * alone[0]  # nothing more than in the whole of the second run
+    assert len(adjusted) <= 2 * alone[1] + 3 * FOLDS

@@ -1,0 +1,126 @@
+"""20 photos with much that is wrong: processor time of whole runs, and how they end.
+
+Run it as ``python benchmarks/hard.py [case ...]``; all take a few minutes. A search is bounded in work: no input of 20
+photos takes more than 10 s of an idle core.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))  # run from anywhere, installed or not
+
+from photostrip.formats.output.simulation import project_files  # noqa: E402
+from photostrip.simulation import Control, Flight, Gnss, Ground, Points, Spec, Terrain, simulate  # noqa: E402
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+LIMIT = 10.0  # seconds
+BUNDLE = ("--set", "processing.adjustment=bundle")
+ALL, FOLDS = "--compare-methods", "--cross-validate"
+STRIP, BLOCK, LAP = Flight(photos=20), Flight(photos=5, strips=4), Flight(photos=20, end_lap_percent=94.0)
+
+
+def spec(flight: Flight, extra: int, bands: int, *, gnss: bool = False) -> Spec:
+    """Give strips over relief, with so many bands of control and more points in each model."""
+    return Spec(
+        flight=flight,
+        terrain=Terrain(relief=60.0),
+        ground=Ground(),
+        control=Control(every=bands),
+        points=Points(rows=5, extra_per_model=extra),
+        gnss=Gnss(use=True) if gnss else None,
+    )
+
+
+def moved(folder: Path, table: str, columns: slice, share: float, size: float) -> None:
+    """Move the coordinates of a share of the rows of a table by normal errors of a size."""
+    rng, place = np.random.default_rng(7), folder / table
+    with place.open(encoding="utf-8", newline="") as file:
+        head, *rows = csv.reader(file)
+    for row in rows:
+        if rng.random() < share:
+            row[columns] = [f"{float(value) + rng.normal(0.0, size):.4f}" for value in row[columns]]
+    with place.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([head, *rows])
+
+
+def images(share: float, mm: float) -> Callable[[Path], None]:
+    return lambda folder: moved(folder, "observations.csv", slice(2, 4), share, mm)
+
+
+def control(share: float) -> Callable[[Path], None]:
+    return lambda folder: moved(folder, "control.csv", slice(1, 4), share, 30.0)
+
+
+def cameras(folder: Path) -> None:
+    moved(folder, "gnss.csv", slice(1, 4), 1.0, 20.0)
+
+
+def sound(folder: Path) -> None:
+    """Leave it as it is."""
+
+
+CASES: dict[str, tuple[Spec, Callable[[Path], None], tuple[str, ...]]] = {
+    "strip of 200 points a photo": (spec(STRIP, 150, 5), sound, (ALL, FOLDS)),
+    "strip of 200 points, 30 % 0.1 mm wrong": (spec(STRIP, 150, 5), images(0.3, 0.1), (ALL, FOLDS)),
+    "strip, 25 % of the control 30 m off": (spec(STRIP, 60, 2), control(0.25), (FOLDS,)),
+    "block of 200 points, 30 % 5 mm wrong": (spec(BLOCK, 150, 2), images(0.3, 5.0), (ALL,)),
+    "block, 40 % of the control 30 m off": (spec(BLOCK, 60, 1), control(0.4), (*BUNDLE, FOLDS)),
+    "block, 20 % 5 mm wrong, variance components": (
+        spec(BLOCK, 100, 2), images(0.2, 5.0), (*BUNDLE, "--set", "processing.bundle.variance_components=true"),
+    ),
+    "block, 20 % 5 mm wrong, self-calibration": (
+        spec(BLOCK, 100, 2), images(0.2, 5.0),
+        (*BUNDLE, "--set", "processing.bundle.self_calibration=[principal_distance, principal_point, k1]"),
+    ),
+    "block, camera positions 20 m off": (spec(BLOCK, 100, 2, gnss=True), cameras, BUNDLE),
+    "94 % end lap, 813 points": (spec(LAP, 60, 3), sound, ()),
+    "94 % end lap, 813 points, 30 % 5 mm wrong": (spec(LAP, 60, 3), images(0.3, 5.0), (ALL,)),
+}  # fmt: skip
+
+
+def timed(folder: Path, options: tuple[str, ...]) -> tuple[float, int]:
+    """Run a project in a process of its own: its processor time in seconds, and its exit code."""
+    command = [sys.executable, "-m", "photostrip", "run", str(folder / "project.yaml"), *options]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, check=False, cwd=ROOT, env=environment, capture_output=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.returncode
+
+
+def main() -> int:
+    """Print the table; 1 where a case takes longer than it may."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("cases", nargs="*", metavar="CASE", help="words of the cases wanted; all by default")
+    wanted = parser.parse_args().cases
+    slow = 0
+    for name, (planned, spoil, options) in CASES.items():
+        if wanted and not any(word in name for word in wanted):
+            continue
+        with tempfile.TemporaryDirectory() as place:
+            for file, text in project_files(simulate(planned)).items():
+                (Path(place) / file).write_text(text, encoding="utf-8")
+            spoil(Path(place))
+            seconds, code = timed(Path(place), options)
+        shown = " ".join(each.removeprefix("processing.") for each in options if each != "--set")
+        print(f"{seconds:6.1f} s  exit {code}  {name:46s} {shown}", flush=True)
+        slow += seconds > LIMIT
+    return 1 if slow else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
