@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 JUNCTION, CONTROL, DISTANCE = 0, 1, 2
-# distances at all junctions over which a point reaches, at most: the time grows with their third power. 126 points on a
-# photo and 13 photos a point: 2 s in place of 15, rms 0.047 in place of 0.029 m; strips of 3 photos a point keep 333
+# distances at all junctions over which a point reaches, at most: the time grows with their third power, see the table
+# in docs/precision.md; strips of 3 photos a point keep 333
 MOST_DISTANCES = 1000
 
 
