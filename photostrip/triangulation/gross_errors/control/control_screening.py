@@ -109,7 +109,7 @@ def _laid(
     """Search, lay the strip on what is kept, and search from what was found, until the same is found."""
     kept, out = strip.control.use, None
     for _ in strip.coordinates.point:
-        laid = strip.laid_on(kept)
+        laid = strip.laid if kept is strip.control.use else strip.laid_on(kept)
         whole = adjust(laid, laid.misclosures(), covariance, bends=bends)
         out = whole.shrunk(whole.grown(whole.shrunk(start(whole) if out is None else out)))
         found = Found(whole, out)

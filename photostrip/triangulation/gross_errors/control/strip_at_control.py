@@ -80,6 +80,11 @@ class StripAtControl:
             share=len(inside) / len(self.design),
         )
 
+    @cached_property
+    def laid(self) -> StripAtControl:
+        """The strip laid on all its control."""
+        return self.laid_on(self.control.use)
+
     def laid_on(self, kept: Flags) -> StripAtControl:
         """Lay the strip on what is kept: a wrong point of 200 m turns it, and its rays, by a hundredth."""
         found, axes = self.coordinates, np.zeros((*kept.shape, 3))

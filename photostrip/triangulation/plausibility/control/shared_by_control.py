@@ -58,7 +58,7 @@ def find_shared(strip: StripAtControl) -> StretchedHeights | ShiftedList | None:
     if count <= strip.design.shape[1] + 1:
         return None
     try:
-        laid = strip.laid_on(strip.control.use)
+        laid = strip.laid
         whole = adjust(laid, laid.misclosures(), strip.covariance(np.arange(count)), bends=False)
     except PhotostripError:
         return None
