@@ -68,6 +68,7 @@ def test_several_methods_form_the_strips_once(count: Counter[str]) -> None:
     assert count == {"screen_pairs": 2, "form_strip": 2, "reject_wrong_control": 2 * (1 + folds) + 2}
 
 
+@pytest.mark.slow
 def test_other_image_coordinates_or_settings_are_another_strip(count: Counter[str]) -> None:
     given, stages = inputs(), all_stages()
     triangulate(given, Settings(), stages=stages)
@@ -82,6 +83,7 @@ def test_other_image_coordinates_or_settings_are_another_strip(count: Counter[st
     assert (count["form_strip"], count["reject_wrong_control"]) == (6, 8)
 
 
+@pytest.mark.slow
 def test_a_failure_is_looked_into_once_with_the_pairs_that_failed(count: Counter[str]) -> None:
     given, stages = inputs(), all_stages()
     o, rng = given.observations, np.random.default_rng(3)

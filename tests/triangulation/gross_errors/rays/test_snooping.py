@@ -131,6 +131,7 @@ def test_of_given_coordinates_one_more_goes_at_a_time_for_every_eight_that_went(
     assert [each.kind for each in worst] == [CONTROL] * (1 + more)
 
 
+@pytest.mark.slow
 def test_a_tenth_of_the_rays_takes_few_adjustments() -> None:
     """91 adjustments with one point of a neighbourhood at a time, and the same rays go."""
     result = adjusted(simulate(Spec(flight=Flight(photos=4, strips=2), points=Points(extra_per_model=60))))
