@@ -126,13 +126,9 @@ def _cells(quantity: Quantity, values: Sequence[Any]) -> Cells:
 
 def _texts(values: Sequence[Any]) -> Sequence[Any]:
     """Quote ids where CSV needs it; all are looked at together first."""
-    if set(map(type, values)) != {str}:
-        return list(map(_cell, values))
-    known = set(values)
-    if "" not in known and not ODD.search("".join(known)):
+    if set(map(type, values)) == {str} and "" not in (known := set(values)) and not ODD.search("".join(known)):
         return values
-    written = {value: _cell(value) for value in known}
-    return [written[value] for value in values]
+    return list(map(_cell, values))
 
 
 def _cell(text: str | Sequence[str] | None) -> str:
