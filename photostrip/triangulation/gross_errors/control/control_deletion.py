@@ -184,6 +184,21 @@ class JointAdjustment:
             return out
         return self.shrunk(tuple(column for column in out if column not in best.columns))
 
+    def exchanged(self, out: Columns) -> Columns:
+        """Leave a majority, then exchange a part for one of its size while the sum of squares falls [Hawkins 1994]."""
+        while not self.allows(out):
+            least = min(self.tests(out), key=lambda each: each.ratio).columns
+            out = tuple(column for column in out if column not in least)
+        best = self.without(out).squares
+        for part in [each for each in self.parts if set(each) <= set(out)]:
+            rest = tuple(column for column in out if column not in part)
+            others = [each for each in self.parts if len(each) == len(part) and not set(each) & set(out)]
+            left = self.without(rest).deletions(others)
+            found = max(left, key=lambda each: each.gain, default=None)
+            if found is not None and found.squares - found.gain < (1 - ROUNDING) * best:
+                return self.exchanged((*rest, *found.columns))
+        return out
+
     def tests(self, out: Columns) -> list[Deletion]:
         """Test every part that was deleted, beside the other deleted ones, against what stays."""
         rows = np.array(out, np.intp)

@@ -26,12 +26,9 @@ from photostrip.triangulation.gross_errors.control.control_rejections import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from photostrip.arrays import Floats
     from photostrip.points import ControlPoints
     from photostrip.rejection import Rejection
-    from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 
@@ -85,33 +82,35 @@ def _searched(strip: StripAtControl) -> Found | None:
     if count <= strip.design.shape[1]:
         return None
     covariance = strip.covariance(np.arange(count))
-    found = [_laid(strip, covariance, lambda _: ())]
+    found = [_laid(strip, covariance)]
     if not found[0].left.explained:  # much may be wrong
-        found += [_laid(strip, covariance, candidates, bends=bends) for bends in (True, False)]
+        found += [_laid(strip, covariance, much=True, bends=bends) for bends in (True, False)]
     told = [
         each
         for each in found
         if each.whole.allows(each.out) and each.left.squares <= BENT**2 * max(each.left.freedom, 1)
     ]
-    # of two equally small explanations the one that blames less control
+    # of two equally small explanations the one that blames less control, or explains more
     best = min(
         told,
-        key=lambda each: (not each.left.explained, len(each.out), len(each.coordinates)),
+        key=lambda each: (not each.left.explained, len(each.out), len(each.coordinates), each.left.squares),
         default=Found(found[0].whole, ()),
     )
     # where much is wrong, little is left to check the rest of wrong points, and to be lost
     return Found(best.whole, best.whole.completed(best.out)) if best is found[0] else best
 
 
-def _laid(
-    strip: StripAtControl, covariance: Floats, start: Callable[[JointAdjustment], Columns], *, bends: bool = False
-) -> Found:
+def _laid(strip: StripAtControl, covariance: Floats, *, much: bool = False, bends: bool = False) -> Found:
     """Search, lay the strip on what is kept, and search from what was found, until the same is found."""
     kept, out = strip.control.use, None
     for _ in strip.coordinates.point:
         laid = strip.laid if kept is strip.control.use else strip.laid_on(kept)
         whole = adjust(laid, laid.misclosures(), covariance, bends=bends)
-        out = whole.shrunk(whole.grown(whole.shrunk(start(whole) if out is None else out)))
+        if out is None:
+            out = candidates(whole) if much else ()
+        out = whole.shrunk(whole.grown(whole.shrunk(out)))
+        if much:
+            out = whole.shrunk(whole.grown(whole.exchanged(out)))
         found = Found(whole, out)
         before, kept = kept, kept_of(strip, found)
         if np.array_equal(before, kept):
