@@ -2,7 +2,7 @@
 
 The most significant hypothesis (a point in plan, in height, in both) is deleted and the rest tested again, until
 nothing is significant (``control_deletion``). Where the covariance does not explain what is left, the smallest set is
-looked for without which it does: wrong coordinates, and bends of the strip beyond it (``control_components``). Where
+looked for without which it does: wrong coordinates, and bends of the strip beyond it (``candidates``). Where
 there is none, what the tests of single points found is all.
 
 Source: derived; data snooping with correlated observations.
@@ -16,8 +16,7 @@ import numpy as np
 
 from photostrip.errors import PhotostripError
 from photostrip.frozen import dataclass, replace
-from photostrip.triangulation.gross_errors.control.control_components import candidates
-from photostrip.triangulation.gross_errors.control.control_deletion import adjust
+from photostrip.triangulation.gross_errors.control.control_deletion import adjust, projected
 from photostrip.triangulation.gross_errors.control.control_rejections import (
     Found,
     control_rejections,
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.points import ControlPoints
     from photostrip.rejection import Rejection
+    from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 
@@ -116,3 +116,32 @@ def _laid(strip: StripAtControl, covariance: Floats, *, much: bool = False, bend
         if np.array_equal(before, kept):
             break
     return found
+
+
+def candidates(whole: JointAdjustment) -> Columns:
+    """Columns whose own variance exceeds that with which all others predict them; as many as leave a check.
+
+    Errors that hide each other are found by no test of single points. So plan and height of every point, and every bend
+    of the strip, get a variance of their own beside the covariance of the misclosures. All begin as large as the
+    largest misclosure, and each is multiplied by its own test value, the root of (M w)_K^T (M w)_K / tr M_KK, as often
+    as there are parts (by the square, as in the source, into worse sets). Source: [Förstner 1979].
+    """
+    part = np.concatenate([np.full(len(columns), number) for number, columns in enumerate(whole.parts)])
+    columns = np.concatenate([np.array(columns) for columns in whole.parts])
+    errors = whole.errors[:, columns]
+    variance = np.full(len(whole.parts), float(np.abs(whole.w).max() ** 2 + whole.covariance.max()))
+    for _ in whole.parts:
+        covariance = whole.covariance + (errors * variance[part]) @ errors.T
+        projector = projected(covariance, whole.design)
+        squares = np.bincount(part, (errors.T @ (projector @ whole.w)) ** 2)
+        expected = np.bincount(part, np.einsum("ij,ij->j", errors, projector @ errors))
+        # of what nothing checks, rounding leaves less than nothing
+        variance *= np.sqrt(np.divide(squares, expected, out=np.ones_like(squares), where=expected > 0.0))
+    predicted = np.bincount(part, (whole.matrix.diagonal() * whole.size**2)[columns]) / np.bincount(part)
+    share = variance * predicted
+    found: list[int] = []
+    for number in np.argsort(-share, kind="stable").tolist():
+        if share[number] <= 1 or len(found) + len(whole.parts[number]) >= whole.freedom:
+            break
+        found += whole.parts[number]
+    return tuple(found)
