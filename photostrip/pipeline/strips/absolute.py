@@ -17,9 +17,9 @@ from photostrip.geometry.similarity import Similarity, similarity_derivatives
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Strip
 from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.error_propagation.strip_at_control import ControlRay, StripAtControl
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
-from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay, StripAtControl
 from photostrip.triangulation.plausibility.control.shared_by_control import find_shared
 
 if TYPE_CHECKING:

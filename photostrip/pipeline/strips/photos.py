@@ -15,7 +15,7 @@ from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.screened_formation import form_screened, with_readmitted
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.error_propagation.joint_covariances import joint_covariance
-from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
+from photostrip.triangulation.error_propagation.strip_at_control import ControlRay
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable

@@ -17,7 +17,7 @@ from photostrip.pipeline.strips.models import form_models, link_strip
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
-from photostrip.triangulation.gross_errors.control import strip_at_control
+from photostrip.triangulation.error_propagation import strip_at_control
 from photostrip.triangulation.independent_models import model_errors, perspective_centers
 from photostrip.triangulation.independent_models.settings import LinkSettings
 from photostrip.triangulation.polynomial import correction

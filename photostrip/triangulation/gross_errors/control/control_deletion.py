@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from photostrip.arrays import Flags, Floats
-    from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
+    from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
 
     Columns = tuple[int, ...]
 

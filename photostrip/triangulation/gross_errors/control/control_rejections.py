@@ -14,8 +14,8 @@ from photostrip.triangulation.gross_errors.control.control_deletion import ALPHA
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
+    from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
     from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
-    from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 
 EXCHANGED, WRONG_IMAGE, EITHER = "exchanged", "image", "image or coordinates"

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.points import ControlPoints
     from photostrip.rejection import Rejection
+    from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
     from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
-    from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 
 BENT = 2.5  # standard deviation of unit weight beyond which more is wrong with a strip than its control

@@ -24,8 +24,8 @@ from photostrip.triangulation.gross_errors.control.control_deletion import HEIGH
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
+    from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
     from photostrip.triangulation.gross_errors.control.control_deletion import JointAdjustment
-    from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 MORE_THAN_ALONE = 1.0 + 1e-6  # of what one point explains: a list may have one point only
 FALSE_ALARM = 1e-5  # probability of an error of all where there is none

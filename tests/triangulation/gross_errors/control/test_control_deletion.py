@@ -20,12 +20,13 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import Settings, triangulate
 from photostrip.points import ControlPoints
 from photostrip.result.document import document_of
+from photostrip.triangulation.error_propagation import strip_at_control
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
-from photostrip.triangulation.gross_errors.control import control_screening, strip_at_control
+from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
+from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.control_deletion import adjust
 from photostrip.triangulation.gross_errors.control.control_rejections import Found, reliability
-from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, control_points, fly, project
 
