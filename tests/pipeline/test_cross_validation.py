@@ -20,7 +20,6 @@ from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Models
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.gross_errors.control.control_components import candidates
 from photostrip.triangulation.gross_errors.rays import snooping
 from tests.loops import nonempty
 from tests.results import solved, spec
@@ -165,7 +164,7 @@ def test_control_that_the_whole_rejected_is_not_searched_for_again(
     enu, rng = inputs.control.enu.copy(), np.random.default_rng(2)
     wrong = rng.choice(len(enu), len(enu) // 5, replace=False)
     enu[wrong] += rng.choice([-30.0, 30.0], (len(wrong), 3))
-    searched, of_variances = list[int](), candidates
+    searched, of_variances = list[int](), control_screening.candidates
     adjusted, of_bundle = list[int](), solve
 
     def counted_search(whole: JointAdjustment) -> Columns:
