@@ -51,7 +51,7 @@ def compare_methods(
         for adjustment in (*METHODS, AUTO):
             waiting.at(f"adjusting: {adjustment}")
             # of auto only the choice is asked
-            more = ["processing.cross_validation=false"] if adjustment == AUTO else []
+            more = ["processing.cross_validation=false", "processing.precision=false"] if adjustment == AUTO else []
             wanted = [*assignments, f"processing.adjustment={adjustment}", *more]
             try:
                 result = loaded_from(project, wanted, stages=stages).run()
