@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.formats.measured.models import ModelTable, read_models
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.frozen import NamedTuple, dataclass
-from photostrip.notes import listed
+from photostrip.notes import counted, listed
 from photostrip.pipeline import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
 from photostrip.project.yaml.references import listed_photos
@@ -147,7 +147,7 @@ def _as_listed(
     """Check the models that a strip lists: they exist, are one fewer than photos, and show the right photos."""
     path = ("strips", number, "models")
     if len(named) != len(flight) - 1:
-        message = f"{len(named)} models are listed for {len(flight)} photos"
+        message = f"{counted(len(named), 'model')} listed for {counted(len(flight), 'photo')}"
         yield fault_at(root, path, message, "length", expected="one model for every two neighbouring photos")
     measured = list(tables.points.model_ids)
     for place, name in enumerate(named):

@@ -19,7 +19,7 @@ from photostrip.formats.text.numbers import number as read_number
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.zones import FEWEST, join_zones
 from photostrip.geometry.rotation import SYSTEMS
-from photostrip.notes import Note, listed
+from photostrip.notes import Note, counted, listed
 from photostrip.project.conversion import ground_columns
 from photostrip.project.models import ModelTables, model_tables, read_model_points
 from photostrip.project.yaml.references import ListedPhoto, listed_photos, marks_of
@@ -247,7 +247,7 @@ def in_one_zone(
         both = read.xyz[here][:, columns], first.xyz[there][:, first_columns]
         known = np.isfinite(both[0]).all(axis=1) & np.isfinite(both[1]).all(axis=1)
         if len(np.unique(both[0][known], axis=0)) < FEWEST:
-            message = f"{int(known.sum())} points of this list stand in the first one too, and join the two zones"
+            message = f"{counted(int(known.sum()), 'point')} of this list in the first one, too, to join the two zones"
             expected = f"{FEWEST} or more, with `use: off` in one of the lists; 4 for the third power"
             faults.append(fault_at(root, place, message, "zone-joint", expected=expected))
             continue

@@ -10,7 +10,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
-from photostrip.notes import before, listed
+from photostrip.notes import before, counted, listed
 from photostrip.statistics import SECOND_LOOK, TEST_LEVEL, chi2_quantile, f_p_value
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def accuracy(document: Document) -> str:
     role = seen_at(document)
     sound = {name: headline_rms(document, role, name) for name in PARTS}
     parts = [
-        f"{part['rms']:.3f} m in {name} ({part['rms_um']:.1f} µm at {scale} scale, {part['count']} points)"
+        f"{part['rms']:.3f} m in {name} ({part['rms_um']:.1f} µm at {scale} scale, {counted(part['count'], 'point')})"
         for name, part in sound.items()
         if part["count"]
     ]

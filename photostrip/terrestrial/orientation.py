@@ -18,7 +18,7 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
-from photostrip.notes import listed
+from photostrip.notes import counted, listed
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile, f_p_value
 from photostrip.terrestrial import frame
@@ -184,8 +184,8 @@ def _refuse_too_few(sightings: Sightings, used: Flags, names: Sequence[str]) -> 
     points = int(used.sum())
     if points < LEAST_POINTS or number < len(names):
         msg = (
-            f"{points} points with {number} directions do not determine {', '.join(names)}: at least "
-            f"{len(names)} directions to at least {LEAST_POINTS} points are needed"
+            f"{counted(points, 'point')} with {counted(number, 'direction')} cannot determine {', '.join(names)}: at "
+            f"least {len(names)} directions to at least {LEAST_POINTS} points are needed"
         )
         raise GeometryError(msg, points=sightings.ids, code="too-few-directions")
 

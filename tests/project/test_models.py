@@ -244,7 +244,7 @@ LISTED = "photos: [1, 2, 3]\n    models: {}"
     ("models", "code", "words"),
     [
         ("['23', '12']", "wrong-center", "is listed between photos 1 and 2, and has the perspective centre of 3"),
-        ("['12']", "length", "1 models are listed for 3 photos"),
+        ("['12']", "length", "1 model listed for 3 photos"),
         ("['12', '32']", "unknown-model", "model 32 is not measured"),
         ("['12', '12']", "model-twice", "model 12 appears twice in the strips"),
     ],

@@ -61,12 +61,12 @@ def test_two_points_join_without_a_check(tmp_path: Path) -> None:
 
 def test_check_points_join_nothing(tmp_path: Path) -> None:
     (line,) = project(tmp_path, role="check")[0].lines()
-    assert line.startswith("project.yaml:30:17: control[1].other_zone: 0 points of this list stand in the first one")
+    assert line.startswith("project.yaml:30:17: control[1].other_zone: 0 points of this list in the first one")
 
 
 def test_one_common_point_is_not_enough(tmp_path: Path) -> None:
     (line,) = project(tmp_path, 1)[0].lines()
-    assert "1 points of this list" in line
+    assert "1 point of this list" in line
 
 
 def test_zones_of_known_projections_need_no_points(tmp_path: Path) -> None:

@@ -217,9 +217,9 @@ def test_points_that_nothing_controls_are_not_rejected() -> None:
 
 
 def test_too_few_directions_are_refused() -> None:
-    with pytest.raises(GeometryError, match=r"1 points with 2 directions do not determine alpha, omega, kappa"):
+    with pytest.raises(GeometryError, match=r"1 point with 2 directions cannot determine alpha, omega, kappa"):
         orient(sightings((0.3, 0.1, 0.0), places=PLACES[:1]), F)
-    with pytest.raises(GeometryError, match=r"2 points with 4 directions do not determine .*, f, x0, z0"):
+    with pytest.raises(GeometryError, match=r"2 points with 4 directions cannot determine .*, f, x0, z0"):
         orient(sightings((0.3, 0.1, 0.0), places=PLACES[[0, 8]]), F, settings=OrientationSettings(EVERYTHING))
 
 

@@ -17,6 +17,7 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.tying import tie_frames
+from photostrip.notes import counted
 from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior
 from photostrip.pipeline.plausibility import gate
@@ -169,7 +170,7 @@ def _pairs(project: Project) -> Iterator[Fault]:
         for j, (left, right) in enumerate(zip(strip.photos, strip.photos[1:], strict=False)):
             common = len(points.get(left, set()) & points.get(right, set()))
             if common < MINIMUM_POINTS:
-                message = f"photos {left} and {right} have {common} points in common"
+                message = f"photos {left} and {right} have {counted(common, 'point')} in common"
                 fix = "measure more, or correct the order of the photos"
                 expected = f"at least {MINIMUM_POINTS}, better 12"
                 path = ("strips", i, "photos", j + 1)
@@ -199,7 +200,8 @@ def _control_of_strips(project: Project) -> Iterator[Fault]:
         plan, height = (int(inputs.control.use[rows, axis].sum()) for axis in (0, 2))
         if plan >= LEAST_PLAN and height >= LEAST_HEIGHT:
             continue
-        message = f"strip {strip.id} has {plan} control points in plan and {height} in height on neighbouring photos"
+        known = f"{counted(plan, 'control point')} in plan and {height} in height"
+        message = f"strip {strip.id} has {known} on neighbouring photos"
         expected = f"at least {LEAST_PLAN} in plan and {LEAST_HEIGHT} in height, not on one line"
         path = ("strips", i, "id")
         fix = "measure more of the control on its photos"

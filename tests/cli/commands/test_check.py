@@ -114,7 +114,7 @@ def test_pairs_joints_and_control_are_counted(tmp_path: Path) -> None:
         ("too-little-control", 13),
     }
     assert "photos 1001 and 1002 have 2 points in common; expected at least 5" in told["too-few-common-points", 12]
-    assert "strip B has 1 control points in plan and 1 in height" in told["too-little-control", 13]
+    assert "strip B has 1 control point in plan and 1 in height" in told["too-little-control", 13]
 
 
 def test_three_photos_without_a_common_point(project: Path, tmp_path: Path) -> None:

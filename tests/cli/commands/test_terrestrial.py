@@ -628,7 +628,7 @@ def test_weak_geometry_has_exit_3(tmp_path: Path, capsys: pytest.CaptureFixture[
     table.write_text("point,x,z,lambda,beta\nA,1,2,3,4\n", encoding="utf-8")
     code, _, err = call(capsys, "directions", "orient", table, *UMK)
     assert code == 3
-    assert "1 points with 2 directions do not determine alpha, omega, kappa" in err
+    assert "1 point with 2 directions cannot determine alpha, omega, kappa" in err
 
 
 def test_failures_are_json_where_json_was_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
