@@ -6,7 +6,6 @@ value is of the kind that its key is described with, every number is finite and 
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault
@@ -56,20 +55,24 @@ def located(value: Any, path: str = "") -> Any:  # noqa: ANN401 (any part of a d
         return value if numbers else [located(each, f"{path}[{place}]") for place, each in enumerate(value)]
     if not isinstance(value, dict):
         return value
-    block = Located({key: located(each, f"{path}.{key}" if path else key) for key, each in value.items()})
+    block = Located(value)
     block.path = path
+    for key, each in value.items():
+        if isinstance(each, dict | list):
+            block[key] = located(each, f"{path}.{key}" if path else key)
     return block
 
 
 def _wrong(block: dict[str, Any], table: Table, path: str) -> Iterator[Wrong]:
     """Check the keys of a block; of keys that are not described, what all values have in common."""
     for key, value in block.items():
-        if _unwritable(key):
+        entry = table.get(key)
+        if entry is None and _unwritable(key):
             yield path, f"holds the key {key!a}, which cannot be written", "a name"
             continue
-        below, entry = f"{path}.{key}" if path else key, table.get(key)
-        if value is None:
+        if value is None or (isinstance(entry, Quantity) and not entry.many and _is(value, entry.kind)):
             continue
+        below = f"{path}.{key}" if path else key
         if isinstance(entry, dict):
             yield from _wrong_block(value, entry, below)
         elif entry is None or entry.kind == "any":
@@ -93,8 +96,7 @@ def _wrong_block(value: object, table: Table, path: str) -> Iterator[Wrong]:
 
 def _wrong_value(value: object, entry: Quantity, path: str) -> Iterator[Wrong]:
     if not entry.many:
-        if not _is(value, entry.kind):
-            yield path, f"holds {_shown(value)}", WORDS[entry.kind]
+        yield path, f"holds {_shown(value)}", WORDS[entry.kind]
     elif not isinstance(value, list):
         yield path, f"holds {_shown(value)}", "a list"
     else:
@@ -130,17 +132,14 @@ def _wrong_anything(value: object, path: str, depth: int) -> Iterator[Wrong]:
 
 
 def _is(value: object, kind: str) -> bool:
-    if kind in {"text", "word"}:
-        return isinstance(value, str) and not _unwritable(value)
-    if kind == "flag":
-        return isinstance(value, bool)
+    if isinstance(value, float):  # neither NaN nor infinite: they are not within any limits
+        return kind == "number" and -LARGEST_NUMBER <= value <= LARGEST_NUMBER
+    if isinstance(value, str):
+        return kind in {"text", "word"} and not _unwritable(value)
     if isinstance(value, bool):
-        return False
-    if kind == "count":
-        return isinstance(value, int) and abs(value) <= LARGEST_COUNT
-    if isinstance(value, int):
-        return abs(value) <= LARGEST_NUMBER
-    return isinstance(value, float) and math.isfinite(value) and abs(value) <= LARGEST_NUMBER
+        return kind == "flag"
+    most = LARGEST_COUNT if kind == "count" else LARGEST_NUMBER
+    return kind in {"count", "number"} and isinstance(value, int) and -most <= value <= most
 
 
 def _unwritable(text: str) -> bool:
