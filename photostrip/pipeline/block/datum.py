@@ -126,11 +126,11 @@ def datum(
             refusal = error
     if len(cameras) >= 2:
         return _by_cameras(stages, group, (control, rows), known), False
-    if refusal is not None or not alone or known.centers:
+    if refusal is not None or not alone or known.centers or known.output.kind != "local":
         what = (
             f"strip {stages[group.members[0]].strip.id}" if len(group.members) == 1 else f"{len(group.members)} strips"
         )
-        message = f"{what}: neither control nor camera positions nor tie points connect it to the ground"
+        message = f"{what}: neither control nor camera positions in x, y and z nor tie points connect it to the ground"
         if refusal is not None:
             message += f" ({refusal})"
         raise GeometryError(message, photos=names, code="strip-not-tied") from refusal

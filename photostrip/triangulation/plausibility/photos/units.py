@@ -6,6 +6,7 @@ than a tenth across the flight. A reach beyond the format or a tenth of it is no
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +31,6 @@ REACH = (0.12, 1.2)  # of half the format
 LIKELY_REACH = (0.3, 1.1)  # a reading that brings the reach into this range explains it
 REACH_OF_DISTANCE = (0.06, 3.0)  # of the principal distance, when no format is given: fields of 7 to 143 degrees
 LIKELY_OF_DISTANCE = (0.1, 2.0)
-MOST_LIKELY = 0.5  # of the upper end of such a range; below it other readings come first
 LIKELY_PIXELS = 2.2  # counted from a corner they reach twice as far
 HALF_DIAGONAL = (0.2, 3.5)  # of the principal distance: fields of 23 to 148 degrees
 USUAL_HALF_DIAGONAL = (0.24, 1.9)  # a 610 mm lens and an 85 mm lens on 23 cm film
@@ -42,12 +42,12 @@ INCH = 25.4
 READINGS = (
     (1e-3, "micrometres read as millimetres"),
     (1e3, "millimetres read as micrometres"),
-    (0.1, "tenths of a micrometre read as micrometres"),
-    (10.0, "centimetres read as millimetres, or micrometres read as tenths"),
+    (0.1, "the decimal point one place off, or tenths of a micrometre (`0.1um`) read as micrometres"),
+    (10.0, "the decimal point one place off, or centimetres read as millimetres"),
     (1e-4, "tenths of a micrometre read as millimetres"),
     (INCH, "inches read as millimetres"),
-    (1e-2, "hundredths of a millimetre read as millimetres"),
-    (1e2, "a decimal point two places off"),
+    (1e-2, "the decimal point two places off, or hundredths of a millimetre read as millimetres"),
+    (1e2, "the decimal point two places off"),
 )
 
 
@@ -61,8 +61,7 @@ class UnitReading(NamedTuple):
 def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | None = None) -> UnitReading:
     """Find the unit that brings a ratio into the likely range.
 
-    The first reading that brings it into the upper half of the range, or else into the rest of it, pixels first;
-    factor 1 when none does.
+    Pixels first, then the reading that brings it nearest to the middle of the range; factor 1 when none does.
     """
     pixels = (
         []
@@ -74,8 +73,9 @@ def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | No
         ]
     )
     fits = [UnitReading(factor, name) for factor, name in pixels if likely[0] < ratio * factor < LIKELY_PIXELS]
-    for least in (MOST_LIKELY * likely[1], likely[0]):
-        fits += [UnitReading(factor, name) for factor, name in READINGS if least < ratio * factor < likely[1]]
+    middle = sum(likely) / 2.0
+    nearest = sorted(READINGS, key=lambda each: abs(math.log(ratio * each[0] / middle)))
+    fits += [UnitReading(factor, name) for factor, name in nearest if likely[0] < ratio * factor < likely[1]]
     return fits[0] if fits else UnitReading(1.0, "")
 
 

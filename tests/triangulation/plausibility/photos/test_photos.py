@@ -227,6 +227,17 @@ def test_a_wrong_unit_of_all_coordinates_is_named(factor: float, word: str) -> N
     assert factors == {made.camera.name: pytest.approx(1 / factor)}
 
 
+@pytest.mark.parametrize(("factor", "word"), [(0.01, "two places off"), (10.0, "one place off")])
+def test_a_decimal_point_is_named_without_a_format(factor: float, word: str) -> None:
+    """Whatever the unit of the project: inches are not the first thing to think of, nor tenths of a micrometre."""
+    made = simulation()
+    cameras = dict.fromkeys(made.strips[0][1], replace(made.camera, format=None))
+    wrong = replace(made.observations, xy=made.observations.xy * factor)
+    (finding,), factors = units.find_wrong_units(wrong, cameras)
+    assert f"the decimal point {word}" in finding.message
+    assert factors == {made.camera.name: pytest.approx(1 / factor)}
+
+
 @pytest.mark.parametrize(("measured", "word"), [(1000.0, "micrometres"), (1e-3, "millimetres"), (1 / 25.4, "inches")])
 def test_marks_in_another_unit_are_named_with_the_unit(measured: float, word: str) -> None:
     scales = np.array([1.0, 1.002, 1.0 / measured, 0.998 / measured])  # calibrated over measured distances
