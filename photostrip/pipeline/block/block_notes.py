@@ -80,7 +80,7 @@ def _given_notes(bundle: Bundle) -> Iterator[Note]:
             continue
         axis = ("east (X)", "north (Y)", "up (Z)")[each.axes[0]]
         reached = (
-            f"test value {each.value:.1f}, limit {each.limit:.1f}" if np.isfinite(each.value) else "found in its strip"
+            f"test value {each.value:.2f}, limit {each.limit:.2f}" if np.isfinite(each.value) else "found in its strip"
         )
         if each.kind == reliability.CONTROL:
             name = problem.point_name(int(problem.control.point[each.row]))

@@ -44,6 +44,7 @@ MOST_PHOTOS = 40  # photos: a longer strip would take too long
 MOST_POINTS = 10_000  # image points of all strips formed for trials: of 20 photos with 100 points one start is followed
 FACTOR_RANGE = (0.05, 5.0)  # of the principal distance given
 FIX = "take it from the certificate"
+UNIT_FACTOR = 5.0  # a principal distance off by more may be right, and the decimal point of the image coordinates wrong
 FIRST_FACTORS = (1.4, 0.7, 2.0, 0.5, 0.1)  # tried when the pairs cannot be oriented at all
 
 
@@ -171,4 +172,5 @@ def _finding(strip: Strip, ratio: float, how: str, numbers: Evidence) -> list[Fi
         return []
     given = strip.camera.principal_distance
     message = f"strip {strip.id} {how} with a principal distance of {given * ratio:.1f} mm; {given:g} mm is given"
-    return [other_distance(strip.camera, given * ratio, message, FIX, numbers, (strip.id,))]
+    fix = FIX if 1.0 / UNIT_FACTOR < ratio < UNIT_FACTOR else f"{FIX}, or correct `observations.unit`"
+    return [other_distance(strip.camera, given * ratio, message, fix, numbers, (strip.id,))]

@@ -234,6 +234,17 @@ def test_the_principal_distance_of_another_lens(factor: float) -> None:
         assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=1.0)
 
 
+@pytest.mark.slow
+def test_image_coordinates_ten_times_too_small_without_a_format_are_named_beside_the_principal_distance() -> None:
+    inputs = inputs_of(simulation("utm"))
+    strip = inputs.strips[0]
+    unknown = replace(strip, camera=replace(strip.camera, format=None))
+    small = replace(inputs.observations, xy=0.1 * inputs.observations.xy)
+    fixes = [each.fix for each in told(replace(inputs, strips=(unknown,), observations=small)) if each.code == "P105"]
+    assert len(fixes) == 1
+    assert "observations.unit" in fixes[0]
+
+
 def second_list(inputs: Inputs, change: Callable[[Floats], Floats]) -> tuple[Inputs, tuple[str, ...]]:
     """Put every third control point into a list of its own and change it."""
     rows = control_rows(inputs)[::3]

@@ -76,8 +76,8 @@ def find_line(
     if breadth > LEAST_BREADTH:
         return
     message = (
-        f"{what}: its control lies on one line, {100 * breadth:.1f} % of half the breadth of "
-        f"{'a' if len(strips) > 1 else 'the'} strip to either side: an error of a height turns the "
+        f"{what}: its control lies on one line, within {100 * breadth:.1f} % (rms) of half the breadth of "
+        f"{'a' if len(strips) > 1 else 'the'} strip: an error in one height turns the "
         f"{'block' if len(strips) > 1 else 'strip'} about it"
     )
     fix = "add a control point at some distance from that line"

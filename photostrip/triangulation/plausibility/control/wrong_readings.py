@@ -126,7 +126,7 @@ def _mirror(
         "base_direction_on_photos_deg": float(np.degrees(on_strip.base_angle)),
     }
     fit = (
-        f"strip {on_strip.strip} fits its control only as a mirror image: middle misclosure in plan "
+        f"strip {on_strip.strip} fits its control only as a mirror image: median misclosure in plan "
         f"{normal.median:.4g} m as given, {mirror.median:.3g} m mirrored"
     )
     if axes_are_right:
@@ -174,7 +174,7 @@ def _columns(
         ):
             names = [GROUND_AXES[each] for each in (order if read is given else (1, 0, 2))]
             message = (
-                f"strip {on_strip.strip} does not fit its control in plan (middle misclosure {normal.median:.4g} m), "
+                f"strip {on_strip.strip} does not fit its control in plan (median misclosure {normal.median:.4g} m), "
                 f"but fits within {middle:.3g} m when what is called east, north, up is read as {', '.join(names)}"
             )
             evidence = {
@@ -204,7 +204,7 @@ def _rows(
         fit = fit_similarity(w[counts], plan[counts])
         if fit is not None and counts.sum() >= LEAST_SURE and far(plan, fit) < FAR_LEFT * before:
             message = (
-                f"strip {on_strip.strip} does not fit its control in plan (middle misclosure {normal.median:.4g} m), "
+                f"strip {on_strip.strip} does not fit its control in plan (median misclosure {normal.median:.4g} m), "
                 f"but fits within {fit.median:.3g} m with the coordinates moved {way} by one row"
             )
             evidence: Evidence = {"misclosure_as_given_m": normal.median, "misclosure_m": fit.median}
@@ -218,8 +218,8 @@ def _of_other_points(on_strip: StripPoints, normal: PlanSimilarity, extent: floa
     if normal.median < NO_FIT_SHARE * extent or np.isfinite(on_strip.xyz).all(axis=1).sum() < LEAST_SURE:
         return []
     message = (
-        f"strip {on_strip.strip} fits its control in no way: half of its points are more than {normal.median:.4g} m "
-        f"off in plan, and the control reaches {extent:.4g} m from its middle"
+        f"strip {on_strip.strip} does not fit its control, however it is laid on it: half of the control points are "
+        f"more than {normal.median:.4g} m off in plan, and the control reaches {extent:.4g} m from its middle"
     )
     evidence: Evidence = {"misclosure_m": normal.median, "extent_of_control_m": extent}
     fix = "do its ids and coordinates belong to these photos, and to the points that were measured?"

@@ -94,7 +94,7 @@ def find_other_scale(observations: PhotoPoints, strip: str, photos: Sequence[str
         ratio = np.array([before, 1.0 / max(after, mosaic.TINY)])  # of this photo to both
         if (ratio > OTHER_SCALE).all() or (ratio < 1 / OTHER_SCALE).all():
             size = float(np.sqrt(ratio.prod()))
-            message = f"things are {size:.2f} times as large on photo {photos[number]} as on both its neighbours"
+            message = f"the scale of photo {photos[number]} is {size:.2f} times that of both its neighbours"
             fix = "does it have another principal distance, unit, or flight?"
             evidence = {"scale_over_neighbours": size}
             yield found("P205", message, fix, evidence, photos=(photos[number],), strips=(strip,))

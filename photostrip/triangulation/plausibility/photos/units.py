@@ -13,7 +13,7 @@ import numpy as np
 
 from photostrip.arrays import distinct, median, quantile
 from photostrip.frozen import NamedTuple
-from photostrip.notes import listed
+from photostrip.notes import counted, listed
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -186,8 +186,8 @@ def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding
     names = tuple(photo for photo, each in zip(photos, odd, strict=True) if each)
     reading = reading_of(1.0 / scale, MARKS_RATIO)
     message = (
-        f"the fiducial marks of {len(names)} photos are measured {1 / scale:.4g} times as far apart as they are "
-        "calibrated"
+        f"the fiducial marks of {counted(len(names), 'photo')} are measured {1 / scale:.4g} times as far apart as "
+        "they are calibrated"
     )
     if reading.name:
         message += f": {reading.name}"

@@ -248,6 +248,11 @@ def test_marks_in_another_unit_are_named_with_the_unit(measured: float, word: st
     assert finding.key == "fiducial_measurements.unit"
 
 
+def test_marks_of_one_photo_are_counted_as_one() -> None:
+    (finding,) = units.find_wrong_mark_units(np.array([1.0, 0.001]), ["1", "2"])
+    assert "the fiducial marks of 1 photo are measured" in finding.message
+
+
 @given(st.lists(st.floats(0.6, 1.6), min_size=1, max_size=8))
 def test_scans_and_old_paper_are_no_other_unit(scales: list[float]) -> None:
     assert units.find_wrong_mark_units(np.array(scales), [f"{number}" for number in range(len(scales))]) == []
