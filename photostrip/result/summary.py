@@ -54,7 +54,9 @@ def counts_of(result: Result, measurements: int) -> Document:
         "control_plan": int((part & control.use[:, 0]).sum()),
         "control_height": int((part & control.use[:, 2]).sum()),
         "check_points": int((measured & control.check).sum()),
-        "given_not_measured": int((~measured).sum()),
+        "given_not_measured": sum(
+            not (has or name in result.not_determined) for has, name in zip(measured, control.ids, strict=True)
+        ),
         "image_points": measurements,
         "image_points_used": used,
         "pass_point_transfers": sum(int(used.sum()) for used in transfers),

@@ -276,6 +276,14 @@ def test_given_points_that_were_not_measured_are_named() -> None:
     assert "given, but not measured: G4 bis" in words(section(saved(), "Control points"))
 
 
+def test_a_given_point_whose_rays_were_rejected_is_not_called_unmeasured() -> None:
+    document = saved()
+    document["not_determined"] = [{"id": "G4 bis", "reason": "rays contradict each other"}]
+    text = words(section(document, "Control points"))
+    assert "without coordinates: G4 bis" in text
+    assert "given, but not measured" not in text
+
+
 def test_without_check_points_the_report_says_what_that_means() -> None:
     control = [row for row in saved()["control"] if row["role"] == "control"]
     assert words(section(changed(control=control), "Check points")).startswith("None. What lies between")

@@ -20,7 +20,7 @@ from photostrip.pipeline import Settings
 from photostrip.result.document import document_of
 from photostrip.result.numbers import natural, rounded, significant
 from photostrip.result.records import Records
-from photostrip.result.summary import TOLERANCES
+from photostrip.result.summary import TOLERANCES, counts_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, GrossError
 from tests.loops import nonempty
@@ -326,6 +326,8 @@ def test_what_does_not_count_has_no_difference() -> None:
     assert rows["nowhere"]["dx"] is None
     counts = found.document["counts"]
     assert counts["given_not_measured"] == 1
+    refused = replace(found.result, not_determined={"nowhere": "rays contradict each other"})
+    assert counts_of(refused, 0)["given_not_measured"] == 0  # its rays were measured, and rejected
     assert (counts["control_plan"], counts["control_height"], counts["control_points"]) == (9, 9, 10)
     summary = found.document["summary"]["control"]
     assert (summary["plan"]["count"], summary["height"]["count"]) == (9, 9)

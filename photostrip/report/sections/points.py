@@ -115,14 +115,16 @@ def _most(rows: Sequence[Document]) -> str:
 def _unused(document: Document) -> list[Part]:
     """Given points that were not used, and why."""
     rows = document["control"]
+    refused = {each["id"] for each in document["not_determined"]}
     lost = [row["id"] for row in rows if not row["measured"]]
     off = [row["id"] for row in rows if row["measured"] and row["role"] == "control" and row["use"] == "off"]
-    facts = [
-        (label, listed(names, IDS_NAMED))
-        for label, names in (("given, but not measured", lost), ("switched off", off))
-        if names
-    ]
-    return [Facts(tuple(facts))] if facts else []
+    named = {
+        "given, but not measured": [name for name in lost if name not in refused],
+        "without coordinates": [name for name in lost if name in refused],
+        "switched off": off,
+    }
+    facts = tuple((label, listed(names, IDS_NAMED)) for label, names in named.items() if names)
+    return [Facts(facts)] if facts else []
 
 
 def ties_section(document: Document, *, everything: bool) -> Section:
