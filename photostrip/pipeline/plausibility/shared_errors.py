@@ -76,7 +76,7 @@ def _positions(bundle: Bundle, inputs: Inputs, error: CommonError) -> Iterator[F
         if not (np.abs(solution.common[columns]) > SHOWN_SIGMAS * sigma[columns]).any():
             continue
         # unknowns are what has to be added to what is given
-        off, drifted = (-np.where(each >= 0, solution.common[each], 0.0) for each in (offset, drift))
+        off, drifted = (-np.where(each >= 0, solution.common[each], np.nan) for each in (offset, drift))
         length = float(np.ptp(given.time[given.group == group]))
         yield _finding(bundle, inputs, error, group, off, drifted * length if error.kind == DRIFT else None)
 
@@ -89,11 +89,11 @@ def _finding(
     axes = problem.position_axes
     whose = "the camera positions" if error.of == ALL else f"the camera positions of strip {problem.group_ids[group]}"
     message = f"{whose} all lie {_steps(offset, axes)} from where control and photos put them"
-    evidence = {f"offset_{axis}_m": float(each) for axis, each in zip(axes, offset, strict=True)}
+    evidence = _numbers("offset", offset, axes)
     correction = "offset"
     if drift is not None:
         message += f", and drift by {_steps(drift, axes)} from the first to the last"
-        evidence |= {f"drift_{axis}_m": float(each) for axis, each in zip(axes, drift, strict=True)}
+        evidence |= _numbers("drift", drift, axes)
         correction = "drift"
     message += f"; the adjustment continued as with `correction: {correction}`"
     if error.rival == DISTANCE:
@@ -116,4 +116,9 @@ def _finding(
 
 
 def _steps(step: Floats, axes: tuple[str, str, str]) -> str:
-    return ", ".join(f"{each:+.2f} m {axis}" for each, axis in zip(step, axes, strict=True))
+    """Write what is known of a step: of heights alone only up."""
+    return ", ".join(f"{each:+z.2f} m {axis}" for each, axis in zip(step, axes, strict=True) if np.isfinite(each))
+
+
+def _numbers(name: str, step: Floats, axes: tuple[str, str, str]) -> Evidence:
+    return {f"{name}_{axis}_m": float(each) for axis, each in zip(axes, step, strict=True) if np.isfinite(each)}

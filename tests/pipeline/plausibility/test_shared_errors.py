@@ -30,13 +30,13 @@ def adjusted(
     distance: float = 1.0,
     seed: int = 7,
     control: Control | None = None,
+    use: tuple[bool, bool, bool] = (True, True, True),
 ) -> tuple[Simulation, Result]:
     """Adjust a block whose control stands at both ends, with measured camera positions that are shifted."""
     flight = Flight(photos=10, strips=strips)
     simulation = simulate(Spec(seed=seed, flight=flight, control=control or Control(bands=2), gnss=Gnss()))
     inputs, photos = inputs_of(simulation), simulation.truth.photo_ids
     assert simulation.gnss is not None
-    shape = len(photos), 3
     inputs = replace(
         inputs,
         strips=tuple(
@@ -47,7 +47,7 @@ def adjusted(
             photos=photos,
             frame=inputs.frames[0],
             enu=simulation.gnss + np.asarray(shift, float),
-            use=np.ones(shape, bool),
+            use=np.tile(use, (len(photos), 1)),
             sigma=np.tile((0.10, 0.10, 0.15), (len(photos), 1)),
             time=np.full(len(photos), np.nan),
         ),
@@ -83,6 +83,15 @@ def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shi
     assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.6)
     assert lost(result) == []
     assert rms(simulation, result) < 0.4
+
+
+def test_of_heights_alone_only_up_is_named() -> None:
+    _, result = adjusted(strips=1, shift=(0.0, 0.0, 12.0), use=(False, False, True))
+    (finding,) = result.findings
+    assert finding.code == "P208"
+    assert "m up" in finding.message
+    assert "east" not in finding.message
+    assert list(finding.evidence) == ["offset_up_m"]
 
 
 @pytest.mark.slow
