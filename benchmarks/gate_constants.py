@@ -31,12 +31,16 @@ from photostrip.threads import limit_threads
 
 limit_threads()  # as the command does, before numpy is imported
 
+import numpy as np  # noqa: E402
+
 from benchmarks import false_alarms, plausibility  # noqa: E402
 from benchmarks.ablation import put, scaled  # noqa: E402
+from benchmarks.false_alarms import Sound  # noqa: E402
 from photostrip.errors import PhotostripError  # noqa: E402
 from photostrip.pipeline import plausibility as around_tests  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.pipeline.plausibility import gate  # noqa: E402
+from photostrip.simulation import Image, Spec  # noqa: E402
 from photostrip.triangulation import plausibility as tests  # noqa: E402
 
 if TYPE_CHECKING:
@@ -132,9 +136,49 @@ def planted(first: int, count: int, words: Sequence[str]) -> Iterator[Project]:
             done += 1
 
 
+def computed(seed: int) -> Sound:
+    """Make strips whose image coordinates have no noise."""
+    rng = np.random.default_rng([25, seed])
+
+    def draw(rng: np.random.Generator) -> Spec:
+        return replace(false_alarms.base_spec(rng, int(rng.integers(5, 15))), image=Image(sigma_um=0.0))
+
+    return false_alarms.sound_of(false_alarms.made(rng, seed, draw), str(rng.choice(false_alarms.METHODS)))
+
+
+def one_check_point(seed: int) -> Sound:
+    """Leave one check point."""
+    made = false_alarms.short(seed)
+    check = made.inputs.control.check
+    control = made.inputs.control.take(~check | (np.cumsum(check) == 1))
+    return replace(made, inputs=replace(made.inputs, control=control))
+
+
+def two_ids(seed: int) -> Sound:
+    """Give a control point a second id, in control and photos: P302, but no copied row."""
+    case = plausibility.sound(seed)
+    o, control = case.inputs.observations, case.inputs.control
+    row = int(case.rng.choice(np.flatnonzero(plausibility.shown(case))))
+    of_one = o.point == o.point_ids.index(control.ids[row])
+    rays = np.r_[np.arange(len(o.xy)), np.flatnonzero(of_one)]
+    point = np.where(np.arange(len(rays)) < len(o.xy), o.point[rays], len(o.point_ids))
+    again = np.flatnonzero(point == len(o.point_ids))
+    xy = o.xy[rays]
+    xy[again] += case.rng.normal(0.0, case.spec.image.sigma_um / 1000.0, (len(again), 2))
+    observations = replace(
+        o, point_ids=(*o.point_ids, "twin"), photo=o.photo[rays], point=point, xy=xy, sigma=o.sigma[rays]
+    )
+    given = replace(control.take(np.r_[np.arange(len(control.ids)), row]), ids=(*control.ids, "twin"))
+    inputs = replace(case.inputs, observations=observations, control=given)
+    return Sound(inputs, case.settings, case.spec, frozenset({"P302"}))
+
+
+RARE = {"computed coordinates": computed, "one check point": one_check_point, "one point under two ids": two_ids}
+
+
 def sound(first: int, count: int, words: Sequence[str]) -> Iterator[Project]:
-    """Make sound projects of all layouts."""
-    for name, make in false_alarms.LAYOUTS.items():
+    """Make sound projects of all layouts, and rare ones for which there are limits."""
+    for name, make in (false_alarms.LAYOUTS | RARE).items():
         for seed in range(first, first + count) if any(word in SOUND + name for word in words) else ():
             made = make(seed)
             after = adjusted(made.inputs, made.settings)

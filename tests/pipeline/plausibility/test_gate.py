@@ -686,6 +686,17 @@ def test_a_strip_that_a_wrong_distance_tears_apart_is_not_taken_for_control_of_o
     assert other not in named
 
 
+@pytest.mark.parametrize(("wrong", "least"), [(1, 3), (2, 4)])
+def test_one_wrong_point_of_three_is_no_other_control_but_two_of_four_are(wrong: int, least: int) -> None:
+    inputs = inputs_of(simulation())
+    rows = control_rows(inputs)[[0, -1, 2, 3][:least]]
+    control = inputs.control.take(rows)
+    enu = control.enu.copy()
+    enu[:wrong, :2] += [[5000.0, -3000.0], [-9000.0, 4000.0]][:wrong]
+    found = codes(told(replace(inputs, control=replace(control, enu=enu))))
+    assert ("P409" in found) is (least > 3)
+
+
 def test_every_kind_of_mistake_is_planted_in_the_benchmark() -> None:
     assert {code for mistake in plausibility.MISTAKES for code in mistake.codes} == set(KINDS)
 

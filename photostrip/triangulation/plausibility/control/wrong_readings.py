@@ -47,10 +47,7 @@ if TYPE_CHECKING:
 NO_FIT = "P409"
 MIRRORED_SHARE = 0.15  # of the misclosure of the strip as it is, left when it is mirrored
 FIT_SHARE = 0.1  # of the extent of the control: a misclosure above it is no fit
-LEAST_FAR, ROWS_SHARE = 3, 0.2  # points that are so far off, of all: their coordinates may stand in the next row
-FAR_LEFT = 0.35  # of them that are still far off then: the first or the last has no other row
-NO_FIT_SHARE = 0.2  # of it: no strip bends so far
-LEAST_SURE = 6  # points that tell that they are others
+FAR_LEFT = 0.35  # of such points that are still far off with the rows moved: the first or the last has no other row
 
 
 class Reading(NamedTuple):
@@ -89,7 +86,7 @@ def find_wrong_readings(
     elif normal.median > FIT_SHARE * extent:
         columns = _columns(given, exchanged(), on_strip, w, in_fit, normal)
         return Reading(
-            columns or _rows(given, on_strip, w, normal, extent) or _of_other_points(on_strip, normal, extent)
+            columns or _rows(given, on_strip, w, normal, extent) or _of_other_points(on_strip, in_fit, normal, extent)
         )
     elif rows := _rows(given, on_strip, w, normal, extent):
         return Reading(rows)
@@ -196,13 +193,11 @@ def _rows(
         return int((np.abs(fit(w) - plan) > FIT_SHARE * extent).sum())
 
     before = far(given.plan, normal)
-    if before < max(LEAST_FAR, ROWS_SHARE * len(w)):
-        return []
-    for rows, way in ((1, "down"), (-1, "up")):
+    for rows, way in ((1, "down"), (-1, "up")) if before else ():
         plan = np.roll(given.plan, rows)
         counts = np.isfinite(w) & np.isfinite(plan)
         fit = fit_similarity(w[counts], plan[counts])
-        if fit is not None and counts.sum() >= LEAST_SURE and far(plan, fit) < FAR_LEFT * before:
+        if fit is not None and far(plan, fit) < FAR_LEFT * before:
             message = (
                 f"strip {on_strip.strip} does not fit its control in plan (median misclosure {normal.median:.4g} m), "
                 f"but fits within {fit.median:.3g} m with the coordinates moved {way} by one row"
@@ -213,9 +208,9 @@ def _rows(
     return []
 
 
-def _of_other_points(on_strip: StripPoints, normal: PlanSimilarity, extent: float) -> list[Finding]:
+def _of_other_points(on_strip: StripPoints, in_fit: Flags, normal: PlanSimilarity, extent: float) -> list[Finding]:
     """Say that a formed strip fits its control in no way; photos side by side under an oblique mount do not, either."""
-    if normal.median < NO_FIT_SHARE * extent or np.isfinite(on_strip.xyz).all(axis=1).sum() < LEAST_SURE:
+    if np.isfinite(on_strip.xyz[in_fit]).all(axis=1).sum() <= LEAST_POINTS:  # one wrong point of three is a slip
         return []
     message = (
         f"strip {on_strip.strip} does not fit its control, however it is laid on it: half of the control points are "
