@@ -47,7 +47,6 @@ if TYPE_CHECKING:
 NO_FIT = "P409"
 MIRRORED_SHARE = 0.15  # of the misclosure of the strip as it is, left when it is mirrored
 FIT_SHARE = 0.1  # of the extent of the control: a misclosure above it is no fit
-FAR_LEFT = 0.35  # of such points that are still far off with the rows moved: the first or the last has no other row
 
 
 class Reading(NamedTuple):
@@ -197,7 +196,7 @@ def _rows(
         plan = np.roll(given.plan, rows)
         counts = np.isfinite(w) & np.isfinite(plan)
         fit = fit_similarity(w[counts], plan[counts])
-        if fit is not None and far(plan, fit) < FAR_LEFT * before:
+        if fit is not None and fit.median < min(normal.median, FIT_SHARE * extent) and far(plan, fit) < before:
             message = (
                 f"strip {on_strip.strip} does not fit its control in plan (median misclosure {normal.median:.4g} m), "
                 f"but fits within {fit.median:.3g} m with the coordinates moved {way} by one row"
