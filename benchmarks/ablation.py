@@ -6,6 +6,7 @@ gets twice or half of what it leaves to one; whole numbers stay whole. Errors ar
 program without gross errors.
 
 Usage: python benchmarks/ablation.py [STRIPS] [--first-seed N] [--workers N] [--only WORD ...]
+       [--wrong-control]
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from photostrip.threads import limit_threads
 limit_threads()  # as the command does, before numpy is imported
 
 
-from benchmarks.gross_errors import AUTO, CLEAN, HEAD, KNOWN, Run, Tally, loses_anything, runs_of  # noqa: E402
+from benchmarks.gross_errors import AUTO, CLEAN, HEAD, KNOWN, Run, Tally, loses_anything, much_wrong_run, runs_of  # noqa: E402
 from photostrip import frozen  # noqa: E402
 from photostrip.pipeline.strips.absolute import ScreenedStrip  # noqa: E402
 from photostrip.triangulation import gross_errors as search  # noqa: E402
@@ -124,6 +125,11 @@ def without_readmission() -> None:
     put(f"{search.__name__}.control.control_deletion:JointAdjustment", "shrunk", lambda _, out: out)
 
 
+def without_exchange() -> None:
+    """Leave the suspects among much wrong control as variance components find them."""
+    put(f"{search.__name__}.control.control_deletion:JointAdjustment", "exchanged", lambda _, out: out)
+
+
 def changes() -> dict[str, Callable[[], None]]:
     """Everything that is changed, one after the other."""
     found: dict[str, Callable[[], None]] = {
@@ -131,6 +137,7 @@ def changes() -> dict[str, Callable[[], None]]:
         "without the step along the strip": without_rays,
         "without the step at the control": without_control,
         "without re-admission": without_readmission,
+        "without exchanging suspects": without_exchange,
     }
     for (module, name, value), factor in product(constants(), (2.0, 0.5)):
         other = scaled(value, factor)
@@ -167,6 +174,19 @@ def print_ablation(pool: Pool, seeds: range, words: Sequence[str]) -> None:
         print(tally.row(title), f" {failed} failed" if failed else "", flush=True)
 
 
+def changed_control(title: str, seeds: range) -> int:
+    """Count strips with two fifths of the control wrong in which a changed program names just that."""
+    changes()[title]()
+    return sum(wrong == named and not others for wrong, named, others, _ in map(much_wrong_run, seeds))
+
+
+def print_control(pool: Pool, seeds: range, words: Sequence[str]) -> None:
+    """Print how often just the wrong control is named where much of it is."""
+    titles = [title for title in changes() if any(word in title for word in words or ("",))]
+    for title, right in zip(titles, pool.imap(partial(changed_control, seeds=seeds), titles), strict=True):
+        print(f"{title:44s}{right:4d} of {len(seeds)}", flush=True)
+
+
 def main() -> None:
     """Print one line for every change."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -176,10 +196,11 @@ def main() -> None:
     parser.add_argument(
         "--only", nargs="+", default=(), metavar="WORD", help="changes whose title has one of the words"
     )
+    parser.add_argument("--wrong-control", action="store_true", help="strips with two fifths of the control wrong")
     options = parser.parse_args()
     seeds = range(options.first_seed, options.first_seed + options.strips)
     with get_context("fork").Pool(options.workers, maxtasksperchild=1) as pool:
-        print_ablation(pool, seeds, options.only)
+        (print_control if options.wrong_control else print_ablation)(pool, seeds, options.only)
 
 
 if __name__ == "__main__":

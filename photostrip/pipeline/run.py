@@ -54,6 +54,12 @@ def triangulate(
     """
     ground = photo = None
     stages = stages or Stages("pairs")
+
+    def of_failure() -> tuple[Finding, ...]:
+        find = partial(gate.of_failure, inputs, settings, directory, photo, ground, stages)
+        # of several methods that fail the first is told of: another need not look again
+        return stages.once("failure", find, inputs, replace(settings, adjustment=""), photo is None, ground is None)
+
     try:
         require_runnable(inputs, settings)
         ground = tie_ground_frames(inputs, settings, directory, tied)
@@ -62,26 +68,14 @@ def triangulate(
         photo = orient_interior(inputs, settings)
         result = _walk(inputs, settings, ground, photo, stages)
     except (InputError, GeometryError) as error:
-        error.findings = _of_failure(inputs, settings, directory, photo, ground, stages)
+        error.findings = of_failure()
         raise
     except np.linalg.LinAlgError as error:
         msg = f"the data contradict themselves so much that an equation cannot be solved ({str(error).lower()})"
         unsolvable = GeometryError(msg, code="singular")
-        unsolvable.findings = _of_failure(inputs, settings, directory, photo, ground, stages)
+        unsolvable.findings = of_failure()
         raise unsolvable from error
     return replace(result, findings=gate.of_result(result, directory))
-
-
-def _of_failure(
-    inputs: Inputs,
-    settings: Settings,
-    directory: Path | None,
-    photo: PhotoCoordinates | None,
-    ground: GroundFrames | None,
-    stages: Stages,
-) -> tuple[Finding, ...]:
-    find = partial(gate.of_failure, inputs, settings, directory, photo, ground, stages)
-    return stages.once("failure", find, inputs, replace(settings, adjustment=""), photo is None, ground is None)
 
 
 def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages) -> Result:
