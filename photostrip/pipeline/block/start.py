@@ -3,7 +3,7 @@
 Each strip is formed by the strip method. Strips with enough control of their own go to the ground with it; others are
 tied to them by common points; what is still apart is joined to a block of its own, and the block goes to the ground
 with its control, with camera positions or with given orientations, whatever there is. With nothing at all the first
-strip gives frame and scale. Single photos are resected on what is known by then.
+strip gives frame and scale. Single photos are resected on what is known by then, one after the other.
 """
 
 from __future__ import annotations
@@ -163,19 +163,26 @@ def _together(
         centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
         turned = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
         oriented |= {photo: (c, r) for photo, c, r in zip(strip.strip.photos, centers, turned, strict=True)}
+    points = _with_control(points, observations, known)
     rough: set[str] = set()
     singles = {strip.photos[0]: strip.camera.principal_distance for strip in inputs.strips if len(strip.photos) == 1}
-    if singles:
-        with_control = _with_control(points, observations, known)
-        for photo, focal in singles.items():
-            center, rotation, solved = _single(photo, focal, with_control, observations, known)
-            oriented[photo] = center, rotation
-            if not solved:
-                rough.add(photo)
+    while singles:
+        seen = np.bincount(
+            observations.photo[np.isfinite(points[observations.point, 0])], minlength=len(observations.photo_ids)
+        )
+        photo = max(singles, key=lambda each: seen[observations.photo_index[each]])
+        center, rotation, solved = _single(photo, singles.pop(photo), points, observations, known)
+        oriented[photo] = center, rotation
+        if solved:  # its rays give the next photos their points
+            points = _rest(
+                inputs, observations, {each: at for each, at in oriented.items() if each not in rough}, points
+            )
+        else:
+            rough.add(photo)
     names = tuple(photo for strip in inputs.strips for photo in strip.photos)
     centers = np.array([oriented[name][0] for name in names])
     rotations = np.array([oriented[name][1] for name in names])
-    points = _rest(inputs, observations, (centers, rotations), _with_control(points, observations, known))
+    points = _rest(inputs, observations, oriented, points)
     if np.isnan(points[:, 0]).all():
         message = "no point stands on two photos or is given; do the ids of points in the tables agree?"
         raise GeometryError(message, code="bundle-rays")
@@ -247,7 +254,8 @@ def _single(photo: str, focal: float, points: Floats, observations: PhotoPoints,
         begin = approximate(xy, xyz, focal)
     except GeometryError as error:
         message = (
-            f"photo {photo}, a strip of its own, cannot be oriented on points known from the other photos: {error}"
+            f"photo {photo}, a strip of its own, cannot be oriented on points known from the other photos: {error}; "
+            "list photos that overlap as one strip, or give its orientation roughly (orientations, role: approximate)"
         )
         raise GeometryError(message, photos=(photo,), code="strip-not-tied") from error
     return _resected(xy, xyz, focal, begin)._replace(solved=True)
@@ -263,17 +271,25 @@ def _resected(xy: Floats, points: Floats, focal: float, begin: tuple[Floats, Flo
     return _SingleStart(center, rotation, solved=bool(found.solved[0]) and before)
 
 
-def _rest(inputs: Inputs, observations: PhotoPoints, oriented: tuple[Floats, Floats], points: Floats) -> Floats:
-    """Intersect the points that no strip has, as those seen on one photo of each of two strips."""
-    photos = [photo for strip in inputs.strips for photo in strip.photos]
-    focal = np.array([strip.camera.principal_distance for strip in inputs.strips for _ in strip.photos])
-    rows = np.flatnonzero(np.isnan(points[observations.point, 0]))
+def _rest(
+    inputs: Inputs, observations: PhotoPoints, oriented: Mapping[str, tuple[Floats, Floats]], points: Floats
+) -> Floats:
+    """Intersect the points that no strip has from the photos oriented so far, as those of two strips."""
+    focal = {photo: strip.camera.principal_distance for strip in inputs.strips for photo in strip.photos}
+    place = observations.places(list(oriented))
+    missing = np.isnan(points[observations.point, 0]) & (place >= 0)
+    rays = np.bincount(observations.point[missing], minlength=len(points))
+    rows = np.flatnonzero(missing & (rays[observations.point] >= 2))
     if not len(rows):
         return points
     numbers, point = np.unique(observations.point[rows], return_inverse=True)
-    photo = locate(observations.photo_ids, photos)[observations.photo[rows]]
+    photos = KnownPhotos(
+        centers=np.array([center for center, _ in oriented.values()]),
+        rotations=np.array([rotation for _, rotation in oriented.values()]),
+        focal=np.array([focal[photo] for photo in oriented]),
+    )
     found = intersect_points(
-        observations.xy[rows], observations.sigma[rows], (photo, point), KnownPhotos(*oriented, focal), len(numbers)
+        observations.xy[rows], observations.sigma[rows], (place[rows], point), photos, len(numbers)
     )
     points = points.copy()
     points[numbers] = found.xyz

@@ -43,6 +43,23 @@ def test_single_photos_on_full_control_come_back_to_the_truth(crs: str) -> None:
     assert [row["strip"] for row in document["precision"]["basis"]] == [photo["id"] for photo in document["photos"]]
 
 
+def test_single_photos_hand_points_on_to_the_next() -> None:
+    """The last photo sees three control points, and points of the photo before it, which is oriented first."""
+    simulation = simulate(exact(flight=Flight(photos=8), control=replace(MANY, bands=3)))
+    inputs = inputs_of(simulation)
+    (strip,) = inputs.strips
+    cut = (strip.photos[:6], strip.photos[6:7], strip.photos[7:])
+    strips = tuple(Strip(photos[0], strip.camera, photos) for photos in cut)
+    result = adjusted(simulation, replace(inputs, strips=strips))
+    assert np.abs(errors(simulation, result)).max() < MICROMETRE
+
+
+def test_single_photos_with_three_known_points_each_are_refused_with_a_way_out() -> None:
+    simulation = simulate(exact(flight=Flight(photos=6), control=replace(MANY, bands=2)))
+    with pytest.raises(GeometryError, match=r"3 known points .*; list photos that overlap as one strip"):
+        adjusted(simulation, singles(simulation))
+
+
 @pytest.mark.slow
 def test_every_output_knows_single_photos() -> None:
     simulation = simulate(replace(Spec(), flight=Flight(photos=6), control=replace(MANY, noise=(0.05, 0.05, 0.08))))
