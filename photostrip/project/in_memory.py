@@ -54,7 +54,7 @@ def in_memory(source: Source) -> Iterator[None]:
             yield
     except InputError as error:
         placed = InputError(unplaced(error.faults))
-        placed.findings = error.findings
+        placed.findings = unplaced(error.findings)
         raise placed from None
 
 

@@ -6,6 +6,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.source import current, seen_from
 from photostrip.frozen import dataclass, replace
@@ -24,6 +26,7 @@ from photostrip.project.schema.cameras import Camera as CameraBlock
 from photostrip.project.schema.ground import CameraPositions as CameraPositionsBlock
 from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
 from photostrip.project.schema.project_file import ProjectFile
+from photostrip.project.schema.sections import read_section
 from photostrip.project.tables import Tables, check_tables, in_one_zone, read_tables
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.references import check_references
@@ -34,11 +37,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from photostrip.camera import Camera
+    from photostrip.formats.measured.measurements import Measurements
     from photostrip.formats.text.findings import Findings
     from photostrip.notes import Finding, Note
     from photostrip.pipeline import Result
     from photostrip.pipeline.strips.stages import Stages
 
+OF_IMAGES = ("photostrip", "cameras", "strips", "observations", "fiducial_measurements", "accept")
 __all__ = ["Project", "adjust_project", "load_project"]
 
 
@@ -131,8 +136,12 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     grid_folder = source.grids if source is not None and source.grids is not None else path.parent
     findings.add(*_check_certificates(root, checked))
     tied = _tied_frames(root, checked, grid_folder, findings)
-    project = completed(reading.complete(checked), root, reading.file)
-    inputs, notes = _inputs(project, tables, root, placed_models)
+    try:
+        project = completed(reading.complete(checked), root, reading.file)
+        inputs, notes = _inputs(project, tables, root, placed_models)
+    except InputError as error:
+        error.findings = _units_of_images(reading, tables)
+        raise
     specs = (*inputs.frames, *(() if inputs.output is None else (inputs.output,)))
     grids = tuple(dict.fromkeys(grid for spec in specs for grid in grid_names(spec.crs)))
     return Project(
@@ -206,6 +215,32 @@ def _read_alone(root: Node) -> tuple[dict[str, GivenList | None], Output | None]
     blocks += [("orientations", Orientations, root.find("orientations"))]
     given = {name: valid_section(kind, node) for name, kind, node in blocks if node is not None}
     return given, valid_section(Output, root.find("output"))
+
+
+def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
+    """Look at the units of image coordinates where anything else is at fault: no fault shall hide them."""
+    from photostrip.pipeline.plausibility import image_evidence  # a project without faults is examined as a whole
+
+    root, measured = reading.root, tables.observations
+    given = read_section(ProjectFile, {name: root.entries[name].plain for name in OF_IMAGES if root.has(name)}, [])
+    if given is None or measured is None or {strip.camera for strip in given.strips} - set(given.cameras):
+        return ()
+    read = Tables(observations=_whole(measured), fiducials=tables.fiducials and _whole(tables.fiducials), control=[])
+    try:
+        inputs, _ = _inputs(completed(given, root, reading.file), read, root, {})
+        if not np.isfinite(inputs.observations.xy).all():
+            return ()  # the size of a pixel, or the format, is what is missing
+        findings = image_evidence.of_units(inputs, conversion.settings(given))
+    except (GeometryError, InputError):
+        return ()
+    return tuple(places_of(findings, root, tables, inputs.flights))
+
+
+def _whole(read: Measurements) -> Measurements:
+    """Leave out the rows that are no numbers."""
+    rows = np.flatnonzero(np.isfinite(read.xy).all(axis=1))
+    columns = {name: getattr(read, name)[rows] for name in ("photo", "target", "xy", "sigma", "times")}
+    return replace(read, table=read.table.take(rows), **columns)
 
 
 def _inputs(

@@ -1,4 +1,7 @@
-"""Pairs whose photos are exchanged, and lists in another unit, are told once, by their cause."""
+"""Pairs whose photos are exchanged, and lists in another unit, are told once, by their cause.
+
+Neither they nor any other fault of a project hide image coordinates in another unit.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.errors import InputError
 from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.formats.text.findings import Findings
+from photostrip.project.checks.check import check_project
 from photostrip.simulation import Flight, Spec
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
+from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -79,3 +85,59 @@ def test_photos_laid_in_anew_are_told_once(tmp_path: Path) -> None:
     ((code, message),) = faults(tmp_path, listed(set(), noise=1.0))
     assert code == "measurements-disagree"
     assert "agree as measurements do" not in message
+
+
+def told(project: Sample) -> tuple[list[str], list[str]]:
+    """Give the codes of faults and findings, and see that a run that is refused tells the same."""
+    checked = check_project(project.folder / "project.yaml")
+    with pytest.raises(InputError) as refused:
+        project.load()
+    assert (refused.value.faults, refused.value.findings) == (checked.faults, checked.findings)
+    return [each.code for each in checked.faults], [each.code for each in checked.findings]
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1.0, []), (10.0, ["P101"]), (0.1, ["P101"])])
+def test_an_exchanged_pair_does_not_hide_the_unit(tmp_path: Path, factor: float, unit: list[str]) -> None:
+    """It ended the reading before the unit was looked at."""
+    listing, photos = listed({2}, factor=factor)
+    project = sample(tmp_path)
+    project.write("observations.csv", listing)
+    project.change("project.yaml", "[1001, 1002]", f"[{', '.join(sorted(photos))}]")
+    project.change("project.yaml", "  - id: B\n    camera: RC30\n    photos: [2001, 2002]\n", "")
+    assert told(project) == (["pair-exchanged"], unit)
+
+
+FAULTS = [
+    ("observations.csv", "1001,P2", "1001,P1", "measured-twice"),
+    ("project.yaml", "[1001, 1002]", "[1001, 1003]", "not-measured"),
+    ("observations.csv", "\n2001,P2,1", "\n2001,P2,l", "number"),
+    ("control.csv", "212.31", "212,31", "row-length"),
+    ("control.csv", "P2,", "G1,", "given-twice"),
+    ("project.yaml", "    sigma: [0.05, 0.06, 0.08]\n", "", "no-sigma"),
+    ("project.yaml", "grubbs_alpha", "grubs_alpha", "unknown-key"),
+    ("project.yaml", "EPSG:32633", "EPSG:1", "crs-unknown"),
+]
+
+
+@pytest.mark.parametrize(("file", "old", "new", "code"), FAULTS)
+@pytest.mark.parametrize(("unit", "expected"), [("mm", []), ("um", ["P101"])])
+def test_no_fault_hides_the_unit(
+    tmp_path: Path, file: str, old: str, new: str, code: str, unit: str, expected: list[str]
+) -> None:
+    """Every fault did, and was told alone."""
+    project = sample(tmp_path)
+    project.change("project.yaml", "unit: mm", f"unit: {unit}")
+    project.change(file, old, new)
+    assert told(project) == ([code], expected)
+
+
+def test_marks_that_orient_no_photo_say_nothing_of_the_unit(tmp_path: Path) -> None:
+    """Coordinates of a comparator have their origin anywhere, and were told to reach too far."""
+    project = sample(tmp_path, MARKED_FILES)
+    rows = [row.split(",") for row in OBSERVATIONS.split()[1:]]
+    lines = ["photo,point,x,y", *(f"{a},{b},{float(x) + 300},{float(y) + 300}" for a, b, x, y in nonempty(rows))]
+    project.write("observations.csv", "\n".join(lines))
+    project.change("fiducials.csv", "2002,F1,106.1,-106\n", "")
+    checked = check_project(project.folder / "project.yaml")
+    assert "too-few-marks" in {each.code for each in checked.faults}
+    assert checked.findings == ()

@@ -9,6 +9,7 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.plausibility.base_directions import closer_look
+from photostrip.triangulation.plausibility import accepted
 from photostrip.triangulation.plausibility.photos import flight_order, units
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline.image_coordinates import PhotoCoordinates
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,15 +32,19 @@ class ImageEvidence:
     settings: Settings
 
 
+def of_units(inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
+    """Look at how large image coordinates are, which no fault of other data hides."""
+    cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
+    return accepted(_photo_coordinates(inputs, cameras, settings, None)[1], settings.accept)
+
+
 def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None = None) -> ImageEvidence:
     """Look at image coordinates as far as that goes without adjusting anything.
 
     photo: image points in the system of the photo, where a run has them already.
     """
     cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
-    observations, findings = _photo_coordinates(inputs, cameras, settings, photo)
-    of_units, of_camera = units.find_wrong_units(observations, cameras)
-    findings += of_units
+    observations, findings, of_camera = _photo_coordinates(inputs, cameras, settings, photo)
     factor = {name: of_camera[cameras[name].name] for name in observations.photo_ids}
     in_unit = _put_right(observations, factor, frozenset())
     orders = []
@@ -69,25 +73,25 @@ def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None
 
 def _photo_coordinates(
     inputs: Inputs, cameras: dict[str, Camera], settings: Settings, photo: PhotoCoordinates | None
-) -> tuple[PhotoPoints, list[Finding]]:
-    """Image points in the system of the photo, and what the fiducial marks say."""
-    if photo is not None:
-        return photo.observations, [] if photo.interior is None else _of_marks(photo.interior)
-    measured = _on_listed_photos(inputs.observations, cameras)
-    if inputs.fiducials is None:
-        return measured, []
-    from photostrip.triangulation.image_coordinates import interior  # digital cameras need none of it
+) -> tuple[PhotoPoints, list[Finding], dict[str, float]]:
+    """Image points in the system of the photo, what marks and sizes say, and the factor that a camera's size asks for.
 
-    try:
-        oriented = interior.orient(_on_listed_photos(inputs.fiducials, cameras), cameras, settings.interior)
-        observations = interior.transform(measured, oriented)
-    except (GeometryError, InputError):
-        return measured, []  # what is wrong with the marks stops the run
-    return observations, _of_marks(oriented)
+    Nothing is said where the marks give no such system: what is wrong with them stops the run.
+    """
+    oriented = None if photo is None else photo.interior
+    observations = _on_listed_photos(inputs.observations, cameras) if photo is None else photo.observations
+    if photo is None and inputs.fiducials is not None:
+        from photostrip.triangulation.image_coordinates import interior  # digital cameras need none of it
 
-
-def _of_marks(oriented: InteriorOrientation) -> list[Finding]:
-    return list(units.find_wrong_mark_units(oriented.scale_x, oriented.photo_ids))
+        try:
+            oriented = interior.orient(_on_listed_photos(inputs.fiducials, cameras), cameras, settings.interior)
+            observations = interior.transform(observations, oriented)
+        except (GeometryError, InputError):
+            return observations, [], {camera.name: 1.0 for camera in cameras.values()}
+    findings, factors = units.find_wrong_units(observations, cameras)
+    if oriented is not None:
+        findings += units.find_wrong_mark_units(oriented.scale_x, oriented.photo_ids)
+    return observations, findings, factors
 
 
 def _on_listed_photos(measured: PhotoPoints, cameras: dict[str, Camera]) -> PhotoPoints:

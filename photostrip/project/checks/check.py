@@ -82,7 +82,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     try:
         project = load_project(path, overrides)
     except InputError as error:
-        return Checked(path=str(path), faults=error.faults, findings=(), notes=(), document={})
+        return Checked(path=str(path), faults=error.faults, findings=error.findings, notes=(), document={})
     inputs, models = project.inputs, project.inputs.models
     faults = _refused(project, partial(overruling.require, project.settings.relative, inputs.observations))
     if models is not None:
