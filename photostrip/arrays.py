@@ -6,13 +6,10 @@ numpy, pyproj and yaml take together.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]  # counts, and rows of other arrays

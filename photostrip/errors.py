@@ -11,14 +11,13 @@ Readers collect faults and raise one ``InputError`` for all of them; mathematics
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
     from photostrip.notes import Finding
 
 EXIT_DONE = 0

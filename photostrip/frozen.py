@@ -8,12 +8,10 @@ dataclass when it is asked for its fields. For type checkers, ``fields`` and ``a
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Never, Self, TypeVar
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
 
 __all__ = ["NamedTuple", "dataclass", "replace"]
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     from _typeshed import DataclassInstance
-    from numpy.typing import ArrayLike, NDArray
-
-    from photostrip.arrays import Flags, Floats, Numbers
 
 T = TypeVar("T", bound="DataclassInstance")
 

@@ -7,12 +7,9 @@ below 1e-11 over the range the tests of photostrip use.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from math import erfc, exp, fabs, inf, lgamma, log, pi, sqrt
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 # A sound result calls for a second look with this probability at the most, for whatever reason: sigma0, pairs, points
 # that the adjustment has not seen, given points that stand out, deformed models, control against a strip's covariance.

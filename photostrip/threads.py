@@ -7,10 +7,7 @@ already runs one process per core, and lets the order of a sum depend on the mac
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import MutableMapping
+from collections.abc import MutableMapping
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",

@@ -13,9 +13,10 @@ import signal
 import socket
 import threading
 import time
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlsplit
 
 from photostrip.batch.cluster_worker import compute
@@ -28,9 +29,6 @@ from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.batch.worker_process import WORK
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import replace
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 LOCAL = "local"
 CONNECT_SECONDS = 5.0  # seconds for a scheduler to answer

@@ -9,16 +9,14 @@ from __future__ import annotations
 import signal
 import time
 from collections import deque
+from collections.abc import Callable, Iterator
 from multiprocessing.connection import wait
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Protocol, Self
 
 from photostrip.batch.outcomes import BROKEN, TIMEOUT, failure, out_of_memory
 from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.batch.worker_process import NO_MEMORY, READY, WORK, WorkerProcess, share_of_memory
 from photostrip.errors import Fault, InputError, PhotostripError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 TICK_SECONDS = 0.1  # seconds between two looks at what else may have happened
 TRIES = 2  # of a project whose worker dies

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
 from photostrip.report.page.messages import findings_of, line_of
+from photostrip.report.page.parts import Document
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, seen_at
-
-if TYPE_CHECKING:
-    from photostrip.report.page.parts import Document
 
 # How a project can end beside the verdicts of a result (good, unverified, look, failed), and the exit code of each.
 FAULTY, UNWRITTEN, WEAK = "faulty", "unwritten", "weak"

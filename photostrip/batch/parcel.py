@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from photostrip.errors import InputError
 from photostrip.formats.text.files import read_bytes
@@ -13,11 +13,7 @@ from photostrip.formats.text.table_text import LARGEST_TABLE
 from photostrip.frozen import dataclass
 from photostrip.geodesy.crs import grid_names
 from photostrip.project.yaml.merging import override, path_of, read_tree
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.project.yaml.tree import Node
+from photostrip.project.yaml.tree import Node
 
 
 @dataclass(frozen=True)

@@ -9,23 +9,19 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from photostrip import __version__
+from photostrip.batch.selection import ChosenProject
+from photostrip.batch.tasks import Answer
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output.batch import SCHEMA, parsed_record, record_text
 from photostrip.formats.text.source import digest
 from photostrip.formats.text.writing import write_files
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.batch.selection import ChosenProject
-    from photostrip.batch.tasks import Answer
-    from photostrip.report.page.parts import Document
+from photostrip.report.page.parts import Document
 
 LOCK = ".batch.lock"
 RECORD = "batch.json"

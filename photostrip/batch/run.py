@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from types import FrameType
+from typing import Any, Protocol
 
+from photostrip.batch.local_pool import Executor
 from photostrip.batch.outcomes import FAULTY, UNWRITTEN, failure, not_run
+from photostrip.batch.result_folder import ResultFolder
+from photostrip.batch.selection import ChosenProject
 from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, InputError
+from photostrip.report.page.parts import Document
 from photostrip.result.verdict import VERDICTS, exit_code
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from types import FrameType
-
-    from photostrip.batch.local_pool import Executor
-    from photostrip.batch.result_folder import ResultFolder
-    from photostrip.batch.selection import ChosenProject
-    from photostrip.report.page.parts import Document
 
 LAST_REFUSALS = 3  # results in a row that cannot be written before the batch gives up
 SIGNALS = (signal.SIGINT, signal.SIGTERM)

@@ -6,10 +6,10 @@ from dataclasses import field
 from typing import TYPE_CHECKING
 
 from photostrip.frozen import dataclass
+from photostrip.report.page.parts import Document
 
 if TYPE_CHECKING:
     from photostrip.batch.parcel import Parcel
-    from photostrip.report.page.parts import Document
 
 
 @dataclass(frozen=True)

@@ -15,19 +15,16 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from itertools import count
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from photostrip.batch.tasks import Answer, Task
 from photostrip.threads import THREAD_VARIABLES
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from photostrip.batch.tasks import Answer, Task
 
 WORK = "photostrip.batch.evaluation:evaluate"  # what a worker does with a task
 READY = "ready"

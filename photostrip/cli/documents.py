@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -13,8 +14,6 @@ from photostrip.frozen import dataclass
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
     from photostrip.notes import Note
     from photostrip.report.page.parts import Document, Section
 

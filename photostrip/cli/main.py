@@ -10,6 +10,7 @@ import atexit
 import gc
 import os
 import sys
+from collections.abc import Callable, Sequence
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, TextIO, cast
@@ -19,8 +20,6 @@ from photostrip.cli.command_table import COMMANDS, COMPLETION, HELP_NAMES, usage
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     from typer._click.core import Command
 
 EXIT_USAGE = 2

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Sequence
+from typing import Annotated
 
 import typer
 
 from photostrip.cli.stdout import Format
 from photostrip.report.sections.accuracy_report import SectionName
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Sections = Annotated[
     list[SectionName] | None,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable, Sequence
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -11,13 +13,10 @@ import typer
 from photostrip.frozen import NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from pathlib import Path
-
     from photostrip.report.page.parts import Section
     from photostrip.report.sections.accuracy_report import SectionName
 
-    Document = dict[str, Any]
+Document = dict[str, Any]
 
 
 class Format(StrEnum):

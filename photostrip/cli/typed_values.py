@@ -6,6 +6,7 @@ together. What is not given, a text, a path and a word from a list need none of 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args, get_origin
@@ -13,8 +14,6 @@ from typing import TYPE_CHECKING, Any, get_args, get_origin
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     from typer._click.core import Command
 
 READER = "get_runtime_param"  # method of an option that gives typer what reads its values

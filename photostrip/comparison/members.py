@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from photostrip.comparison.quantities import name_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from photostrip.result.numbers import Document
 
 Member = tuple[str, str, str]  # block, id, what it is

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, TypeGuard
 
 from photostrip.frozen import NamedTuple
 from photostrip.result.description import quantity_at
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from photostrip.result.numbers import Document
 
 Number = float | None

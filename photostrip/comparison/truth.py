@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,6 @@ from photostrip.result.reading import MOST_FAULTS, faults_of
 from photostrip.statistics import chi2_quantile
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from photostrip.arrays import Floats
     from photostrip.result.numbers import Document
 

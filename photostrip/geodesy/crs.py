@@ -7,20 +7,18 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from photostrip.errors import PhotostripError
 from photostrip.frozen import dataclass
+from photostrip.geodesy.curvature import Ellipsoid
 from photostrip.geodesy.frame_spec import FrameSpec, Kind, Refusal
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geodesy.proj_operation import load_pyproj
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from pyproj import CRS
-
-    from photostrip.geodesy.curvature import Ellipsoid
 
 _EARTH_RADIUS = 6378137.0  # m; a body whose radius is within half a percent of it is the Earth
 _BODY_TOLERANCE = 0.005

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.notes import named
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats
 
 _ROWS_NAMED = 8
 

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Iterator
+from typing import Literal
 
 from photostrip.errors import Fault
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.geodesy.curvature import Ellipsoid
+from photostrip.geodesy.curvature import Ellipsoid
 
 Kind = Literal["projected", "geographic", "geocentric", "local"]
 

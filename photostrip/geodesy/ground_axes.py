@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.geodesy.domain import named_rows
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
 
 _POLE = 1e-9  # radians: nearer to a pole, east and north are not defined
 

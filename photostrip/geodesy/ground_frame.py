@@ -9,11 +9,13 @@ Source: [001] eq. 152, 153; directions of grid axes are derived.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError, PhotostripError
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import Ellipsoid, curvature_correction, meridian_radius, prime_vertical_radius
@@ -22,13 +24,6 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_axes import axes_along_north, axes_between, true_axes
 from photostrip.geodesy.local_frame import geocentric_from_geodetic, geodetic_from_geocentric
 from photostrip.geodesy.proj_operation import DatumShift, ProjOperation, wrapped_longitude
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 WGS84: Ellipsoid = (6378137.0, 6356752.314245179)
 """Semi-axes of WGS 84, metres: by definition a = 6378137 m, 1/f = 298.257223563 (NIMA TR8350.2)."""

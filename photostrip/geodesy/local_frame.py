@@ -10,18 +10,15 @@ the matrix is not orthogonal).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import Ellipsoid, eccentricity_squared, prime_vertical_radius
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 _ITERATIONS = 10  # the Earth stops after 2 or 3, a body as flat as Saturn after a few more
 _CONVERGED = 1e-15  # radians, 6 nanometres on the Earth

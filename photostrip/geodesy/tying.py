@@ -10,19 +10,15 @@ one whose grid file is missing.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 from photostrip.errors import Fault, InputError, PhotostripError
 from photostrip.geodesy.crs import CrsParts, missing_named_grids, read_crs
+from photostrip.geodesy.curvature import Ellipsoid
 from photostrip.geodesy.frame_spec import FrameSpec, Refusal, contradictions
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.proj_operation import DatumShift, ProjOperation, missing_grids, trouble_with
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from photostrip.geodesy.curvature import Ellipsoid
 
 _SAME_AXIS = 1e-10  # relative: two semi-axes are the same within 0.6 mm on the Earth
 

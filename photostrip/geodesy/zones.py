@@ -9,16 +9,11 @@ Source: derived.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from photostrip.arrays import Floats
 
 HIGHEST = 3  # power
 FEWEST = 2  # points in both zones

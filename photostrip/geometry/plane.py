@@ -14,20 +14,15 @@ products would cost half of the digits.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.points import frozen
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 SINGULAR = 1e-9  # smallest over largest singular value: below, rounding decides
 ITERATIONS = 50

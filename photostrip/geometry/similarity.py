@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.points import frozen
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats, Numbers
 
 SIMILARITY_PARAMETERS = 7  # shift, rotation, logarithm of the scale
 

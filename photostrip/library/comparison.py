@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from photostrip.comparison import Tolerances, compare_results
 from photostrip.errors import Fault, InputError
 from photostrip.library.result import RESULT, Result
 from photostrip.notes import counted
 
 if TYPE_CHECKING:
-    from os import PathLike
-
-    from photostrip.comparison import Tolerances
     from photostrip.result.numbers import Document
 
 BASELINE = "baseline.json"
@@ -66,7 +65,6 @@ def compare(
     Raises InputError when they cannot be compared: other frames, another format, no result. Of folders, what cannot be
     compared stands under ``refused`` in the document, beside what can.
     """
-    from photostrip.comparison import Tolerances, compare_results
     from photostrip.comparison.truth import compare_with_truth
 
     if tolerances is None or isinstance(tolerances, Tolerances):
@@ -118,7 +116,6 @@ def results_below(folder: Path) -> dict[str, Path]:
 
 def _folders(above: Path, now: Mapping[str, Path], baselines: Path, allowed: Tolerances) -> Document:
     """Compare every result below a folder with the baseline of the same name below another."""
-    from photostrip.comparison import compare_results
     from photostrip.formats.output.result_json import read_result
 
     if not baselines.is_dir():

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from photostrip.library.project import assignments_of, reading_from
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from os import PathLike
-
-    from photostrip.result.numbers import Document
+from photostrip.result.numbers import Document
 
 PlanKind = Literal["model", "strip", "camera", "displacement", "screening"]
 

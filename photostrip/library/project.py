@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from contextlib import nullcontext
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
+from photostrip.formats.text.source import Source, current, digest
+from photostrip.formats.text.source import reading_from as accounted
 from photostrip.frozen import replace
 from photostrip.library.result import Result
 from photostrip.notes import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from contextlib import AbstractContextManager
-    from os import PathLike
-
-    from photostrip.formats.text.source import Source
     from photostrip.pipeline import Result as Computed
     from photostrip.pipeline.strips.stages import Stages
     from photostrip.project.checks.check import Checked
@@ -81,7 +79,6 @@ class Project:
 
     def _certificate(self, document: dict[str, Any], computed: Computed) -> dict[str, Any]:
         """Say what the result was made from, by hashes that any machine can repeat."""
-        from photostrip.formats.text.source import digest
         from photostrip.result.statement.certificate import certificate_of
 
         loaded, inputs = self.loaded, self.loaded.inputs
@@ -209,8 +206,6 @@ def loaded_from(
     path: Path, assignments: Sequence[str], source: Source | None = None, stages: Stages | None = None
 ) -> Project:
     """Read a project from files, or from a source in memory; stages are those that other runs of it have made."""
-    from photostrip.formats.text.source import Source, current
-    from photostrip.formats.text.source import reading_from as accounted
     from photostrip.project.loading import load_project
 
     with reading_from(source), accounted(current() or Source()) as account:

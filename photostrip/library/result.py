@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from os import PathLike
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from photostrip.errors import Fault, InputError
+from photostrip.errors import Fault, InputError, faults_instead
 from photostrip.notes import named
 from photostrip.result.records import as_lists
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from os import PathLike
-
     from photostrip.arrays import Floats, Numbers
     from photostrip.library.table import Table
     from photostrip.pipeline import Result as Computed
@@ -173,7 +172,6 @@ class Result:
         everything: False for the short report that the command prints by default; the page always has everything.
         Raises InputError when HTML is asked for and jinja2 is not installed; ValueError for another form.
         """
-        from photostrip.errors import faults_instead
         from photostrip.report.page import layout, text
         from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, require_complete, title_of
 
@@ -210,7 +208,6 @@ class Result:
         profile, required: a profile of accuracy classes (YAML), and the class of it that must be kept.
         Raises InputError with every reason why nothing can be stated.
         """
-        from photostrip.errors import faults_instead
         from photostrip.result.statement.accuracy_statement import statement_document
 
         classes = None
@@ -258,7 +255,6 @@ class Result:
 
     def pictures(self) -> dict[str, str]:
         """Return the pictures of the report as SVG, content by file name."""
-        from photostrip.errors import faults_instead
         from photostrip.report.pictures.result.pictures import picture_files
 
         with faults_instead(self.name, "reported"):

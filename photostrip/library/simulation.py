@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from photostrip.formats.text.source import Source
 from photostrip.library.project import Project, assignments_of, loaded_from, reading_from
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from os import PathLike
-
-    from photostrip.formats.text.source import Source
 
 KEY = "photostrip_simulation"  # number of the schema
 
@@ -43,8 +39,6 @@ class Simulation:
 
     @property
     def _source(self) -> Source:
-        from photostrip.formats.text.source import Source
-
         return Source({name: text.encode() for name, text in self.files.items()})
 
     def write(self, folder: str | PathLike[str]) -> None:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import InputError
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats, Numbers
-
-    Rays = tuple[ArrayLike, ArrayLike, ArrayLike]  # photo (n,) and point (n,) as numbers from 0, coordinates (n, 2)
+Rays = tuple[ArrayLike, ArrayLike, ArrayLike]  # photo (n,) and point (n,) as numbers from 0, coordinates (n, 2)
 
 
 def rows(values: ArrayLike, width: int, *, gaps: bool = False) -> Floats:

@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats
+from photostrip.camera import Camera
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.library.step_arguments import of_rays
-from photostrip.library.step_documents import columns, table
-from photostrip.library.steps import one_pair
+from photostrip.library.step_arguments import Rays, of_rays
+from photostrip.library.step_documents import Column, Document, columns, table
+from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip, one_pair
 from photostrip.result.trace.replay import first_rounds
 from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
 from photostrip.triangulation.polynomial.terms import columns as design_columns
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
-from photostrip.triangulation.resection.closed_form import approximate
+from photostrip.triangulation.resection.closed_form import OrientedPhoto, approximate
 from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 from photostrip.triangulation.resection.resection import resect
 from photostrip.units import MICROMETRES
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.camera import Camera
-    from photostrip.library.step_arguments import Rays
-    from photostrip.library.step_documents import Column, Document
-    from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip
-    from photostrip.triangulation.resection.closed_form import OrientedPhoto
-
-    Trace = list[Document]
+Trace = list[Document]
 
 _COLLINEAR = "(u, v, w) = R' (X - X0); x' = -f u/w, y' = -f v/w; v = x - x'"
 _TURNED = "(u, v, w) = R (x, y, -f); xh = -f u/w, yh = -f v/w; eq. 137"

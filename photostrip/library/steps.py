@@ -8,10 +8,12 @@ Rotations take image axes, or those of a model, to the axes named beside them.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass
@@ -26,12 +28,6 @@ from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, 
 from photostrip.triangulation.resection.closed_form import OrientedPhoto, space_resection
 from photostrip.triangulation.strip_formation.intersection import Intersection, intersect
 from photostrip.triangulation.strip_formation.strip import hand_on_rotations
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
-
 
 __all__ = [
     "Absolute",

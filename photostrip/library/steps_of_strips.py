@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import compress
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import Similarity, collinearity
-from photostrip.library.step_arguments import of_rays, rows, same, sigma0_of
+from photostrip.library.step_arguments import Rays, of_rays, rows, same, sigma0_of
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.bundle.observations.problem import (
     BundleCameras,
@@ -20,6 +23,7 @@ from photostrip.triangulation.bundle.observations.problem import (
     StartValues,
 )
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
+from photostrip.triangulation.bundle.solution import IterationStep
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.polynomial.terms import POWERS, columns
 from photostrip.triangulation.relative_orientation.orientation import orient_pairs
@@ -27,16 +31,7 @@ from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 from photostrip.triangulation.strip_formation.strip import FirstPhoto, form_from_pairs
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.library.step_arguments import Rays
-    from photostrip.triangulation.bundle.solution import IterationStep
-
-    Names = tuple[Sequence[str], Sequence[str]]
+Names = tuple[Sequence[str], Sequence[str]]
 
 ON_A_LINE = 1e-6  # ratio of the spreads of points that lie on one line
 

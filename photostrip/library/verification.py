@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import isclose
 from os.path import normpath
 from pathlib import Path
@@ -14,8 +15,6 @@ from photostrip.library.project import loaded_from
 from photostrip.result.statement.certificate import result_hash
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from photostrip.result.numbers import Document
 
 SCHEMA = 1

@@ -8,10 +8,10 @@ import numpy as np
 
 from photostrip.frozen import dataclass
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
+from photostrip.triangulation.polynomial.correction import Polynomial
 
 if TYPE_CHECKING:
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.polynomial.correction import Polynomial
 
 POLYNOMIAL, COVARIANCE = "polynomial", "covariance"
 

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
+from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
+from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-    from collections.abc import Set as AbstractSet
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.inputs import Settings
-    from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-    from photostrip.points import ControlPoints, PhotoPoints
 
 
 def join_strips(

@@ -6,21 +6,16 @@ control, polynomials, covariance or bundle adjustment, precision.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
+from photostrip.arrays import Numbers
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import replace
 from photostrip.pipeline.given_points import rejected_control
-from photostrip.pipeline.results import Fold
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from photostrip.arrays import Numbers
-    from photostrip.pipeline.inputs import Inputs
-    from photostrip.pipeline.results import Result
+from photostrip.pipeline.inputs import Inputs
+from photostrip.pipeline.results import Fold, Result
 
 FOLDS = 10  # adjustments that are made at most
 

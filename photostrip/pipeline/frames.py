@@ -5,7 +5,8 @@ Source: [001] eq. 153 for Earth curvature in the frames; see docs/frames.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -13,17 +14,12 @@ from photostrip.arrays import median
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.curvature import curvature_correction
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
+from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.refusals import refuse_curvature_twice
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
-
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.results import StripResult
+from photostrip.pipeline.results import StripResult
 
 LEFT_BY_A_LEVEL_FIT = 2.0 / (3.0 * 5.0**0.5)  # rms of what a parabola leaves about its mean, of its height at the ends
 EPOCH_UNKNOWN = 10.0  # years by which an epoch that is not given may differ from that of an operation

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.pipeline.results import Adjusted, Result
 from photostrip.points import ControlPoints, PhotoPoints, locate
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.results import Adjusted, Result
 
 
 def measured_control(control: ControlPoints, observations: PhotoPoints) -> ControlPoints:

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass, replace
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.pipeline.frames import GroundFrames
+from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import corrections
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.frames import GroundFrames
-    from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.strips.stages import Stages
-    from photostrip.points import PhotoPoints
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
 
 

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.frozen import dataclass
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
@@ -21,10 +23,7 @@ from photostrip.triangulation.strip_formation.scale_transfer import StripFormati
 from photostrip.triangulation.strip_formation.strip import NOTHING_GIVEN, FirstPhoto
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.camera import Camera
-    from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 
 METHODS = ("similarity", "polynomial", "covariance", "bundle")
 AUTO = "auto"  # polynomial or covariance, strip by strip

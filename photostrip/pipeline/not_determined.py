@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.pipeline.inputs import Inputs
-    from photostrip.pipeline.results import Adjusted, StripResult
-    from photostrip.points import PhotoPoints
+from photostrip.pipeline.inputs import Inputs
+from photostrip.pipeline.results import Adjusted, StripResult
+from photostrip.points import PhotoPoints
 
 
 def not_determined(

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import replace
 from photostrip.notes import Note
+from photostrip.points import ModelPoints, PhotoPoints
+from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
+from photostrip.triangulation.independent_models.settings import LinkSettings
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_again
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.points import ModelPoints, PhotoPoints
-    from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
-    from photostrip.triangulation.independent_models.settings import LinkSettings
-    from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
 CENTER = "center of photo "  # before the name of a perspective centre in model coordinates
 

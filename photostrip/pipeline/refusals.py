@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, Settings
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.geodesy.ground_frame import GroundFrame
 
 OF_MODELS = ("auto", "polynomial", "similarity")  # adjustments that need no image coordinates
 

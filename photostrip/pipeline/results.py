@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass
+from photostrip.notes import Finding, Note
+from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
+from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.triangulation import absolute_orientation as absolute
+from photostrip.triangulation.polynomial.correction import Polynomial
+from photostrip.triangulation.relative_orientation.orientation import Orientation
+from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from collections.abc import Set as AbstractSet
-
-    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.notes import Finding, Note
     from photostrip.pipeline.choice import Choice
-    from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
-    from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.rejection import Rejection
-    from photostrip.triangulation import absolute_orientation as absolute
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
     from photostrip.triangulation.bundle.quality.correlations import Correlation
@@ -35,10 +37,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
     from photostrip.triangulation.independent_models.formation import FormedModels
     from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
-    from photostrip.triangulation.polynomial.correction import Polynomial
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.resection import resection as exterior
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 NEW, CONTROL, CHECK = "new", "control", "check"
 

@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import replace
+from photostrip.notes import Finding
 from photostrip.pipeline.common_points import join_strips
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
 from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
+from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
-from photostrip.pipeline.results import AdjustedStrips, Result
+from photostrip.pipeline.results import AdjustedStrips, Bundle, Result
 from photostrip.pipeline.strips.absolute import StripStage, on_control
 from photostrip.pipeline.strips.adjusting import adjust
 from photostrip.pipeline.strips.forming import form_strips
+from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.pipeline.strips.stages import Stages
 from photostrip.pipeline.unchecked_control import unchecked_control_notes
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.results import Bundle
-    from photostrip.pipeline.strips.photos import FormedPhotos
-    from photostrip.points import PhotoPoints
+from photostrip.points import PhotoPoints
 
 
 def triangulate(

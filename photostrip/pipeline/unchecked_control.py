@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, median
 from photostrip.notes import Note
+from photostrip.pipeline.results import AdjustedStrips, Bundle, StripResult
 from photostrip.triangulation.bundle.quality import reliability
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.pipeline.results import AdjustedStrips, Bundle, StripResult
 
 HARDLY = 10.0  # standard deviations of a given coordinate in one model: errors of half of them must be that large
 PARTS = (("plan", slice(0, 2)), ("height", slice(2, 3)))

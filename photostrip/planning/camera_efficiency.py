@@ -8,6 +8,7 @@ Source: [004b] eq. 1-8, with the corrections that ``photostrip sources`` lists.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,8 +18,6 @@ from photostrip.triangulation.image_coordinates.lens_distortion import ideal_fro
 from photostrip.units import MILLIMETRES
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from photostrip.camera import Distortion
 
 KILOMETRE = 1e6  # mm

@@ -7,11 +7,11 @@ by itself follows from the elements' derivatives.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import from_angles
@@ -19,11 +19,6 @@ from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs,
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked, unusable_pairs
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
 
 ZONES = 6
 ARC_MINUTES = 60 * 180 / np.pi  # in a radian

@@ -5,11 +5,16 @@ Here the user's units, axes and directions end: inside there are millimetres wit
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photostrip import camera
+from photostrip.arrays import Floats, Numbers
+from photostrip.formats.measured.control import ControlTable
+from photostrip.formats.measured.measurements import Measurements
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import mean_radius, radius_in_azimuth
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
@@ -18,27 +23,21 @@ from photostrip.geometry.rotation import from_angles
 from photostrip.pipeline import Settings, Strip
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.project.schema.cameras import Camera, Distortion, FirstPhoto
+from photostrip.project.schema.ground import CameraPositions as PositionsBlock
+from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
+from photostrip.project.schema.sections import Section
 from photostrip.triangulation.image_coordinates import certificate
+from photostrip.triangulation.image_coordinates.certificate import Certificate
 from photostrip.triangulation.strip_formation import strip
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from _typeshed import DataclassInstance
-    from numpy.typing import NDArray
 
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.formats.measured.control import ControlTable
     from photostrip.formats.measured.exterior import OrientationTable, PositionTable
-    from photostrip.formats.measured.measurements import Measurements
-    from photostrip.project.schema.cameras import Camera, Distortion, FirstPhoto
-    from photostrip.project.schema.ground import CameraPositions as PositionsBlock
-    from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
     from photostrip.project.schema.processing import Processing
     from photostrip.project.schema.project_file import ProjectFile
-    from photostrip.project.schema.sections import Section
-    from photostrip.triangulation.image_coordinates.certificate import Certificate
 
 T = TypeVar("T", bound="DataclassInstance")
 PER_MILLIMETRE = {"mm": 1.0, "um": 1e3, "0.1um": 1e4}

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.formats.measured.control import ControlTable
+from photostrip.formats.measured.exterior import OrientationTable, PositionTable
+from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.text.tables import Table
 from photostrip.frozen import replace
 from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
 from photostrip.project.conversion import certificate_of
+from photostrip.project.models import ModelTables
+from photostrip.project.schema.cameras import Camera
+from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.tables import Tables, alike, rays
 from photostrip.project.yaml.tree import Node, key_path
 from photostrip.triangulation.image_coordinates.certificate import POOR_FIT, Certificate
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.formats.measured.control import ControlTable
-    from photostrip.formats.measured.exterior import OrientationTable, PositionTable
-    from photostrip.formats.measured.measurements import Measurements
-    from photostrip.formats.text.tables import Table
-    from photostrip.project.models import ModelTables
-    from photostrip.project.schema.cameras import Camera
-    from photostrip.project.schema.project_file import ProjectFile
 
 NEAR_NAMED = 3
 

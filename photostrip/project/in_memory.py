@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from math import isnan
 from os import fspath
@@ -16,8 +17,6 @@ from photostrip.formats.text.source import Source, reading_from
 from photostrip.frozen import replace
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
     from photostrip.notes import Finding, Note
 
 T = TypeVar("T", "Fault", "Finding", "Note")

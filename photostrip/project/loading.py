@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.camera import Camera
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.source import current, seen_from
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings
+from photostrip.notes import Finding, Note
+from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Result, Settings
 from photostrip.pipeline.frames import TiedFrames
 from photostrip.points import PhotoPoints
 from photostrip.project import conversion
@@ -34,13 +39,6 @@ from photostrip.project.yaml.tree import NO_FILES, Node, at_own_key
 from photostrip.project.yaml.validation import valid_section
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-    from photostrip.camera import Camera
-    from photostrip.formats.measured.measurements import Measurements
-    from photostrip.formats.text.findings import Findings
-    from photostrip.notes import Finding, Note
-    from photostrip.pipeline import Result
     from photostrip.pipeline.strips.stages import Stages
 
 OF_IMAGES = ("photostrip", "cameras", "strips", "observations", "fiducial_measurements", "accept")

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
+from photostrip.errors import Fault
 from photostrip.formats.measured.models import ModelTable, read_models
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import counted, listed
 from photostrip.pipeline import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
+from photostrip.project.schema.measurements import Models
 from photostrip.project.yaml.references import listed_photos
 from photostrip.project.yaml.tree import Node, fault_at
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.errors import Fault
-    from photostrip.project.schema.measurements import Models
 
 MILLIMETRES = {"mm": 1.0, "um": 1e-3, "m": 1e3}  # in a unit
 

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, median
+from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
+from photostrip.formats.measured.measurements import Measurements
 from photostrip.frozen import replace
 from photostrip.notes import Note, counted
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from photostrip.arrays import Floats
-    from photostrip.camera import Camera
-    from photostrip.formats.measured.measurements import Measurements
-    from photostrip.project.schema.project_file import ProjectFile
-    from photostrip.project.yaml.tree import Node
+from photostrip.project.schema.project_file import ProjectFile
+from photostrip.project.yaml.tree import Node
 
 PIXELS = "px"
 

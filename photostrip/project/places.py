@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from photostrip.errors import Fault
 from photostrip.frozen import replace
+from photostrip.notes import Finding
+from photostrip.pipeline import ModelStrip, Strip
+from photostrip.project.tables import Tables
 from photostrip.project.yaml.tree import Node, steps
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from photostrip.errors import Fault
-    from photostrip.notes import Finding
-    from photostrip.pipeline import ModelStrip, Strip
-    from photostrip.project.tables import Tables
 
 
 def places_of(

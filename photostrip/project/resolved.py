@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from photostrip.formats.text.source import seen_from
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.project.conversion import first_frame, output_spec
 from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.ground import Ellipsoid
+from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.schema.sections import Section
 from photostrip.project.schema.values import Text
 from photostrip.project.yaml.merging import path_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.project.schema.project_file import ProjectFile
-    from photostrip.project.yaml.tree import Node
+from photostrip.project.yaml.tree import Node
 
 HEADER = (
     "# A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.\n"

@@ -6,7 +6,9 @@ here, values there.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
 
 from photostrip import camera, simulation
 from photostrip.formats.text.findings import suggestion
@@ -31,10 +33,6 @@ from photostrip.project.schema.values import (
     schema_number,
 )
 from photostrip.project.yaml.reading import Reading, read_file
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 SCHEMA_NUMBER = 1
 USUAL = simulation.Spec()

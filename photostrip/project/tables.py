@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from photostrip.errors import InputError
+from photostrip.errors import Fault, InputError
 from photostrip.formats.measured.control import ControlTable, read_control, refuse_repeated
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable, read_orientations, read_positions
+from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber
@@ -22,16 +23,10 @@ from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, counted, listed
 from photostrip.project.conversion import ground_columns
 from photostrip.project.models import ModelTables, model_tables, read_model_points
+from photostrip.project.schema.ground import Control
+from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.references import ListedPhoto, listed_photos, marks_of
 from photostrip.project.yaml.tree import Node, fault_at
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from photostrip.errors import Fault
-    from photostrip.formats.measured.measurements import Measurements
-    from photostrip.project.schema.ground import Control
-    from photostrip.project.yaml.reading import Reading
 
 LOOK_ALIKES = str.maketrans("авеѕіјкмнорстухoil", "abes1jkmh0pctyx011")  # after folding the case
 _ENDINGS = re.compile(r"(?im)\.(?:tiff?|jpe?g|png|jp2|img)$")

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from photostrip.errors import Fault, InputError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 PROJECT = """\
 # A project of photostrip. Fill in what is empty, then:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
+from collections.abc import Iterable, Iterator, Sequence
 from hashlib import sha256
 from importlib import resources
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
 from photostrip.report.commands.batch import batch_page_sections
@@ -20,13 +20,9 @@ from photostrip.report.page.links import link
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
 from photostrip.report.pictures.batch_map import batch_maps
 from photostrip.report.pictures.result.pictures import SECTIONS, pictures_of
+from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.accuracy_report import named_sections, title_of
 from photostrip.visible import visible
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from photostrip.report.pictures.svg import Picture
 
 INSTALL = "pip install 'photostrip[report]'"
 FOREMOST = "verdict", "findings"  # sections before the pictures

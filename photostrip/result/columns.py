@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
-from typing import TYPE_CHECKING
 
 from photostrip.frozen import NamedTuple, replace
 from photostrip.result.description import Quantity, table_at
+from photostrip.result.numbers import Document
 from photostrip.result.quantities import angle_decimals, coordinate_decimals
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from photostrip.result.numbers import Document
 
 AZIMUTH_DECIMALS = {"deg": 1, "gon": 1, "rad": 3}
 MATRIX = [f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)]

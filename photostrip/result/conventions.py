@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, fields, is_dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.geodesy.ground_frame import plural
+from photostrip.pipeline import Result
 from photostrip.result.numbers import Document, rms
 from photostrip.result.quantities import record
-
-if TYPE_CHECKING:
-    from photostrip.pipeline import Result
 
 ROTATION = {
     "projected": "grid east, grid north and the ellipsoid's normal at the perspective centre",

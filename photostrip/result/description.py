@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import cache
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from photostrip.frozen import dataclass, replace
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 LIST = " list"
 KINDS = {"text", "word", "count", "flag", "any"}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from photostrip import __version__
+from photostrip.notes import Finding, Note
+from photostrip.pipeline import Result
 from photostrip.result import conventions, summary
 from photostrip.result.adjustment import (
     bundle,
@@ -21,12 +23,6 @@ from photostrip.result.numbers import Document, natural_rank
 from photostrip.result.points import cross_validation, given, ground, image_coordinates, photos, precision
 from photostrip.result.statement.evidence import statement_of
 from photostrip.result.verdict import verdict_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from photostrip.notes import Finding, Note
-    from photostrip.pipeline import Result
 
 SCHEMA = 1
 

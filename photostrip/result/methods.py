@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from photostrip import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from photostrip.errors import PhotostripError
-    from photostrip.result.numbers import Document
+from photostrip.errors import PhotostripError
+from photostrip.result.numbers import Document
 
 SCHEMA = 1
 PARTS = ("count", "rms", "max", "worst", "rms_um")

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from photostrip.result.description import Quantity, Table, table_at
 from photostrip.result.numbers import (
@@ -24,10 +25,6 @@ from photostrip.result.numbers import (
     to_decimals,
 )
 from photostrip.result.records import Records, as_records
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
 
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
 DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES, "gon": DEGREES, "rad": RADIANS}

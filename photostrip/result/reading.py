@@ -6,13 +6,11 @@ value is of the kind that its key is described with, every number is finite and 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 from photostrip.errors import Fault
 from photostrip.result.description import Quantity, Table, described
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 LARGEST_NUMBER = 1e100  # its square is a number yet
 LARGEST_COUNT = 10**15

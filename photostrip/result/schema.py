@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 from photostrip.result.description import Quantity, Table, described
 from photostrip.result.document import SCHEMA
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 URI = "https://json-schema.org/draft/2020-12/schema"
 TYPES = {"text": "string", "word": "string", "count": "integer", "flag": "boolean", "number": "number"}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
+from photostrip.pipeline import Result
 from photostrip.result.adjustment import links
 from photostrip.result.adjustment.bundle import image_fit
 from photostrip.result.adjustment.pairs import Parallaxes, sigma0
@@ -13,12 +15,6 @@ from photostrip.result.adjustment.rejected import rejected_by_strip
 from photostrip.result.numbers import Document, Plain, rms
 from photostrip.result.points.given import Differences, of_used
 from photostrip.result.quantities import record
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from photostrip.arrays import Flags, Floats
-    from photostrip.pipeline import Result
 
 # Name of a tolerance in the project file: where its value stands in the summary, and its unit.
 TOLERANCES: dict[str, tuple[tuple[str, ...], str]] = {

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 from photostrip.frozen import NamedTuple, replace
 from photostrip.result import columns
 from photostrip.result.description import Quantity, Table, table_at
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from photostrip.result.numbers import Document
+from photostrip.result.numbers import Document
 
 # The tables that have records of their own in the document, by the name of their block; a block that a result does not
 # have is an empty table.

@@ -5,6 +5,7 @@ It is made from the finished document, so that a saved result has the same verdi
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -14,8 +15,6 @@ from photostrip.notes import before, counted, listed
 from photostrip.statistics import SECOND_LOOK, TEST_LEVEL, chi2_quantile, f_p_value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from photostrip.result.numbers import Document
 
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"

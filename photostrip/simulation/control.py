@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import counted
 from photostrip.points import ControlPoints, PointTable
 from photostrip.simulation.draws import Draws, Purpose
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.simulation.placement import Placed
-    from photostrip.simulation.spec import Spec
+from photostrip.simulation.placement import Placed
+from photostrip.simulation.spec import Spec
 
 CHECK_POINTS = 10  # when the specification does not say how many
 

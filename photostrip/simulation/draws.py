@@ -11,12 +11,10 @@ the flight, and a strip that is twice as noisy has the same errors twice as larg
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Floats, Numbers
 
 
 class Purpose(IntEnum):

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import rotation_z
 from photostrip.simulation.draws import Draws, Purpose
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.simulation.spec import Spec
+from photostrip.simulation.spec import Spec
 
 LENGTHS = (1.0, 0.7, 0.5)  # wavelengths of the irregular deformation, parts of the larger side of the photo
 

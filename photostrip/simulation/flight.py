@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.simulation.draws import Draws, Purpose
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.simulation.ground import World
-    from photostrip.simulation.spec import Spec
+from photostrip.simulation.ground import World
+from photostrip.simulation.spec import Spec
 
 CUT_SIGMAS = 3.0  # standard deviations beyond which no photo is displaced or tilted: a pilot would fly again
 BASE_SCATTER = (0.02, 0.02, 0.01)  # of the base: along, across, height

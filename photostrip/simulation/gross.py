@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass, replace
+from photostrip.points import PhotoPoints
 from photostrip.simulation.draws import Draws, Purpose
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.points import PhotoPoints
-    from photostrip.simulation.spec import GrossError, Spec
+from photostrip.simulation.spec import GrossError, Spec
 
 AXES = "xyz"
 HALF = 0.5

@@ -5,17 +5,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.simulation.flight import Photos
+from photostrip.simulation.spec import Spec
 from photostrip.triangulation.image_coordinates import lens_distortion
 from photostrip.triangulation.image_coordinates.refraction import refraction_constant
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.simulation.flight import Photos
-    from photostrip.simulation.spec import Spec
 
 USABLE = 0.97  # part of the width and height of the photo that is measured in
 BENDING_STEPS = 6  # each gains four digits

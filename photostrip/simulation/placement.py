@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.flight import CUT_SIGMAS, Photos, position_sigma
+from photostrip.simulation.ground import Surface, World
 from photostrip.simulation.imaging import sees
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.simulation.ground import Surface, World
-    from photostrip.simulation.spec import Spec
+from photostrip.simulation.spec import Spec
 
 # Where a point is tried when its photos do not all show it at first: shift along, in half widths of the zone on three
 # photos, and part of the distance from the flight line.

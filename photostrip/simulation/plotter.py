@@ -7,19 +7,15 @@ brought into the system of the instrument, with errors that do not depend on eac
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, distinct
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_vector
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.simulation.draws import Draws, Purpose
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.simulation.spec import Models, Spec
+from photostrip.simulation.spec import Models, Spec
 
 TILT_SIGMA = np.radians(2.0)  # scatter of the axes of a level model
 LOG_SCALE_SIGMA = 0.2  # scatter of the logarithm of the model scales

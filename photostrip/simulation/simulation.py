@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
+from photostrip.camera import Camera
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, PointTable
@@ -22,14 +24,9 @@ from photostrip.simulation.ground import World, surface, world
 from photostrip.simulation.imaging import bent, project
 from photostrip.simulation.placement import Placed, place, shown
 from photostrip.simulation.plotter import TruePlaces, plotted
+from photostrip.simulation.spec import Spec
 from photostrip.simulation.validation import LARGEST_ARC, faults_of
 from photostrip.triangulation.image_coordinates.corrections import distort
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.camera import Camera
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.simulation.spec import Spec
 
 STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors
 MOST_ROUND_TRIP = 1e-4  # metres

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from photostrip.errors import Fault
 from photostrip.frozen import replace
 from photostrip.notes import counted
 from photostrip.simulation.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES, Spec
 from photostrip.triangulation.image_coordinates import lens_distortion
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 LEAST_LAP, LARGEST_LAP = 50.0, 95.0  # percent; up to 50 % no point lies on three photos
 LARGEST_SIDE_LAP = 90.0

@@ -7,18 +7,14 @@ fitted to the stable points and tested against zero. A stable point that does no
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.frame import rays, small_turn
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
 
 ANGLES = 3  # a turn to the right, up, and about the optical axis
 MOST_ITERATIONS = 20

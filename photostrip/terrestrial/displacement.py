@@ -5,17 +5,12 @@ A pseudo-parallax is the difference of a coordinate on two photos taken from the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.frozen import NamedTuple
 from photostrip.statistics import chi2_quantile
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 SPACE = 3  # components of a displacement
 SINGULAR = 1e-12  # reciprocal condition of a covariance matrix below which there is no test

@@ -8,10 +8,10 @@ covariance.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass, replace
 from photostrip.terrestrial.camera_motion import ANGLES, ImagePair, Motion, find_motion
 from photostrip.terrestrial.displacement import displacements, limit
@@ -31,9 +31,6 @@ from photostrip.terrestrial.monitoring import (
 )
 from photostrip.terrestrial.normal_case import SIDES, Normal, StereoPair, intersect, meeting_z, to_normal
 from photostrip.terrestrial.remarks import remarks
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
 
 COLUMNS = (slice(0, 2), slice(2, 4))  # of the left and of the right photo
 TURNS = (slice(0, 3), slice(3, 6))

@@ -7,21 +7,16 @@ distances of the points are known, and what is seen is the displacement across t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.statistics import noncentrality
 from photostrip.terrestrial.displacement import SPACE
 from photostrip.terrestrial.epochs import monitor
-from photostrip.terrestrial.frame import ground_from_photo
+from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series
 from photostrip.terrestrial.normal_case import StereoPair
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.terrestrial.frame import Phototheodolite
 
 HALVINGS = 60
 FARTHEST = 20.0  # of the distance: no photo shows more to the side

@@ -7,18 +7,15 @@ share (of the reference photos, when pseudo-parallaxes were measured against the
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass
+from photostrip.notes import Note
+from photostrip.terrestrial.camera_motion import Motion, Turn
 from photostrip.terrestrial.displacement import SPACE, limit, statistic
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.notes import Note
-    from photostrip.terrestrial.camera_motion import Motion, Turn
-    from photostrip.terrestrial.normal_case import StereoPair
+from photostrip.terrestrial.normal_case import StereoPair
 
 MOVED_CAMERA = ("always", "auto", "never")
 MEASURED, ABSENT, NO_REFERENCE, SMALL_PARALLAX, OUTSIDE = range(5)

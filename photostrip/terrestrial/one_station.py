@@ -7,19 +7,15 @@ the ray. Where it is known in both, the displacement is complete. Points that st
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.camera_motion import ImagePair, Turn, fit
 from photostrip.terrestrial.displacement import SPACE
 from photostrip.terrestrial.frame import rays, small_turn
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats
 
 STEPS = np.array([1e-4] * 4 + [1e-3] * 2 + [1e-6] * 3)  # of differences: mm, metres, radians
 ACROSS, COMPLETE = 2, 3  # components of a displacement

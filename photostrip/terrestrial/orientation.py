@@ -10,11 +10,12 @@ computed from coordinates have no refraction in them, and the photo has: beta of
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
@@ -22,11 +23,6 @@ from photostrip.notes import counted, listed
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile, f_p_value
 from photostrip.terrestrial import frame
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
 
 ANGLES = ("alpha", "omega", "kappa")
 INTERIOR = ("f", "x0", "z0")

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
 from photostrip.arrays import distinct
 from photostrip.notes import Note, named
 from photostrip.statistics import chi2_quantile
+from photostrip.terrestrial.camera_motion import Turn
 from photostrip.terrestrial.monitoring import MEASURED, REASONS, Monitoring
 from photostrip.units import ARCSECONDS, MICROMETRES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.terrestrial.camera_motion import Turn
 
 SURE = 0.99  # probability below which a misfit may be chance
 

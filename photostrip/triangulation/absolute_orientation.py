@@ -10,12 +10,13 @@ Source: [001] eq. 142-149; mixed control and its weights are derived.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import column_medians, median
+from photostrip.arrays import Floats, Numbers, column_medians, median
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
@@ -23,14 +24,11 @@ from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
 from photostrip.geometry.similarity import Similarity, collinearity, similarity_derivatives
 from photostrip.notes import listed
+from photostrip.points import ControlPoints
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.points import ControlPoints
 
 LARGEST_SCALE_STEP = 5.0  # of the logarithm of the scale, in one iteration
 ITERATIONS = 50

@@ -8,14 +8,10 @@ Source: the weights of [Krarup 1980]; the scale is the median absolute deviation
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.statistics import SIGMA_FROM_MEDIAN
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
 
 TUNING = 3.0  # standard deviations up to which an observation keeps its weight [Krarup 1980]
 # standard deviation of a scale from the median of n normal residuals, over the scale, times sqrt(n) [Hampel 1974]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -14,8 +15,6 @@ from photostrip.cli.options import Silent
 from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from photostrip.report.page.parts import Document
 
 step = command_group("Single steps of the method, from a table of points: for teaching and checking.")

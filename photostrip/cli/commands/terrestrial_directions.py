@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -14,8 +15,6 @@ from photostrip.cli.options import Silent
 from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from photostrip.formats.output.terrestrial_directions import Attitude, Grid, Theodolite
     from photostrip.terrestrial.frame import Phototheodolite
 

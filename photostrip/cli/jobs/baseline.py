@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import typer
 
@@ -14,10 +15,6 @@ from photostrip.formats.text.writing import write_text
 from photostrip.frozen import replace
 from photostrip.library.comparison import BASELINE, place_of, results_below
 from photostrip.report.commands.compare import headline
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 
 @contextmanager

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from photostrip import __version__
 from photostrip.batch.local_pool import Executor, LocalPool
 from photostrip.batch.result_folder import ResultFolder, opened
 from photostrip.batch.run import Batch, Run, Stop, on_signals
 from photostrip.batch.selection import choose
+from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.cli.failures import as_fault, failures_as
 from photostrip.cli.stdout import BatchFormat, Format, ascii_only, print_sections
 from photostrip.errors import InputError, PhotostripError
@@ -24,12 +26,6 @@ from photostrip.report.page import messages, text
 from photostrip.report.page.parts import Document
 from photostrip.report.page.progress import BatchTable, batch_table
 from photostrip.visible import visible, visible_json
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from photostrip.batch.tasks import Answer, Limits, Task
 
 EXIT_SIGNAL = 128  # plus its number, as a shell reports it
 

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 from photostrip import __version__
 from photostrip.cli.stdout import Format, ascii_only, print_sections
+from photostrip.project.checks.check import Checked
 from photostrip.report.commands.check import check_sections, verdict
 from photostrip.report.page import messages
 from photostrip.report.page.text import to_markdown
 from photostrip.visible import visible, visible_json
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.project.checks.check import Checked
 
 SCHEMA = 1
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import typer
 
 from photostrip import __version__
 from photostrip.cli.command_table import COMMANDS, usage
 from photostrip.cli.whole_program import whole_program
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 EXIT_CODES = (
     ("0", "Done."),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 from photostrip.cli.failures import failures_as
+from photostrip.cli.stderr import Messages
 from photostrip.cli.stdout import Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
 from photostrip.formats.text.writing import write_text
@@ -15,13 +17,7 @@ from photostrip.pipeline.strips.stages import Stages
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
 from photostrip.result.methods import methods_document
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from photostrip.cli.stderr import Messages
-    from photostrip.result.numbers import Document
+from photostrip.result.numbers import Document
 
 
 def compare_methods(

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, distinct
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.tables import Column, Table
 from photostrip.notes import counted
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from photostrip.arrays import Flags
-    from photostrip.formats.text.findings import Findings
 
 AXES = ("x", "y", "z")
 PHOTO = Column("photo", aliases=("photo_id", "image", "image_id"))

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
 from photostrip.formats.measured.columns import AXES, POINT, SIGMAS, numbers, sigmas
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
 from photostrip.frozen import dataclass
 from photostrip.notes import listed
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from photostrip.arrays import Flags, Floats
-    from photostrip.formats.text.findings import Findings
 
 USES = ("xyz", "xy", "z", "off")
 ROLES = ("control", "check")

@@ -6,10 +6,11 @@ another system, and their standard deviations in ``s_alpha`` and so on; ``photos
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.formats.measured.columns import (
     AXES,
     PHOTO,
@@ -20,15 +21,10 @@ from photostrip.formats.measured.columns import (
     sigmas,
 )
 from photostrip.formats.measured.control import USE, GivenTable, given_columns, refuse_empty
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
 from photostrip.frozen import dataclass, replace
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.formats.text.findings import Findings
 
 FIX = "set `{}` in the project file, or fill the columns"
 

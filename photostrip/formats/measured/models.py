@@ -5,20 +5,16 @@ Files of blocks, a model's id, lines ``point x y z`` and -99, are read as well.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.formats.measured.columns import AXES, PHOTO, POINT, SIGMAS, numbers, refuse_without_sigma, sigmas
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.formats.text.findings import Findings
 
 MODEL = Column("model", aliases=("model_id", "pair", "stereopair"))
 COORDINATES = (*numbers(*AXES), *sigmas(*AXES))

@@ -5,22 +5,18 @@ Lists of a stereocomparator, a row for each point of a pair, are read as well: s
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.formats.measured import pairs, repeated
 from photostrip.formats.measured.columns import PHOTO, POINT, numbers, refuse_without_sigma, sigmas
 from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from photostrip.formats.text.findings import Findings
 
 MARK = Column("mark", aliases=("mark_id", "fiducial", "fiducial_mark"))
 COORDINATES = (*numbers("x", "y"), *sigmas("x", "y"))

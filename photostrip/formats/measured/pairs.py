@@ -6,23 +6,18 @@ right photo x - p, y - q: p and q are the parallaxes. Every row becomes one row 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.formats.measured.columns import POINT, numbers, sigmas
+from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.tables import Column, Table
 from photostrip.frozen import replace
 from photostrip.notes import counted
 from photostrip.points import locate
-
-if TYPE_CHECKING:
-    from collections.abc import Set as AbstractSet
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.formats.measured.measurements import Measurements
-    from photostrip.formats.text.findings import Findings
 
 PAIR = (Column("pair", aliases=("pair_id", "model", "stereopair")),)
 BOTH = (

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from photostrip.arrays import distinct, median, quantile
+from photostrip.arrays import Floats, Numbers, distinct, median, quantile
+from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.text.findings import Findings
 from photostrip.frozen import replace
 from photostrip.notes import Note, counted
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.formats.measured.measurements import Measurements
-    from photostrip.formats.text.findings import Findings
 
 POLICIES = ("refuse", "average")
 LEAST_TOGETHER = 4  # points measured several times, of which more than

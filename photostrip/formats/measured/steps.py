@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from photostrip.arrays import Floats
 from photostrip.errors import InputError
 from photostrip.formats.measured.columns import POINT, numbers
+from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.measured.observations import read_measurements
 from photostrip.formats.measured.terrestrial import read_points
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.tables import Column
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.formats.measured.measurements import Measurements
 
 IMAGE, XYZ, GROUND = ("x", "y"), ("x", "y", "z"), ("x_ground", "y_ground", "z_ground")
 PHOTOS = (("x_left", "y_left"), ("x_right", "y_right"))

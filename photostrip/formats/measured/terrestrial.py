@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.formats.measured.columns import POINT, repeated_rows
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
 from photostrip.frozen import dataclass
 from photostrip.terrestrial.normal_case import SIDES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.formats.text.findings import Findings
 
 EPOCH = Column("epoch", aliases=("epoch_id",))
 IMAGE = (Column("x", number=True), Column("z", number=True, aliases=("y",)))

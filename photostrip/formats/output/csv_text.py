@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterable
 from io import StringIO
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 
 def to_csv(names: Iterable[str], rows: Iterable[Iterable[object]]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import accumulate, chain, pairwise
 from types import NoneType
 from typing import TYPE_CHECKING
@@ -9,15 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.text import number_columns
-from photostrip.result.numbers import RoundedColumn
+from photostrip.formats.text.number_columns import Cells
+from photostrip.result.numbers import Plain, RoundedColumn
 from photostrip.result.records import Records
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from photostrip.formats.output.json_encoder import Encoder
-    from photostrip.formats.text.number_columns import Cells
-    from photostrip.result.numbers import Plain
 
 
 def lines(columns: Mapping[str, Sequence[Plain]], encode: Encoder) -> str:

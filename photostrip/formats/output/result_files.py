@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from itertools import compress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from photostrip.formats.output.result_json import to_json
 from photostrip.formats.text import number_columns
+from photostrip.formats.text.number_columns import Cells
+from photostrip.pipeline import Result
 from photostrip.result import columns as tables
+from photostrip.result.columns import Column
+from photostrip.result.description import Quantity
 from photostrip.result.numbers import PER_RADIAN, Document
 from photostrip.result.points.image_coordinates import refined_rows
 from photostrip.result.records import Records
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from photostrip.formats.text.number_columns import Cells
-    from photostrip.pipeline import Result
-    from photostrip.result.columns import Column
-    from photostrip.result.description import Quantity
 
 ODD = re.compile(r'[",\s]')  # without these no id needs quotes
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')

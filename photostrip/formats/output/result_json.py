@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output import json_encoder
+from photostrip.formats.output.json_encoder import Encoder
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
 from photostrip.result.records import Records
 from photostrip.visible import visible_json
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.formats.output.json_encoder import Encoder
     from photostrip.result.numbers import Document, Plain
 
 LARGEST_RESULT = 1000 * MEGABYTE

@@ -6,25 +6,21 @@ which they were placed.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
+from photostrip.camera import Camera
 from photostrip.formats.output import simulation_tables as tables
 from photostrip.formats.output.simulation_tables import on_one_line
 from photostrip.formats.output.simulation_truth import truth_text
 from photostrip.frozen import replace
+from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.points import ModelPoints, PhotoPoints
+from photostrip.simulation import Simulation
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.camera import Camera
-    from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.simulation import Simulation
 
 
 def inputs_of(simulation: Simulation) -> Inputs:

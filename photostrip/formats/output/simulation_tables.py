@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from photostrip.arrays import Floats
-    from photostrip.camera import Camera
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.points import ModelPoints, PhotoPoints
-    from photostrip.simulation import Simulation
+from photostrip.arrays import Floats
+from photostrip.camera import Camera
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.points import ModelPoints, PhotoPoints
+from photostrip.simulation import Simulation
 
 IMAGE_STEP, IMAGE_STEP_FREE = 1e-4, 1e-9  # mm to which image coordinates are rounded, with noise and without
 GROUND_STEP, GROUND_STEP_FREE = 1e-4, 1e-7  # metres, likewise

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.formats.output.simulation_tables import ground_decimals, on_one_line
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.rotation import angles
 from photostrip.result.numbers import ROTATION, rounded
+from photostrip.simulation import InjectedError, Simulation
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Floats
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.simulation import InjectedError, Simulation
-
-    Document = dict[str, Any]
+Document = dict[str, Any]
 
 TRUE_STEP = 1e-7  # metres to which the truth is rounded
 ANGLE_DECIMALS = 10  # degrees: 2e-12 rad

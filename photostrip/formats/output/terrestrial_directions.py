@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.frozen import NamedTuple
 from photostrip.result.numbers import EXACT, Document, rounded, significant
@@ -14,12 +15,7 @@ from photostrip.terrestrial.frame import Phototheodolite, directions_from_photo,
 from photostrip.terrestrial.orientation import ANGLES, REFRACTION, OrientationSettings, PhotoOrientation, Sightings
 from photostrip.units import ARCSECONDS, MICROMETRES
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats
-
-    Grid = tuple[Floats, Floats]  # x and z of a table over the photo in mm, from the principal point
+Grid = tuple[Floats, Floats]  # x and z of a table over the photo in mm, from the principal point
 
 SCHEMA = 1
 ANGLE, ARCSEC, MILLIMETRE, MICROMETRE, RATIO = 8, 5, 6, 4, 5  # decimals: finer than any report prints

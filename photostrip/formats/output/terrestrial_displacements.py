@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, Attitude, head
 from photostrip.frozen import NamedTuple
+from photostrip.notes import Note
 from photostrip.result.numbers import Document, natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.displacement import ellipses
+from photostrip.terrestrial.frame import Phototheodolite
 from photostrip.terrestrial.monitoring import REASONS, CameraState, Monitoring, Step
 from photostrip.terrestrial.normal_case import SIDES
 from photostrip.units import ARCSECONDS, MICROMETRES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.notes import Note
-    from photostrip.terrestrial.frame import Phototheodolite
     from photostrip.terrestrial.one_station import OneStation, OneStationResult
 
 METRE = 6  # decimals: a micrometre on the ground

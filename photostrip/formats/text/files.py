@@ -9,16 +9,14 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Mapping
+from io import FileIO
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NoReturn
+from typing import BinaryIO, NoReturn
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.source import current, digest
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from io import FileIO
 
 MEGABYTE = 1_000_000
 BOM = b"\xef\xbb\xbf"

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from photostrip.notes import Note
+from photostrip.notes import Note
 
 LARGEST_LIST = 200  # faults kept of one file; a wrong export has one in every row
 

@@ -6,20 +6,16 @@ together. Matrices are put on each other for lines; what fills them is taken out
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+from photostrip.arrays import Floats
 
-    from numpy.typing import NDArray
-
-    from photostrip.arrays import Floats
-
-    Cells = NDArray[np.uint8]  # (w, n)
-    Count = NDArray[np.uint64]
+Cells = NDArray[np.uint8]  # (w, n)
+Count = NDArray[np.uint64]
 
 MOST_DIGITS = 15  # of a decimal number that no other one of as many shares its float with
 LARGEST = 1e16  # numbers from which on Python writes an exponent

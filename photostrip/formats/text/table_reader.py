@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from operator import itemgetter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import BYTE_ORDER_MARK
 from photostrip.formats.text.findings import Findings, suggestion
@@ -23,12 +24,7 @@ from photostrip.formats.text.tables import CONTROL_CHARACTER, Column, Table
 from photostrip.frozen import replace
 from photostrip.notes import Note, counted, listed
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-
-    Cells = tuple[str, ...]
+Cells = tuple[str, ...]
 
 CHUNK = 16_384  # rows turned into columns at a time, so that a big table never stands in memory cell by cell
 STANDARD_DEVIATIONS = {"s", "sd", "std", "sigma", "stdev", "accuracy", "precision"}  # one column for all coordinates

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.errors import Fault
 from photostrip.frozen import dataclass, replace
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from photostrip.arrays import Floats, Numbers
-    from photostrip.errors import Fault
     from photostrip.formats.text.table_text import TableText
 
 CONTROL_CHARACTER = re.compile(r"[\x00-\x1f\x7f]")

@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
-    Content = str | bytes | Iterable[str]  # the last: a text in pieces, each made when it is written
+Content = str | bytes | Iterable[str]  # the last: a text in pieces, each made when it is written
 
 PIECE = 1_000_000  # characters that are encoded at a time
 

@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, replace
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.block import block_result
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
 from photostrip.pipeline.block.check_points import check_errors
 from photostrip.pipeline.block.datum import known_of
+from photostrip.pipeline.frames import GroundFrames
+from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart, Bundle, SinglePhoto
-from photostrip.points import locate
+from photostrip.pipeline.strips.photos import FormedPhotos
+from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation.bundle.common_errors import taken_up
 from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.correlations import Correlation, correlations
 from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, restarted, selected, supported
+from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.rays import snooping
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.frames import GroundFrames
-    from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.strips.photos import FormedPhotos
-    from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
-    from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
+from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
 
 REFILLED = 1e-9  # metres by which targets of plan or height points may still move
 REFILLS = 3

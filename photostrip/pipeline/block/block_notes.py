@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
 from photostrip.notes import Note
+from photostrip.pipeline.results import Bundle
 from photostrip.triangulation.bundle.common_errors import DISTANCE
 from photostrip.triangulation.bundle.quality import reliability
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.pipeline.results import Bundle
 
 OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustment
     "control-doubtful",

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Numbers, median
 from photostrip.frozen import replace
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.block import block_notes
+from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, Bundle, Precision, StripResult, Ties
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.bundle.quality import self_calibration
 from photostrip.triangulation.resection.resection import with_residuals
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.inputs import Inputs
-    from photostrip.points import PhotoPoints
 
 
 def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFrame, bundle: Bundle) -> AdjustedStrips:

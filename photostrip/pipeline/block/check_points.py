@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.given_points import axes_of, compare_with_given
+from photostrip.pipeline.results import AdjustedStrips, Bundle
+from photostrip.points import ControlPoints
 from photostrip.triangulation.bundle.quality.joint_points import joint_cofactors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.results import AdjustedStrips, Bundle
-    from photostrip.points import ControlPoints
 
 MOST = 40  # check points that are tested together; in a block of 400 photos 60 of them take 11 % of a run
 

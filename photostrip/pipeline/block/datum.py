@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, Numbers, median
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.rotation import from_angles
 from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.given_points import cartesian_of
+from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.strips.absolute import middle_frame
+from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation import absolute_orientation
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.frames import GroundFrames
-    from photostrip.pipeline.inputs import Inputs
-    from photostrip.pipeline.strips.photos import FormedPhotos
 
 LEAST_TIES = 3
 ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.arrays import distinct, median
+from photostrip.arrays import Flags, Floats, Numbers, distinct, median
 from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.rotation import angle_rates, from_angles
 from photostrip.pipeline import overruling
+from photostrip.pipeline.frames import GroundFrames
+from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
 from photostrip.pipeline.results import BlockProblem, BlockStart
 from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation.bundle.observations.problem import (
@@ -25,14 +28,6 @@ from photostrip.triangulation.bundle.observations.problem import (
 from photostrip.triangulation.bundle.quality.self_calibration import sigmas
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.resection.collinearity import KnownPhotos, project
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.frames import GroundFrames
-    from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
 
 FAR = 10.0  # times the median: a ray of no pair that misses its point by more waits outside at first
 LEAST_FAR = 50.0  # in standard deviations

@@ -8,11 +8,12 @@ strip gives frame and scale. Single photos are resected on what is known by then
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, replace
 from photostrip.geometry.similarity import collinearity
@@ -26,22 +27,16 @@ from photostrip.pipeline.block.datum import (
 )
 from photostrip.pipeline.common_points import compared_strips, mean_points
 from photostrip.pipeline.given_points import cartesian_of
+from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import BlockStart, StripResult
 from photostrip.pipeline.strips.adjusting import adjust_formed
+from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation.plausibility.photos.tied_strips import odd_ties
 from photostrip.triangulation.resection.closed_form import approximate
 from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.resection.ray_intersection import intersect_points
 from photostrip.triangulation.resection.resection import resect
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from collections.abc import Set as AbstractSet
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.strips.photos import FormedPhotos
 
 MOST_TIES = 60  # points that hand the frame of a block to one of its strips
 

@@ -7,22 +7,18 @@ with the pair oriented, which keeps base and tilt apart.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.camera import Camera
 from photostrip.errors import GeometryError
+from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, unusable_pairs
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from photostrip.camera import Camera
-    from photostrip.pipeline.inputs import Settings, Strip
-    from photostrip.points import PhotoPoints
 
 LEAST_POINTS = 6  # one more than a pair has unknowns
 MOST_SIGMA0 = 0.01  # of a pair, over the principal distance: beyond it the base is no better known than by the layout

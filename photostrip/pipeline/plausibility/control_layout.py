@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import NamedTuple
+from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
+from photostrip.notes import Finding
+from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.pipeline.plausibility import evidence
+from photostrip.pipeline.plausibility.given_control import GivenControl
+from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
 from photostrip.points import ControlPoints
 from photostrip.triangulation.plausibility.control import given_points, layout
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
-    from photostrip.pipeline.plausibility.given_control import GivenControl
-    from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
     from photostrip.pipeline.plausibility.model_evidence import ModelStripEvidence
 
 

@@ -7,28 +7,24 @@ it then fits much better, and the pairs no worse, that is reported.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from photostrip.arrays import median
+from photostrip.camera import Camera
 from photostrip.frozen import NamedTuple, replace
+from photostrip.notes import Finding
+from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence
+from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control import wrong_heights
+from photostrip.triangulation.plausibility.control.wrong_heights import HeightStretch
+from photostrip.triangulation.plausibility.finding import Evidence
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from photostrip.camera import Camera
-    from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Settings, Strip
-    from photostrip.pipeline.plausibility.evidence import EvidenceStrip
-    from photostrip.points import PhotoPoints
-    from photostrip.triangulation.plausibility.control.wrong_heights import HeightStretch
-    from photostrip.triangulation.plausibility.finding import Evidence
-
-    Compare = Callable[[EvidenceStrip], HeightStretch | None]
+Compare = Callable[[EvidenceStrip], HeightStretch | None]
 
 # sigma0 of the pairs over what is stated, from which they ask for it: in strips with the distance of another lens whose
 # control shows no stretch it is 3 and more, in sound ones below 1.8

@@ -5,32 +5,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import column_medians, distinct, median, quantile
+from photostrip.arrays import Floats, Numbers, column_medians, distinct, median, quantile
+from photostrip.camera import Camera
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.given_points import rows_of_given
-from photostrip.points import locate
+from photostrip.pipeline.inputs import Settings, Strip
+from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.triangulation.plausibility.control.straightening import Rays, StripPoints
 from photostrip.triangulation.plausibility.photos import mosaic
-from photostrip.triangulation.relative_orientation.orientation import refuse_unusable
-from photostrip.triangulation.strip_formation.strip import form_from_pairs, mean_points, model_points
+from photostrip.triangulation.relative_orientation.orientation import Orientation, refuse_unusable
+from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs, mean_points, model_points
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.camera import Camera
-    from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.strips.stages import Stages
-    from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 
 MOSAIC_PHOTOS = 10  # of a mosaic that is laid on control: a longer one curls

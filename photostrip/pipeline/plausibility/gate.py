@@ -6,15 +6,21 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, median
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import replace
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
+from photostrip.notes import Finding
+from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
+from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.pipeline.plausibility import (
     control_layout,
     evidence,
@@ -23,27 +29,17 @@ from photostrip.pipeline.plausibility import (
     shared_control,
     slips,
 )
+from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.plausibility.given_control import GivenControl
-from photostrip.pipeline.plausibility.image_evidence import of_images
-from photostrip.points import locate
+from photostrip.pipeline.plausibility.image_evidence import ImageEvidence, of_images
+from photostrip.pipeline.results import Result
+from photostrip.points import PhotoPoints, locate
 from photostrip.triangulation.plausibility import accepted
 from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
 from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, tied_strips, units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
-
-    from photostrip.arrays import Floats
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.notes import Finding
-    from photostrip.pipeline.frames import GroundFrames
-    from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
-    from photostrip.pipeline.plausibility.evidence import EvidenceStrip
-    from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
-    from photostrip.pipeline.results import Result
     from photostrip.pipeline.strips.stages import Stages
-    from photostrip.points import PhotoPoints
     from photostrip.triangulation.independent_models.formation import FormedModels
 
 STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give

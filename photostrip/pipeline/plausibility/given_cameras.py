@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from photostrip.arrays import column_medians, median
+from photostrip.arrays import Floats, Numbers, column_medians, median
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import NamedTuple, replace
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.notes import Finding
 from photostrip.pipeline.given_points import cartesian_of, rows_of_given
-from photostrip.points import locate
+from photostrip.pipeline.inputs import Inputs, Strip
+from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.photos import flight
 from photostrip.triangulation.plausibility.photos import rotations as given_angles
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Inputs, Strip
-    from photostrip.pipeline.plausibility.evidence import EvidenceStrip
-    from photostrip.points import ControlPoints, PhotoPoints
-
 
 LEAST_POINTS = 3  # points that carry a similarity
 LEAST_BREADTH = 0.05  # second over first extent of control, below which it says nothing of the roll

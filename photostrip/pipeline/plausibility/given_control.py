@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Self
+from pathlib import Path
+from typing import Self
 
+from photostrip.arrays import Numbers
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.crs import area_of_use
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.notes import Finding
+from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.pipeline.plausibility import distance_trial, evidence
+from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
+from photostrip.points import ControlPoints
 from photostrip.triangulation.plausibility.control import (
     given_points,
     wrong_heights,
     wrong_place,
     wrong_readings,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from photostrip.arrays import Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Inputs, Strip
-    from photostrip.pipeline.plausibility.evidence import EvidenceStrip
-    from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
-    from photostrip.points import ControlPoints
-    from photostrip.triangulation.plausibility.control.straightening import GivenPoints, StripPoints
+from photostrip.triangulation.plausibility.control.straightening import GivenPoints, StripPoints
 
 
 @dataclass(frozen=True, eq=False)

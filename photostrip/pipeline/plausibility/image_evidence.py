@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.camera import Camera
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
+from photostrip.notes import Finding
+from photostrip.pipeline.image_coordinates import PhotoCoordinates
+from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.plausibility.base_directions import closer_look
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.plausibility import accepted
 from photostrip.triangulation.plausibility.photos import flight_order, units
-
-if TYPE_CHECKING:
-    from photostrip.camera import Camera
-    from photostrip.notes import Finding
-    from photostrip.pipeline.image_coordinates import PhotoCoordinates
-    from photostrip.pipeline.inputs import Inputs, Settings, Strip
-    from photostrip.points import PhotoPoints
 
 
 @dataclass(frozen=True, eq=False)

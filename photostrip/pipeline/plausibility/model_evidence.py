@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import median, quantile
+from photostrip.arrays import Floats, Numbers, median, quantile
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.pipeline.given_points import rows_of_given
+from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
 from photostrip.pipeline.strips.models import form_models
+from photostrip.points import ControlPoints
+from photostrip.triangulation.independent_models.formation import FormedModels
 from photostrip.triangulation.plausibility.control.straightening import StripPoints
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
-    from photostrip.points import ControlPoints
-    from photostrip.triangulation.independent_models.formation import FormedModels
-
 
 UP = np.array([0.0, 0.0, 1.0])  # of a strip of models with perspective centres
 

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.notes import Finding
+from photostrip.pipeline.inputs import Strip
 from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
+from photostrip.pipeline.results import Result, StripResult
+from photostrip.points import ControlPoints
 from photostrip.triangulation.plausibility import found
-from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, significant
-from photostrip.triangulation.plausibility.finding import ERROR
+from photostrip.triangulation.plausibility.control.shared_by_control import (
+    Shared,
+    ShiftedList,
+    StretchedHeights,
+    significant,
+)
+from photostrip.triangulation.plausibility.finding import ERROR, Evidence
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Strip
-    from photostrip.pipeline.results import Result, StripResult
-    from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.check_errors import CheckErrors
-    from photostrip.triangulation.plausibility.control.shared_by_control import Shared, StretchedHeights
-    from photostrip.triangulation.plausibility.finding import Evidence
 
 OTHER_PLACE = "is its crs the right one: zone, datum, false easting?"
 OTHER_HEIGHTS = "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
+from photostrip.arrays import Floats
+from photostrip.notes import Finding
+from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
 from photostrip.pipeline.plausibility.shared_control import shifted_list
-from photostrip.triangulation.bundle.common_errors import ALL, DISTANCE, DRIFT, LIST, OFFSET, SHOWN_SIGMAS
+from photostrip.pipeline.results import Bundle
+from photostrip.triangulation.bundle.common_errors import ALL, DISTANCE, DRIFT, LIST, OFFSET, SHOWN_SIGMAS, CommonError
 from photostrip.triangulation.bundle.observations.given_orientations import drift_columns
 from photostrip.triangulation.bundle.quality.reliability import CONTROL
+from photostrip.triangulation.bundle.quality.self_calibration import Parameter
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Floats
-    from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Inputs
-    from photostrip.pipeline.results import Bundle
-    from photostrip.triangulation.bundle.common_errors import CommonError
-    from photostrip.triangulation.bundle.quality.self_calibration import Parameter
-    from photostrip.triangulation.plausibility.finding import Evidence
+from photostrip.triangulation.plausibility.finding import Evidence
 
 KEY = "camera_positions.correction"
 

@@ -7,28 +7,23 @@ nothing wrong with the given points of a strip has compared them better than the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Flags, Floats, median
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.notes import Finding
 from photostrip.pipeline.given_points import rejected_control, rows_of_given
+from photostrip.pipeline.inputs import MeasuredModels
+from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+from photostrip.pipeline.plausibility.given_control import GivenControl
+from photostrip.pipeline.results import Result
 from photostrip.points import locate
 from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
 from photostrip.triangulation.plausibility.control import given_points, point_slips
 from photostrip.triangulation.plausibility.control.plan_fit import ODD_PROBABILITY
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from photostrip.arrays import Flags, Floats
-    from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import MeasuredModels
-    from photostrip.pipeline.plausibility.evidence import EvidenceStrip
-    from photostrip.pipeline.plausibility.given_control import GivenControl
-    from photostrip.pipeline.results import Result
 
 CODE = "P406"
 LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)

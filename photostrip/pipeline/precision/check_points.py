@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.given_points import rows_of_given
+from photostrip.pipeline.results import StripResult
+from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
+from photostrip.triangulation.error_propagation.control_errors import Misclosures
+from photostrip.triangulation.error_propagation.covariances import ParameterCovariances
 from photostrip.triangulation.error_propagation.joint_covariances import after_fit
-from photostrip.triangulation.error_propagation.photo_errors import differentiate_photos
+from photostrip.triangulation.error_propagation.photo_errors import PhotoErrors, Sightings, differentiate_photos
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.triangulation.resection.resection import Resection
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.results import StripResult
-    from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.error_propagation.control_errors import Misclosures
-    from photostrip.triangulation.error_propagation.covariances import ParameterCovariances
-    from photostrip.triangulation.error_propagation.photo_errors import PhotoErrors, Sightings
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-    from photostrip.triangulation.resection.resection import Resection
 
 LARGEST = 100  # check points of a strip that are tested together, spread over it
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.results import Result, StripResult
 
 BUNDLE = "set processing.adjustment to bundle"

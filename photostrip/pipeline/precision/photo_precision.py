@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.precision import check_points
 from photostrip.pipeline.precision.check_points import CheckPoints, Propagation
 from photostrip.pipeline.precision.strip_precision import StripPrecision
+from photostrip.pipeline.results import StripResult
+from photostrip.pipeline.strips.absolute import OrientedStrip
+from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.error_propagation import control_errors, covariances, photo_errors
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.results import StripResult
-    from photostrip.pipeline.strips.absolute import OrientedStrip
-    from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
 AT_ONCE = 4096  # points, for the sake of memory

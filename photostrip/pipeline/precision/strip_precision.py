@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.pipeline.results import Adjusted, Precision, StripResult
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.error_propagation.check_errors import CheckErrors
+from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 
 AT_A_TIME = 100  # control coordinates that two strips share, looked at together
 

@@ -5,37 +5,34 @@ Source: [001] eq. 142-149.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.geometry.similarity import Similarity, similarity_derivatives
+from photostrip.pipeline.choice import Deformation
 from photostrip.pipeline.given_points import rows_of_given
-from photostrip.pipeline.inputs import Strip
+from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
+from photostrip.pipeline.results import StripResult, StripShape
+from photostrip.points import ControlPoints
+from photostrip.rejection import Rejection
 from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.strip_at_control import ControlRay, StripAtControl
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
-from photostrip.triangulation.plausibility.control.shared_by_control import find_shared
+from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
+from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.choice import Deformation
-    from photostrip.pipeline.inputs import ModelStrip, Settings
-    from photostrip.pipeline.results import StripResult, StripShape
-    from photostrip.points import ControlPoints
-    from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.error_propagation.control_errors import Misclosures
-    from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
-    from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
 
 
 Errors = TypeVar("Errors")  # derivatives of a strip on the ground by what was measured

@@ -5,21 +5,15 @@ Source: [001] eq. 150-152 for the polynomials.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.choice import COVARIANCE, POLYNOMIAL, Deformation
-from photostrip.pipeline.inputs import AUTO
-from photostrip.pipeline.strips.absolute import on_control
+from photostrip.pipeline.inputs import AUTO, Settings
+from photostrip.pipeline.results import StripResult
+from photostrip.pipeline.strips.absolute import Errors, OrientedStrip, ScreenedStrip, StripStage, on_control
+from photostrip.points import ControlPoints
 from photostrip.triangulation.polynomial import correction as polynomial
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.inputs import Settings
-    from photostrip.pipeline.results import StripResult
-    from photostrip.pipeline.strips.absolute import Errors, OrientedStrip, ScreenedStrip, StripStage
-    from photostrip.points import ControlPoints
 
 
 def adjust(screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:

@@ -11,25 +11,21 @@ Source: derived; docs/method.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.pipeline.choice import POLYNOMIAL, Choice, Witness, method_of
+from photostrip.pipeline.strips.absolute import OrientedStrip
+from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
 from photostrip.triangulation.error_propagation import control_errors, covariances
+from photostrip.triangulation.polynomial.correction import Polynomial
 from photostrip.triangulation.polynomial.terms import bands
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.pipeline.strips.absolute import OrientedStrip
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.polynomial.correction import Polynomial
-
-    Oriented = OrientedStrip[Any]
+Oriented = OrientedStrip[Any]
 
 # left-out errors over what the covariance lets expect, beyond which its standard deviations are not to be believed
 MOST_EXCESS = 3.0

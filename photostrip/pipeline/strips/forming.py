@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from photostrip.frozen import replace
 from photostrip.pipeline import overruling
+from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.refusals import require_adjustment_of_models
+from photostrip.pipeline.strips.absolute import StripStage
 from photostrip.pipeline.strips.photos import FormedPhotos, form_strip
-
-if TYPE_CHECKING:
-    from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.strips.absolute import StripStage
-    from photostrip.pipeline.strips.stages import Stages
-    from photostrip.points import PhotoPoints
+from photostrip.pipeline.strips.stages import Stages
+from photostrip.points import PhotoPoints
 
 
 def form_strips(inputs: Inputs, observations: PhotoPoints, settings: Settings, stages: Stages) -> list[StripStage[Any]]:

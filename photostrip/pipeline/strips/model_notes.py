@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import distinct, median
 from photostrip.notes import Note
+from photostrip.points import ModelPoints
 from photostrip.triangulation.independent_models.link_screening import LEFT
 from photostrip.triangulation.independent_models.model_errors import far_ends
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from photostrip.pipeline.inputs import ModelStrip
-    from photostrip.points import ModelPoints
     from photostrip.triangulation.independent_models.formation import FormedModels
 
 ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import median, quantile
+from photostrip.arrays import Flags, Floats, Numbers, median, quantile
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import dataclass, replace
+from photostrip.geometry.similarity import Similarity
+from photostrip.pipeline.choice import Deformation
+from photostrip.pipeline.inputs import ModelStrip, Settings
 from photostrip.pipeline.overruling import CENTER
 from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.model_notes import link_notes
 from photostrip.points import ModelPoints, locate, take_rows
+from photostrip.rejection import Rejection
+from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.independent_models import (
     link_screening,
     linking,
@@ -22,22 +28,14 @@ from photostrip.triangulation.independent_models import (
     perspective_centers,
 )
 from photostrip.triangulation.independent_models.formation import FormedModels, form_from_models, require_links
+from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
+from photostrip.triangulation.independent_models.linking import StripModels
+from photostrip.triangulation.independent_models.settings import LinkSettings
+from photostrip.triangulation.polynomial.correction import Polynomial
 from photostrip.units import MILLIMETRES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.geometry.similarity import Similarity
-    from photostrip.pipeline.choice import Deformation
-    from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-    from photostrip.rejection import Rejection
-    from photostrip.triangulation.error_propagation.control_errors import Misclosures
-    from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
-    from photostrip.triangulation.independent_models.linking import StripModels
-    from photostrip.triangulation.independent_models.settings import LinkSettings
-    from photostrip.triangulation.polynomial.correction import Polynomial
 
     Oriented = OrientedStrip[model_errors.ModelErrors]
     WithControlScreened = ScreenedStrip[model_errors.ModelErrors]

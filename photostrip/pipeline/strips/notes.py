@@ -2,32 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import column_medians, distinct
+from photostrip.arrays import Floats, Numbers, column_medians, distinct
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted
+from photostrip.pipeline.choice import Deformation
+from photostrip.pipeline.inputs import ModelStrip, Strip
+from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.rejection import Rejection
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
+from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
+from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
+from photostrip.triangulation.polynomial.correction import Polynomial
 from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING, Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.triangulation.resection.resection import Resection
+from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.pipeline.choice import Deformation
-    from photostrip.pipeline.inputs import ModelStrip, Strip
-    from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
-    from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
-    from photostrip.triangulation.polynomial.correction import Polynomial
-    from photostrip.triangulation.resection.resection import Resection
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 # of the length that the control spans: how far points may lie beyond it. Of a polynomial they are extrapolated
 BEYOND_POLYNOMIAL = 0.1

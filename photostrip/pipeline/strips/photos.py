@@ -2,43 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct, median, quantile
+from photostrip.arrays import Floats, Numbers, distinct, median, quantile
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
+from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import overruling
+from photostrip.pipeline.choice import Deformation
+from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
+from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
 from photostrip.pipeline.strips.screened_formation import form_screened, with_readmitted
+from photostrip.pipeline.strips.stages import Stages
+from photostrip.points import PhotoPoints
+from photostrip.rejection import Rejection
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.error_propagation.joint_covariances import joint_covariance
 from photostrip.triangulation.error_propagation.strip_at_control import ControlRay
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
-from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
+from photostrip.triangulation.relative_orientation.orientation import (
+    Orientation,
+    RelativeSettings,
+    orient_unchecked,
+    refuse_unusable,
+)
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.resection.resection import Resection, resect, with_residuals
 from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs, without_points
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.geometry.similarity import Similarity
-    from photostrip.pipeline.choice import Deformation
-    from photostrip.pipeline.inputs import Settings, Strip
-    from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-    from photostrip.pipeline.strips.stages import Stages
-    from photostrip.points import PhotoPoints
-    from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 
-    Oriented = OrientedStrip[strip_errors.StripErrors]
-    WithControlScreened = ScreenedStrip[strip_errors.StripErrors]
+Oriented = OrientedStrip[strip_errors.StripErrors]
+WithControlScreened = ScreenedStrip[strip_errors.StripErrors]
 
 
 @dataclass(frozen=True, eq=False)

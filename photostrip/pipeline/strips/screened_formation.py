@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, replace
-from photostrip.rejection import SEVERAL_RAYS
-from photostrip.triangulation.relative_orientation.orientation import orient_again
+from photostrip.rejection import SEVERAL_RAYS, Rejection
+from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
+from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_again
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.strip_formation import non_neighbours
-from photostrip.triangulation.strip_formation.strip import NOTHING_GIVEN, form_from_pairs, without_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats
-    from photostrip.rejection import Rejection
-    from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
-    from photostrip.triangulation.strip_formation.strip import FirstPhoto, FormedStrip
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.triangulation.strip_formation.strip import (
+    NOTHING_GIVEN,
+    FirstPhoto,
+    FormedStrip,
+    form_from_pairs,
+    without_rows,
+)
 
 
 class ScreenedStrip(NamedTuple):

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass
 from photostrip.notes import counted
-
-if TYPE_CHECKING:
-    from photostrip.planning.strip.ideal_strip import IdealStrip
+from photostrip.planning.strip.ideal_strip import IdealStrip
 
 LAYOUTS = ("bands", "corners", "corners+centre", "points")
 USES = {"xyz": (True, True, True), "xy": (True, True, False), "z": (False, False, True)}

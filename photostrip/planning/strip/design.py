@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, spots_of
@@ -13,11 +14,6 @@ from photostrip.planning.strip.ideal_strip import IdealStrip, StripGeometry, ide
 from photostrip.planning.strip.methods import BUNDLE, COVARIANCE, DEGREES, METHODS, SIMILARITY, Accuracy, accuracy
 from photostrip.planning.strip.placement import BestPlaces, Placement, Required, best_places, worst
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Floats
 
 ANYTHING = Required()
 POLYNOMIAL = "polynomial"

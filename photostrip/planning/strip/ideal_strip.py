@@ -5,25 +5,21 @@ It is simulated and taken through the operations of the strip method, so that wh
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
+from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
 from photostrip.notes import counted
+from photostrip.points import PhotoPoints
 from photostrip.simulation import Control, Flight, Ground, Image, Points, Simulation, Spec, Terrain, simulate
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors, differentiate_strip
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_pairs
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.camera import Camera
-    from photostrip.points import PhotoPoints
 
 SAME = 1e-6  # of a base: a point this near to the nadir of a photo belongs to its column
 LEAST_PHOTOS = 3

@@ -5,11 +5,9 @@ The covariances are those that a run reports for a measured strip: nothing is pr
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from photostrip.arrays import quantile
+from photostrip.arrays import Floats, Numbers, quantile
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import FrameSpec
@@ -17,6 +15,7 @@ from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted
 from photostrip.planning.strip.control_layout import USES, ControlLayout, Spot, Triple, numbers_of
+from photostrip.planning.strip.ideal_strip import IdealStrip
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.bundle.observations import problem as bundle
@@ -27,10 +26,6 @@ from photostrip.triangulation.error_propagation import control_errors, covarianc
 from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
 from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.polynomial import terms as polynomial_terms
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.planning.strip.ideal_strip import IdealStrip
 
 SIMILARITY, COVARIANCE, BUNDLE = "similarity", "covariance", "bundle"
 DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}

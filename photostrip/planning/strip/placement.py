@@ -5,19 +5,15 @@ Nothing but the expected precision of whole layouts is used, so it works for eve
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, across, spots_of
+from photostrip.planning.strip.ideal_strip import IdealStrip
 from photostrip.planning.strip.methods import Accuracy, accuracy
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-
-    from photostrip.planning.strip.ideal_strip import IdealStrip
 
 WORTH = 0.01  # part of the score that a place must gain to be called better
 MOST_TRIED = 2000  # layouts that a search looks at

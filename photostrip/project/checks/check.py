@@ -7,17 +7,21 @@ coordinate gets and from where, and what became of every row of every table.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Numbers, distinct
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.formats.measured.control import ControlTable
 from photostrip.formats.text.findings import Findings
 from photostrip.frozen import dataclass, replace
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
-from photostrip.notes import counted
+from photostrip.notes import Finding, Note, counted
 from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior
 from photostrip.pipeline.plausibility import gate
@@ -37,16 +41,7 @@ from photostrip.project.yaml.tree import fault_at
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.units import MILLIMETRES
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
-
-    from photostrip.arrays import Numbers
-    from photostrip.formats.measured.control import ControlTable
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.notes import Finding, Note
-
-    Document = dict[str, Any]
+Document = dict[str, Any]
 
 LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
 

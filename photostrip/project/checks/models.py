@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.measured.models import ModelTable
+from photostrip.pipeline import MeasuredModels
+from photostrip.project.loading import Project
 from photostrip.project.yaml.tree import fault_at, key_path
 from photostrip.units import MICROMETRES
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.formats.measured.measurements import Measurements
-    from photostrip.formats.measured.models import ModelTable
-    from photostrip.pipeline import MeasuredModels
-    from photostrip.project.loading import Project
-
-    Document = dict[str, Any]
+Document = dict[str, Any]
 
 
 def links_of_models(project: Project, models: MeasuredModels) -> Iterator[Fault]:

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from photostrip.arrays import Flags, Numbers
+from photostrip.formats.measured.control import ControlTable
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable
+from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.text.tables import Table
 from photostrip.frozen import NamedTuple
+from photostrip.pipeline import Inputs, MeasuredModels
+from photostrip.project.loading import Project
 from photostrip.project.tables import Tables, rays
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from photostrip.arrays import Flags, Numbers
-    from photostrip.formats.measured.control import ControlTable
-    from photostrip.formats.measured.measurements import Measurements
-    from photostrip.formats.text.tables import Table
-    from photostrip.pipeline import Inputs, MeasuredModels
-    from photostrip.project.loading import Project
-
-    Document = dict[str, Any]
+Document = dict[str, Any]
 
 IN_NO_STRIP = "its photo belongs to no strip"
 ONCE = "the point is measured on one photo only"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -15,11 +17,6 @@ from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
 from photostrip.project.schema.values import Id, Number, Positive, Range, Words, bounded, one_of
 from photostrip.units import MICROMETRES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
 
 Lap = Annotated[Number, After(bounded(Range(0.0, 90.0, "%")))]
 Relief = Annotated[Number, After(bounded(Range(0.0, 9000.0, "m")))]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -15,10 +17,6 @@ from photostrip.project.terrestrial.options import chosen_camera, required_forma
 from photostrip.project.terrestrial.ranges import BASE, DISTANCE, SIGNIFICANCE
 from photostrip.terrestrial.forecast import DisplacementSpec
 from photostrip.units import MICROMETRES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 PRESET = "UMK 10/1318"
 CONVERGENCE = Range(-45.0, 45.0, "deg")

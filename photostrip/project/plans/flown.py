@@ -6,8 +6,11 @@ these keys.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, TypeVar
 
+from photostrip.camera import Camera
 from photostrip.formats.text.findings import Findings
 from photostrip.planning.strip.ideal_strip import StripGeometry
 from photostrip.project.schema.sections import After, Rule, Section, key, wrong
@@ -16,12 +19,6 @@ from photostrip.project.simulation import SimulatedCamera
 from photostrip.project.terrestrial.ranges import IMAGE_SIGMA_UM
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.tree import COMMAND_LINE, Node, Place
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from photostrip.camera import Camera
 
 T = TypeVar("T", bound=Section)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
 
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import NamedTuple
@@ -12,10 +14,6 @@ from photostrip.project.schema.sections import After, Before, Rule, Section, key
 from photostrip.project.schema.values import Id, Number, Pair, Positive, Range, Triple, Whole, Words, bounded, one_of
 from photostrip.project.simulation import camera_of
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 USES = ("xyz", "xy", "z")
 REACH = Range(5.0, 100.0, "%")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
 
 from photostrip.frozen import NamedTuple
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
@@ -21,10 +23,6 @@ from photostrip.project.schema.values import (
     one_of,
 )
 from photostrip.triangulation.gross_errors.pairs.screening import METHODS
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 MICROMETRES = 1000.0  # in a millimetre
 USUAL = ScreeningSpec()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.frozen import dataclass, replace
@@ -15,13 +17,8 @@ from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_pl
 from photostrip.project.schema.sections import After, Before, Length, Rule, Section, key, read_section, wrong
 from photostrip.project.schema.values import Flag, Id, Positive, Range, Whole, Words, bounded, one_of
 from photostrip.project.simulation import camera_of
+from photostrip.project.yaml.reading import Reading
 from photostrip.simulation import Points
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from photostrip.project.yaml.reading import Reading
 
 MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
 ROWS = Range(2, 20, "rows")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import Annotated
 
 from photostrip.project.schema.sections import Read, Section, key
 from photostrip.project.schema.values import Positive, Whole, Words, schema_number
 from photostrip.project.yaml.reading import Reading
 from photostrip.result.statement.classes import MEASURES, AccuracyClass, ClassProfile
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 SCHEMA_NUMBER = 1
 _read_schema_number = schema_number("photostrip_statement", SCHEMA_NUMBER, " of accuracy classes")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
 
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.text.numbers import NotANumber, shown
@@ -11,10 +13,6 @@ from photostrip.frozen import replace
 from photostrip.project.schema.sections import Read, Section, key, wrong
 from photostrip.project.schema.values import Flag, Words, schema_number
 from photostrip.project.yaml.reading import read_file
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 SCHEMA_NUMBER = 1
 USUAL = Tolerances()

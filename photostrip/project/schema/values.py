@@ -5,7 +5,8 @@ Values arrive as texts (see ``yaml.document``) and get their type here. ``wrong`
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Callable
+from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import SMALLEST, NotANumber, shown
@@ -14,9 +15,6 @@ from photostrip.formats.text.tables import CONTROL_CHARACTER
 from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.project.schema.sections import Read, wrong
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 FALSE, TRUE = ("false", "no", "off"), ("true", "yes", "on")
 

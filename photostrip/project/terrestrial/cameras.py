@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import resources
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings, suggestion
@@ -12,11 +12,9 @@ from photostrip.project.schema.sections import After, Length, Section, key
 from photostrip.project.schema.values import Id, Number, Words, bounded, one_of
 from photostrip.project.terrestrial.ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE
 from photostrip.project.yaml.parsing import parse, read_document
+from photostrip.project.yaml.tree import Node
 from photostrip.project.yaml.validation import checked
 from photostrip.terrestrial.frame import Phototheodolite
-
-if TYPE_CHECKING:
-    from photostrip.project.yaml.tree import Node
 
 OWN_LIST = "phototheodolites.yaml"
 SCHEMA_NUMBER = "1"

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, ONE_STATION, SIGHTINGS, read_points
 from photostrip.formats.output.terrestrial_directions import Attitude, Theodolite
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber, number, shown
+from photostrip.formats.text.tables import Column, Table
 from photostrip.frozen import NamedTuple, replace
+from photostrip.notes import Note
+from photostrip.project.schema.values import Range
 from photostrip.project.terrestrial import ranges
 from photostrip.project.terrestrial.cameras import preset, read_presets
 from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo, photo_from_directions
 from photostrip.terrestrial.one_station import OneStation
 from photostrip.terrestrial.orientation import FREE, Sightings
 from photostrip.units import ARCSECONDS
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.formats.text.tables import Column, Table
-    from photostrip.notes import Note
-    from photostrip.project.schema.values import Range
 
 STEEPEST = np.radians(89.9999)
 KILOMETRE = 1e6  # mm

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.formats.text.findings import Findings
+from photostrip.formats.text.tables import Table
 from photostrip.project.schema.values import Range
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.formats.text.findings import Findings
-    from photostrip.formats.text.tables import Table
 
 MILLIMETRES = {"mm": 1.0, "um": 1e-3}  # in a unit of image coordinates
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200}  # in a unit of angles

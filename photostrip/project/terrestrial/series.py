@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
 from photostrip.errors import Fault
 from photostrip.formats.measured import terrestrial
 from photostrip.formats.text.findings import Findings, suggestion
@@ -16,9 +16,6 @@ from photostrip.points import locate
 from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLIMETRES, refuse_outside
 from photostrip.terrestrial.monitoring import Series
 from photostrip.terrestrial.normal_case import SIDES
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats
 
 LAYOUTS = {"coordinates": terrestrial.COORDINATES, "pseudo_parallaxes": terrestrial.PSEUDO_PARALLAXES}
 REFERENCE, SECOND = "first", "second"  # names of epochs that have none

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.errors import InputError
 from photostrip.formats.output.terrestrial_directions import Theodolite
 from photostrip.formats.output.terrestrial_displacements import ReportFrame
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.notes import Note
 from photostrip.project.terrestrial.cameras import listed_cameras, own_presets
 from photostrip.project.terrestrial.options import SightingOptions, read_sightings
 from photostrip.project.terrestrial.ranges import MILLIMETRES, RADIANS
@@ -24,13 +27,6 @@ from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series
 from photostrip.terrestrial.normal_case import SIDES, StereoPair, normal_pair
 from photostrip.terrestrial.orientation import OrientationSettings, orient
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from photostrip.arrays import Floats
-    from photostrip.notes import Note
 
 USUAL_SIGMA = 0.005  # mm: of image coordinates of sightings, where the project states none
 NORMAL_AXES = ("right", "ahead", "up")

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
 
+from photostrip.errors import Fault
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import shown
 from photostrip.frozen import replace
 from photostrip.project.yaml.parsing import parse, read_document
 from photostrip.project.yaml.tree import NO_FILES, OVERRIDE, Node, Path, Place, at_key, fault_at, place_of, steps
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.errors import Fault
 
 LONGEST_CHAIN = 8
 

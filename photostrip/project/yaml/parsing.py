@@ -8,18 +8,16 @@ size. What the parser refuses is reported in the words of the user.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import BYTE_ORDER_MARK, MEGABYTE, decode, read_bytes
+from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import shown
 from photostrip.notes import Note
 from photostrip.project.yaml.tree import Node, Place, type_names
-
-if TYPE_CHECKING:
-    from photostrip.formats.text.findings import Findings
 
 LARGEST_PROJECT = 10 * MEGABYTE
 MOST_VALUES = 100_000  # a strip of a thousand photos has two thousand

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings
@@ -13,9 +14,6 @@ from photostrip.project.schema.sections import Section
 from photostrip.project.yaml.merging import override, path_of, read_tree, where_named
 from photostrip.project.yaml.tree import Node, Path, at_own_key, fault_at
 from photostrip.project.yaml.validation import checked
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
 
 S = TypeVar("S", bound=Section)
 T = TypeVar("T")

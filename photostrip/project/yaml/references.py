@@ -5,17 +5,13 @@ All checks look at the tree, not at the validated project, so that they also run
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
+from photostrip.errors import Fault
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.frozen import dataclass
 from photostrip.project.yaml.tree import NO_FILES, Node, Path, fault_at
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.errors import Fault
 
 LEAST_MARKS = 2
 

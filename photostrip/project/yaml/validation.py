@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
 
-from photostrip.errors import InputError
-from photostrip.project.schema.sections import Problem, Section, bare, read_section, types
+from photostrip.errors import Fault, InputError
+from photostrip.formats.text.findings import Findings
+from photostrip.project.schema.sections import Problem, Section, WrongValueError, bare, read_section, types
 from photostrip.project.yaml.tree import Node, Path, fault_at, key_path
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from photostrip.errors import Fault
-    from photostrip.formats.text.findings import Findings
-    from photostrip.project.schema.sections import WrongValueError
-
-    Model = type[Section]
+Model = type[Section]
 
 T = TypeVar("T", bound=Section)
 MEANT = re.compile(r"did you mean `(.+)`\?")  # a suggestion

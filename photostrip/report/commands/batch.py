@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 from urllib.parse import quote
 
 from photostrip.frozen import replace
@@ -11,9 +11,6 @@ from photostrip.report.page.junit import Case, to_junit
 from photostrip.report.page.numbers import metres
 from photostrip.report.page.parts import DASH, Document, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 COLUMNS = (
     words("project", "project"),

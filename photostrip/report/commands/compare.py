@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import short, unit
 from photostrip.report.page.parts import DASH, Document, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 LEAST_PERCENT = 1e-4  # share; smaller ones are shown in parts per million
 SHOWN = 20  # differences; --verbose prints all

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import micrometres, ratio
 from photostrip.report.page.parts import DASH, Document, Part, Section, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 SHOWN = 20  # errors that were not found; --verbose prints all
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from photostrip.report.page.parts import Document, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.decisions import choice_line
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 def methods_sections(document: Document) -> tuple[Section, ...]:

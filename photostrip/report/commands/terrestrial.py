@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import calibrated, fixed, short
 from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words, numbered
 from photostrip.report.page.tables import number, over_plane, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 ANGLE_DECIMALS = 5  # in deg and gon: 0.04 and 0.03 seconds of arc
 

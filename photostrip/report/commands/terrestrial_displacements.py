@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import fixed, metres, micrometres, short, signed
 from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 VERDICTS = {True: "moved", False: "", None: "not tested"}
 

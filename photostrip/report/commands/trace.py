@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import fixed, power, short
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 PRIMED = {"alpha1": "α1′", "kappa1": "κ1′", "alpha2": "α2′", "omega2": "ω2′", "kappa2": "κ2′"}
 GREEK = {"alpha": "α", "omega": "ω", "kappa": "κ", "tau": "τ", "nu": "ν", "xi": "ξ", "eta": "η", "theta": "θ"}

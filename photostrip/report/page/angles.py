@@ -6,13 +6,9 @@ photos.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from photostrip.frozen import NamedTuple
 from photostrip.report.page.numbers import Number, fixed
-
-if TYPE_CHECKING:
-    from photostrip.report.page.parts import Document
+from photostrip.report.page.parts import Document
 
 
 class AngleUnit(NamedTuple):

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import os
 import shutil
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Iterable, Mapping
+from typing import TextIO
 
 from photostrip.report.page.layout import USUAL, Line, clamp, lay_out
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from photostrip.report.page.parts import Section
+from photostrip.report.page.parts import Section
 
 STYLES = {
     "title": "bold cyan",

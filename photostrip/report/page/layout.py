@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from photostrip.frozen import NamedTuple
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
 from photostrip.visible import visible
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-
-    Plain = Callable[[str], str]
+Plain = Callable[[str], str]
 
 NARROWEST, WIDEST, USUAL = 60, 200, 100
 GAP = "  "

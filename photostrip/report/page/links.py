@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.report.page.parts import Document
+from photostrip.report.page.parts import Document
 
 Name = tuple[str, str]  # what it is, and its id
 

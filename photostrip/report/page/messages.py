@@ -7,16 +7,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.notes import Finding, Note
+from photostrip.report.page.parts import Document
 from photostrip.visible import visible
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from photostrip.report.page.parts import Document
 
 LEVELS = {"error": "error", "warning": "warning", "note": "notice"}  # ours, and those of GitHub
 SCHEMA = 1

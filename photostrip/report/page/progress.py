@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
@@ -16,8 +17,6 @@ from photostrip.report.page.layout import cells, cut
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
     from rich.live import Live
     from rich.table import Table
 

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from photostrip.frozen import NamedTuple
@@ -13,13 +14,11 @@ from photostrip.report.page.numbers import fixed
 from photostrip.report.page.parts import Column, Table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
     from photostrip.report.page.angles import AngleUnit
 
-    Form = Callable[[float], str]
-    Row = Any  # of a document: a mapping, or whatever the functions of the columns know to read
-    Value = str | Callable[[Row], Any]  # key of a row, with dots where it lies deeper (``discrepancy.up``), or function
+Form = Callable[[float], str]
+Row = Any  # of a document: a mapping, or whatever the functions of the columns know to read
+Value = str | Callable[[Row], Any]  # key of a row, with dots where it lies deeper (``discrepancy.up``), or function
 
 
 class Shown(NamedTuple):

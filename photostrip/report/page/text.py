@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator
 
 from photostrip.report.page.layout import USUAL, lay_out, plain_ascii
 from photostrip.report.page.parts import Facts, Part, Section, Table, Words
 from photostrip.visible import visible
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 BEFORE = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_[]<>|#"})
 

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from math import cos, dist, radians
-from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
 from photostrip.report.pictures.ground.sheet import bars, ids, sheet_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from photostrip.report.page.parts import Document
 
 MARGIN = 60.0
 NAMED = 40  # projects whose names stand in the description

@@ -5,22 +5,21 @@ matplotlib is an extra; it is imported when a picture is drawn.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from photostrip.errors import Fault, InputError
 from photostrip.report.pictures.style import DOTS_PER_INCH, LEVELS, SURFACE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike
 
 INSTALL = "pip install photostrip[report]"
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures.drawing import new_figure
 from photostrip.report.pictures.style import INK, METHODS, SERIES, SMALL_TEXT, USES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from photostrip.report.page.parts import Document
 
 
 def strip_figure(document: Document) -> Figure:

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures.drawing import as_png, as_svg, check_matplotlib, drawn_alike, isolines, new_figure
 from photostrip.report.pictures.plan_strip import strip_figure
 from photostrip.report.pictures.style import SERIES, SMALL_TEXT, USES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
-    from photostrip.report.page.parts import Document
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 ARROWS = 8  # along an axis
 ENDINGS = (".png", ".svg")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 from photostrip.errors import faults_instead
 from photostrip.report.page.layout import USUAL
@@ -30,9 +30,6 @@ from photostrip.report.sections.strip import (
 )
 from photostrip.report.sections.verdict import accuracy, headline, verdict_section
 from photostrip.report.statements.statement import certificate_section, statement_section
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
 
 
 class SectionName(StrEnum):

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
-from photostrip.report.page.angles import angle_unit
+from photostrip.report.page.angles import AngleUnit, angle_unit
 from photostrip.report.page.numbers import fixed, power, short, unit
 from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.report.page.angles import AngleUnit
 
 NAMES = {"image": "image coordinates", "control": "control", "position": "camera positions", "attitude": "attitudes"}
 ONE = {

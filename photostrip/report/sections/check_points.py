@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from photostrip.frozen import NamedTuple
 from photostrip.notes import counted, listed
 from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
 from photostrip.report.page.parts import Document, Part, Section, Table, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.tables import Shown, number, tabulated, words
 from photostrip.report.sections.points import AXES, DIFFERENCES, IDS_NAMED, given_table, largest
 from photostrip.report.sections.strip import ALL_SHOWN, worst_first
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.report.page.tables import Shown
 
 PARTS = "plan", "height"
 UNKNOWN = dict.fromkeys(("plan", "height", "p_plan", "p_height", "sigma_x", "sigma_y", "sigma_z"))

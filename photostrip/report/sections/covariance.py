@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import fixed, joined, ratio, signed
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import worst_first
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 def covariance_section(document: Document, *, everything: bool) -> Section:

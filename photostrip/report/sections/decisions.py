@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import LEAST_PROBABILITY, fixed, metres, micrometres, ratio, short
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import elsewhere
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 WEIGHED = ("polynomial", "covariance")
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import groupby, islice
 from operator import itemgetter
-from typing import TYPE_CHECKING
 
 from photostrip.notes import before
 from photostrip.report.page.messages import MOST_OF_A_KIND
 from photostrip.report.page.parts import Document, Part, Section, Words
 from photostrip.report.sections.strip import elsewhere
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 def findings_sections(document: Document, *, everything: bool) -> tuple[Section, ...]:

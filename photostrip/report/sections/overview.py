@@ -6,7 +6,7 @@ Everything else stands in the sections, which ``--verbose`` prints all and ``--s
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from photostrip.notes import counted, listed
 from photostrip.report.page.layout import lay_out
@@ -26,10 +26,7 @@ from photostrip.report.sections.project import adjustment_of, camera_line, count
 from photostrip.report.sections.strip import DIRECTIONS, GROUND_AXES, degree_of, elsewhere, not_taken, photos_of
 from photostrip.report.sections.verdict import verdict_section
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-
-    Rows = Iterator[tuple[str, str]]
+Rows = Iterator[tuple[str, str]]
 
 MOST_LINES = 120  # of a report, its title and its last line included
 # Points, reasons, findings, notes that are shown: as many as leave the report short.

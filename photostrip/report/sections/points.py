@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING
 
 from photostrip.notes import before, counted, listed
 from photostrip.report.page.numbers import joined, metres, micrometres, ratio, signed, unit
@@ -12,9 +12,6 @@ from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, T
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.models import scale_word
 from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN, elsewhere, worst_first
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 AXES = ("x", "y", "z")
 LETTERS = {"east": "x", "north": "y", "up": "z"}  # of `use`

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from photostrip.notes import counted
 from photostrip.report.page.angles import angle_unit
@@ -10,9 +10,6 @@ from photostrip.report.page.numbers import fixed, metres, micrometres, ratio
 from photostrip.report.page.parts import Document, Facts, Section, Table, Words
 from photostrip.report.page.tables import angle, number, tabulated, words
 from photostrip.report.sections.strip import ALL_SHOWN, elsewhere
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 WORST_POINTS = 8
 STATIONS_SHOWN = 12

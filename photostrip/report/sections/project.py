@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from functools import partial
 from math import hypot
-from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
-from photostrip.report.page.angles import angle_unit
+from photostrip.report.page.angles import AngleUnit, angle_unit
 from photostrip.report.page.numbers import fixed, joined, metres, micrometres, short
 from photostrip.report.page.parts import Document, Facts, Section
-from photostrip.report.page.tables import angle, number, tabulated, words
+from photostrip.report.page.tables import Shown, angle, number, tabulated, words
 from photostrip.report.sections.models import measured, of_models, project_rows, scale_word
 from photostrip.report.sections.strip import worst_first
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from photostrip.report.page.angles import AngleUnit
-    from photostrip.report.page.tables import Shown
 
 
 def project_section(document: Document) -> Section:

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
-from photostrip.report.page.angles import angle_unit
+from photostrip.report.page.angles import AngleUnit, angle_unit
 from photostrip.report.page.numbers import LEAST_PROBABILITY, fixed, metres, micrometres, percent, power, short
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
-from photostrip.report.page.tables import angle, number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from photostrip.report.page.angles import AngleUnit
-    from photostrip.report.page.tables import Shown
+from photostrip.report.page.tables import Shown, angle, number, tabulated, words
 
 ALL_SHOWN = 24  # rows up to which a table is printed whole
 HIGH_LEVERAGE = 0.7  # share of a control point in the polynomial at its own place

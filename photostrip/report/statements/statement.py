@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from photostrip.notes import counted, listed
 from photostrip.report.page.numbers import fixed, metres, signed
 from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 STYLES = {"tested": "good", "reduced": "look", "not met": "failed"}
 HEADLINES = {

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, Numbers, median
 from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.pipeline import Result
+from photostrip.pipeline.results import Bundle
 from photostrip.rejection import UNCONTROLLED
 from photostrip.result.numbers import PER_RADIAN, Document, rms
+from photostrip.result.points.photos import ImageResiduals
 from photostrip.result.quantities import grouped, record, records
 from photostrip.result.records import Records, as_records
 from photostrip.triangulation.bundle.quality import reliability
+from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.pipeline import Result
-    from photostrip.pipeline.results import Bundle
-    from photostrip.result.points.photos import ImageResiduals
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.settings import BundleSettings
 
 OBSERVED = (reliability.IMAGE, reliability.CONTROL, reliability.POSITION, reliability.ATTITUDE)
 SHOWN = 10  # observations named as the weakest and as the worst

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from photostrip.pipeline import AUTO
+from photostrip.pipeline import AUTO, Result, StripResult
+from photostrip.pipeline.choice import Choice, Witness
+from photostrip.result.numbers import Document
 from photostrip.result.quantities import record
-
-if TYPE_CHECKING:
-    from photostrip.pipeline import Result, StripResult
-    from photostrip.pipeline.choice import Choice, Witness
-    from photostrip.result.numbers import Document
 
 
 def adjustment_of(result: Result) -> str:

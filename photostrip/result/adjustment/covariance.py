@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.pipeline import Result, StripResult
 from photostrip.result.numbers import Document, natural_rank
 from photostrip.result.quantities import record, records
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Result, StripResult
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
 

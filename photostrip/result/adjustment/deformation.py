@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Numbers
 from photostrip.frozen import dataclass
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.pipeline import Result, StripResult
 from photostrip.planning.model.deformation import LEAST_POINTS, Paraboloid, determines_paraboloid, fit_paraboloid
+from photostrip.result.numbers import Document
 from photostrip.result.quantities import record
 from photostrip.statistics import t_p_value
 from photostrip.triangulation.absolute_orientation import Targets
 from photostrip.units import ARCSECONDS, MILLIMETRES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline import Result, StripResult
-    from photostrip.result.numbers import Document
 
 LEVEL = 0.05  # of all tests together
 LEAST_MODELS = 3  # whose scatter says how far their mean may be from zero

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats
+from photostrip.pipeline import Result, StripResult
+from photostrip.result.numbers import Document
 from photostrip.result.quantities import records
+from photostrip.result.records import Records
 from photostrip.triangulation.strip_formation.strip import FormedStrip
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.pipeline import Result, StripResult
-    from photostrip.result.numbers import Document
-    from photostrip.result.records import Records
 
 DIRECTIONS = ("along", "across", "up")
 PPM = 1e6

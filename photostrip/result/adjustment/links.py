@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
+from photostrip.pipeline import Result, StripResult
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import Document, rms
 from photostrip.result.quantities import grouped, record, records
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Numbers
-    from photostrip.pipeline import Result, StripResult
-    from photostrip.result.records import Records
+from photostrip.result.records import Records
 
 
 def sigma0(strip: StripResult) -> float:

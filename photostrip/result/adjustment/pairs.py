@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.pipeline import Result, StripResult
 from photostrip.result.adjustment.parallax_limits import parallax_limits
+from photostrip.result.numbers import Document
 from photostrip.result.quantities import grouped, records
+from photostrip.result.records import Records
+from photostrip.triangulation.relative_orientation.orientation import Orientation, RelativeSettings
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 from photostrip.triangulation.strip_formation.strip import base_angles
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.pipeline import Result, StripResult
-    from photostrip.result.numbers import Document
-    from photostrip.result.records import Records
-    from photostrip.triangulation.relative_orientation.orientation import Orientation, RelativeSettings
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
+from photostrip.pipeline.results import PhotoStages
 from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest, residual_sigma
 from photostrip.triangulation.gross_errors.pairs.screening import SEARCHES, stages, tested
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.pipeline.results import PhotoStages
-    from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 
 
 def parallax_limits(of_photos: PhotoStages, settings: RelativeSettings) -> Floats:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
-from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
+from photostrip.pipeline import Result, StripResult
+from photostrip.pipeline.results import Bundle
+from photostrip.points import PhotoPoints
+from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY, Rejection
 from photostrip.result.adjustment.bundle import Kind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
@@ -16,12 +17,6 @@ from photostrip.result.quantities import DECIMALS_BY_UNIT, record
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.strip_formation.scale_transfer import depths
 from photostrip.units import MICROMETRES
-
-if TYPE_CHECKING:
-    from photostrip.pipeline import Result, StripResult
-    from photostrip.pipeline.results import Bundle
-    from photostrip.points import PhotoPoints
-    from photostrip.rejection import Rejection
 
 ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity
 REASONS = {

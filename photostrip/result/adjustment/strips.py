@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.pipeline import Result, StripResult
 from photostrip.result.adjustment import links, pairs
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import Document, rms
 from photostrip.result.quantities import record
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.pipeline import Result, StripResult
-    from photostrip.triangulation.polynomial.correction import Polynomial
+from photostrip.triangulation.polynomial.correction import Polynomial
 
 
 def strip_of(result: Result, strip: StripResult) -> Document:

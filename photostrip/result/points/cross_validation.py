@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats
+from photostrip.pipeline import Result
 from photostrip.result.numbers import Document, natural, rms
 from photostrip.result.points.given import PARTS, differences, size_columns
 from photostrip.result.points.own_precision import chances
 from photostrip.result.points.precision import INSIDE, point_columns
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.quantities import record, records
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.pipeline import Result
 
 LEAST = 1e-300  # probability below which it is all the same
 Columns = dict[str, list[object]]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from math import erfc, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.pipeline import Result
 from photostrip.pipeline.given_points import rejected_control
 from photostrip.points import locate
 from photostrip.result.numbers import Document, natural_rank
@@ -16,11 +18,6 @@ from photostrip.result.points.own_precision import chances, normalised
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.quantities import records
 from photostrip.result.records import Records
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline import Result
 
 PARTS = "plan", "height"
 CONTROL = "control"  # kind of observations of a bundle adjustment

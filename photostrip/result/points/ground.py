@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.pipeline import Result
 from photostrip.result.numbers import Document, natural_rank, rounded
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns
 from photostrip.result.quantities import coordinate_decimals, records
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline import Result
-    from photostrip.result.records import Records
+from photostrip.result.records import Records
 
 
 def coordinates(frame: GroundFrame, enu: Floats) -> Document:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
+from photostrip.pipeline import Result
 from photostrip.result.numbers import EXACT, Document, natural_rank, significant
 from photostrip.result.quantities import grouped
 from photostrip.units import MICROMETRES
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.pipeline import Result
 
 
 def fiducials_of(result: Result) -> Document:

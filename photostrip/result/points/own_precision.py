@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from math import erfc, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
+from photostrip.pipeline import Result
 from photostrip.pipeline.given_points import axes_of
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.pipeline import Result
 
 
 def turned(covariances: Floats, axes: Floats) -> Floats:

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import angles
+from photostrip.pipeline import Result, Strip, StripResult
 from photostrip.result.numbers import PER_RADIAN, Document, Plain, rounded
 from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns
 from photostrip.result.quantities import angle_decimals, grouped, records
+from photostrip.result.records import Records
 from photostrip.triangulation.resection.collinearity import project
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.pipeline import Result, Strip, StripResult
-    from photostrip.result.records import Records
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, median
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
+from photostrip.pipeline import Result, StripResult
 from photostrip.result.numbers import PER_RADIAN, Document, rms
+from photostrip.result.points.given import Differences
 from photostrip.result.points.own_precision import chances, turned
 from photostrip.result.quantities import record, records
 from photostrip.result.records import Records
 from photostrip.statistics import binomial_p_value, chi2_quantile, normal_quantile
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.pipeline import Result, StripResult
-    from photostrip.result.points.given import Differences
 
 UPPER = np.triu_indices(6)
 OUTSIDE = 0.05  # share of sound differences that lie outside their ellipse or interval

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
 from photostrip.statistics import TEST_LEVEL, f_p_value
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats
 
 # Probability that the largest of sound differences stands out; plan and height of control, check and left-out points.
 LEVEL = TEST_LEVEL / 6

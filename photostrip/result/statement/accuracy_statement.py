@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, Fault, InputError
 from photostrip.notes import listed
+from photostrip.result.numbers import Document
 from photostrip.result.statement.certificate import result_hash
-from photostrip.result.statement.classes import classified
+from photostrip.result.statement.classes import ClassProfile, classified
 from photostrip.result.statement.stating import NOT_MET, REFUSED, STANDARD, TESTED, stated
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from photostrip.result.numbers import Document
-    from photostrip.result.statement.classes import ClassProfile
 
 SCHEMA = 1
 # Measures of ISO 19157:2013, annex D: identifier, name, alias, where it stands in the block `statement`.

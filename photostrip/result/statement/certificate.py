@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,8 +22,6 @@ from photostrip.geodesy.proj_operation import proj_versions
 from photostrip.result.records import Records
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.result.numbers import Document
 

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from photostrip.result.numbers import Document
+from photostrip.result.numbers import Document
 
 # What a norm may set a limit to, with the meaning that a statement prints; where it stands in the block `statement`.
 MEASURES = {

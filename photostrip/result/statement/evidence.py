@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
+from photostrip.pipeline import Result
+from photostrip.result.numbers import Document
+from photostrip.result.points.given import Differences
 from photostrip.result.quantities import record
 from photostrip.result.statement.figures import figures_of
 from photostrip.result.statement.stating import reason, stated
 from photostrip.result.verdict import FAILED, UNVERIFIED
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Flags, Floats
-    from photostrip.pipeline import Result
-    from photostrip.result.numbers import Document
-    from photostrip.result.points.given import Differences
 
 
 def statement_of(result: Result, found: Differences, document: Document) -> Document:

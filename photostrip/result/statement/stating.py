@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
 
+from photostrip.result.numbers import Document
 from photostrip.result.statement.figures import CENTIMETRES, LINE_95
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from photostrip.result.numbers import Document
 
 TESTED, REDUCED, NOT_MET, REFUSED = "tested", "reduced", "not met", "refused"
 MINIMUM = 30  # check points: ASPRS, edition 2

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from photostrip.frozen import NamedTuple
-
-if TYPE_CHECKING:
-    from photostrip.pipeline import Settings
-    from photostrip.result.numbers import Document
+from photostrip.pipeline import Settings
+from photostrip.result.numbers import Document
 
 
 class Choice(NamedTuple):

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from itertools import compress
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import replace
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.geometry.similarity import pair_scales
+from photostrip.geometry.similarity import Similarity, pair_scales
+from photostrip.pipeline import Result, StripResult
+from photostrip.points import ControlPoints
 from photostrip.result.numbers import EXACT, PER_RADIAN, Document, rounded, significant
 from photostrip.result.records import as_records
 from photostrip.result.trace.departures import departures_of
@@ -18,12 +20,6 @@ from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.polynomial.terms import POWERS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 from photostrip.triangulation.strip_formation.strip import FirstPhoto, base_angles, intersect_models
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.geometry.similarity import Similarity
-    from photostrip.pipeline import Result, StripResult
-    from photostrip.points import ControlPoints
 
 SCHEMA = 1
 ANGLE, STEP, SQUARES, MILLIMETRES, MODEL, COSINE, METRES = 9, 6, 6, 5, 9, 10, 4  # decimals, digits of steps and squares

@@ -11,28 +11,23 @@ Source: derived, see docs/sources.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass, replace
+from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.observations.calibration import PRINCIPAL_DISTANCE
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.quality.joint_points import sum_cofactors
+from photostrip.triangulation.bundle.quality.reliability import Limit
 from photostrip.triangulation.bundle.selection import Selection, selected, supported
 from photostrip.triangulation.bundle.settings import CALIBRATION
+from photostrip.triangulation.bundle.solution import BundleSolution
 from photostrip.triangulation.bundle.solve import solve
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Floats
-    from photostrip.rejection import Rejection
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.quality.reliability import Limit
-    from photostrip.triangulation.bundle.solution import BundleSolution
 
 OFFSET, DRIFT, DISTANCE, LIST = "offset", "drift", "principal distance", "control list"
 ALL = "all"  # positions of all groups share one error

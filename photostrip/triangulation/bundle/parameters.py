@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 from photostrip.triangulation.bundle.observations import calibration
+from photostrip.triangulation.bundle.observations.calibration import Calibrated
 from photostrip.triangulation.bundle.observations.collinearity import Rays, view
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
+from photostrip.triangulation.bundle.observations.ray_batches import Batch
 from photostrip.triangulation.bundle.structure import BandStructure, band_structure
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.observations.calibration import Calibrated
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
 
 @dataclass(frozen=True, eq=False)

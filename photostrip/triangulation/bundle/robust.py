@@ -5,20 +5,15 @@ The weights are those of ``triangulation.robust``: many gross errors at once, al
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, median
 from photostrip.frozen import replace
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.selection import restarted
+from photostrip.triangulation.bundle.solution import BundleSolution
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.robust import falling_weights
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.solution import BundleSolution
 
 REWEIGHTINGS = 6
 NORMAL_MEDIAN = 1.1774  # median of the length of two standard normal residuals

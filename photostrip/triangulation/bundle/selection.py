@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags
 from photostrip.frozen import dataclass, replace
 from photostrip.triangulation.bundle.observations.problem import BundleProblem, StartValues
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags
-    from photostrip.triangulation.bundle.solution import BundleSolution
+from photostrip.triangulation.bundle.solution import BundleSolution
 
 LEAST_RAYS = 2
 FIELDS = {"image": "images", "control": "control", "position": "positions", "attitude": "attitudes"}

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.parameters import PreparedProblem
+from photostrip.triangulation.bundle.parameters import PreparedProblem
 
 
 @dataclass(frozen=True)

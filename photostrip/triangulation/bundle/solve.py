@@ -5,13 +5,14 @@ Source: [Granshaw 1980] for the reduced normal equations; step control after [Ma
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation.bundle.normal_equations import datum, defects
+from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
 from photostrip.triangulation.bundle.normal_equations.reduced import (
+    Reduced,
     control_residuals,
     control_squares,
     factored,
@@ -20,16 +21,16 @@ from photostrip.triangulation.bundle.normal_equations.reduced import (
     reduce,
 )
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
-from photostrip.triangulation.bundle.parameters import Parameters, ParameterStep, parameters_from, prepare
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
+from photostrip.triangulation.bundle.observations.ray_batches import Batch
+from photostrip.triangulation.bundle.parameters import (
+    Parameters,
+    ParameterStep,
+    PreparedProblem,
+    parameters_from,
+    prepare,
+)
 from photostrip.triangulation.bundle.solution import BundleSolution, IterationStep
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
-    from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.observations.ray_batches import Batch
-    from photostrip.triangulation.bundle.parameters import PreparedProblem
 
 FIRST_DAMPING = 1e-4
 MORE, LESS = 10.0, 0.1  # factors of the damping after a refused and after a taken step

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass, replace
+from photostrip.triangulation.bundle.observations.problem import BundleProblem, ControlObservations
 from photostrip.triangulation.bundle.observations.ray_batches import Batch, SortedRays, arrange, sort_rays
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem, ControlObservations
 
 NARROW = 12  # photos: a band as narrow as this is not worth another order
 TABLE = 3_000  # photos: up to here pairs are marked in a square table, which is faster than sorting them

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_vector
+from photostrip.points import PhotoPoints
 from photostrip.triangulation import absolute_orientation as absolute
+from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, Targets
 from photostrip.triangulation.covariance_adjustment import conditions as strip_conditions
 from photostrip.triangulation.covariance_adjustment import prediction, relinearisation
 from photostrip.triangulation.covariance_adjustment import system as strip_system
+from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
 from photostrip.triangulation.error_propagation import control_errors, strip_errors
 from photostrip.triangulation.error_propagation.covariances import image_variance
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.points import PhotoPoints
-    from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, Targets
-    from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
+from photostrip.triangulation.relative_orientation.orientation import Orientation
+from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 MOST_FORMATIONS = 10
 FRESH = 0.05  # radians that a strip may turn before its derivatives are made afresh

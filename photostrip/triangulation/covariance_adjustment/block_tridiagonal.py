@@ -5,16 +5,12 @@ Source: derived; block elimination from the first block on, and the backward rec
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import NamedTuple, dataclass
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Floats
 
 
 class InverseRow(NamedTuple):

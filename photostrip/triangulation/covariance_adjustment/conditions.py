@@ -8,23 +8,20 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
+from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors, scale_shares
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.error_propagation.control_errors import Misclosures
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
+from photostrip.triangulation.relative_orientation.orientation import Orientation
+from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 JUNCTION, CONTROL, DISTANCE = 0, 1, 2
 # distances at all junctions over which a point reaches, at most: the time grows with their third power, see the table

@@ -6,18 +6,14 @@ their correlates, everything else predicts the group with the error Pi^-1 lambda
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.covariance_adjustment.system import System
+from photostrip.triangulation.covariance_adjustment.system import System
 
 UNCHECKED = 1e-9  # smallest eigenvalue of the scaled Pi of a group that the others determine
 

@@ -5,11 +5,13 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import gamma_cdf, normal_quantile
@@ -19,12 +21,7 @@ from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, D
 from photostrip.triangulation.error_propagation import joint_covariances
 from photostrip.triangulation.error_propagation.covariances import NearImages, along_strip, local_covariances
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 AT_A_TIME = 32  # blocks whose columns are made together: 5 MB of points
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check

@@ -11,28 +11,24 @@ Source: derived; see docs/precision.md, eq. 3 and 7.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import replace
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
+from photostrip.points import PhotoPoints
+from photostrip.triangulation.covariance_adjustment.system import System
 from photostrip.triangulation.error_propagation.covariances import by_images
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, y_parallaxes
 from photostrip.triangulation.strip_formation import non_neighbours
+from photostrip.triangulation.strip_formation.scale_transfer import Junctions
 from photostrip.triangulation.strip_formation.strip import FormedStrip, model_points, place_models
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.points import PhotoPoints
-    from photostrip.triangulation.covariance_adjustment.system import System
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.scale_transfer import Junctions
 
 
 def image_errors(found: System) -> Floats:

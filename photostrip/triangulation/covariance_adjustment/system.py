@@ -8,20 +8,18 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
+from photostrip.triangulation.covariance_adjustment.conditions import Conditions
 from photostrip.triangulation.error_propagation.covariances import NearImages
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, ErrorRows, ranges
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.covariance_adjustment.conditions import Conditions
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Collection
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import dataclass, replace
 from photostrip.statistics import gamma_cdf
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from photostrip.arrays import Floats, Numbers
 
 
 @dataclass(frozen=True, eq=False)

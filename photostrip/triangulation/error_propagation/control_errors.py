@@ -9,20 +9,16 @@ Source: derived, docs/precision.md, eq. 5; [001] eq. 145-151 for the fit.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.points import ControlPoints
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.polynomial.terms import columns
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.points import ControlPoints
-    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,22 +10,19 @@ Source: derived; see docs/precision.md, eq. 4-6.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
+from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows, add_rows
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.error_propagation.control_errors import Misclosures
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
 LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates

@@ -5,19 +5,16 @@ Source: derived; see docs/precision.md, eq. 1-4.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass, replace
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.error_propagation.pair_errors import PairErrors
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
+from photostrip.triangulation.error_propagation.pair_errors import PairErrors
+from photostrip.triangulation.relative_orientation.orientation import Orientation
+from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 COMPONENTS = 6  # of the error of a model: five elements of its pair, logarithm of the scale that it hands on
 ELEMENTS, SCALE = slice(0, 5), 5

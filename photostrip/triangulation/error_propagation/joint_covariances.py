@@ -9,13 +9,14 @@ Source: derived; see docs/precision.md, eq. 3 and 4.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.error_propagation.covariances import (
     NearImages,
+    ParameterCovariances,
+    SimilarityCovariances,
     around_models,
     by_model,
     covariances_of_models,
@@ -23,11 +24,7 @@ from photostrip.triangulation.error_propagation.covariances import (
     with_parameters,
 )
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, ErrorRows
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.error_propagation.covariances import ParameterCovariances, SimilarityCovariances
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
 def joint_covariance(errors: StripErrors, rows: ErrorRows, along: SimilarityCovariances) -> Floats:

@@ -5,17 +5,13 @@ Source: derived; see docs/precision.md, eq. 3.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, PlacedStrip
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
 
 
 def with_bridges(points: ErrorRows, strip: PlacedStrip) -> ErrorRows:

@@ -5,22 +5,18 @@ Source: derived, docs/precision.md, eq. 1; [001] eq. 126-138 for the operations.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import angle_rates, from_alpha_omega_kappa
+from photostrip.triangulation.relative_orientation.orientation import Orientation
+from photostrip.triangulation.relative_orientation.pairs import Pairs
 from photostrip.triangulation.relative_orientation.solution import base_rays, linearised_parallaxes, normal_matrices
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.relative_orientation.pairs import Pairs
-
-    _ByRay = Callable[[Floats], Floats]  # from changes of a ray, (m, 3, k), to those of the points
+_ByRay = Callable[[Floats], Floats]  # from changes of a ray, (m, 3, k), to those of the points
 
 SYSTEM = "alpha-omega-kappa"
 LEFT, RIGHT = slice(0, 2), slice(2, 5)  # elements that turn the left and the right photo

@@ -5,23 +5,17 @@ Source: derived; see docs/precision.md, eq. 3.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.points import take_rows
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, ranges
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.resection.collinearity import partials
-from photostrip.triangulation.resection.resection import runs
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-    from photostrip.triangulation.resection.resection import Resection
+from photostrip.triangulation.resection.resection import Resection, runs
 
 SIGHTINGS = 2048  # gone through at a time; 3000 photos of 30 points take 160 MB less than all at once
 

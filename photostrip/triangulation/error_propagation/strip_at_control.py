@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass, replace
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.local_frame import IntermediateFrame
+from photostrip.geometry.similarity import Similarity
+from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.absolute_orientation import Targets
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.geometry.similarity import Similarity
-    from photostrip.points import ControlPoints
-    from photostrip.triangulation.error_propagation.control_errors import Misclosures
-
+from photostrip.triangulation.error_propagation.control_errors import Misclosures
 
 LARGEST = 100  # control coordinates of a section: what one adjustment takes
 

@@ -15,11 +15,9 @@ Source: derived; see docs/precision.md, eq. 2 and 3.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
@@ -34,13 +32,10 @@ from photostrip.triangulation.error_propagation.derivatives import (
     ImagePoints,
     PlacedStrip,
 )
+from photostrip.triangulation.error_propagation.pair_errors import PairErrors
+from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.resection.resection import runs
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.error_propagation.pair_errors import PairErrors
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
+from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 IMAGES = 4096  # image points whose products are summed together: what fits into the processor's cache
 

@@ -7,19 +7,15 @@ the figure is turned as little as possible against the words.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass
 from photostrip.points import frozen
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from photostrip.arrays import Floats, Numbers
 
 PLACES = {
     f"{vertical}-{horizontal}".strip("-"): (x, y)

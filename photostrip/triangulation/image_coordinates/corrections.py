@@ -12,24 +12,20 @@ Film deformation is corrected before, by the interior orientation. ``distort`` g
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeGuard
+from collections.abc import Mapping
+from typing import TypeGuard
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats, Numbers
+from photostrip.camera import Camera, Distortion
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass, replace
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import lens_distortion
 from photostrip.triangulation.image_coordinates.refraction import curvature_constant, refraction_constant
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.camera import Camera, Distortion
-    from photostrip.points import PhotoPoints
-    from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
+from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 
 MICROMETRE = 1e-3  # mm
 SHOWN = 20  # points beyond the distortion table that are named one by one

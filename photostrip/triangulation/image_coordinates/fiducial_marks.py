@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry import plane
 from photostrip.points import PhotoPoints, take_rows
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.camera import Camera
 
 WRONG_PATTERN = 0.05  # largest misfit over radius of the marks: film and paper stay far below, wrong numbers far above

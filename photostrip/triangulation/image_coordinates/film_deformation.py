@@ -7,16 +7,12 @@ there are marks enough to see it, best eight.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
 
 LEAST_MARKS = 4  # three carry the plane that every transformation has already
 FLAT = 0.01  # ratio of the extents of the marks below which they stand on one line

@@ -5,6 +5,7 @@ A plane transformation takes the marks of a photo to their calibrated coordinate
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import replace
 from photostrip.notes import Note, named
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates.fiducial_marks import enough, fault, gather, right_pattern
 from photostrip.triangulation.image_coordinates.film_deformation import Deformation
 from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation, fit_marks, joined_cameras
@@ -23,10 +25,7 @@ from photostrip.triangulation.image_coordinates.mark_notes import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from photostrip.camera import Camera
-    from photostrip.points import PhotoPoints
     from photostrip.triangulation.image_coordinates.settings import InteriorSettings
 
 

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.errors import Fault
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry import plane
 from photostrip.points import frozen
 from photostrip.triangulation.image_coordinates.fiducial_marks import Marks, fault
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.errors import Fault
     from photostrip.notes import Note
     from photostrip.triangulation.image_coordinates.film_deformation import Deformation
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Flags, median
+from photostrip.errors import Fault
 from photostrip.notes import Note, named
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates.fiducial_marks import QUARTER, fault
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from photostrip.arrays import Flags
     from photostrip.camera import Camera
-    from photostrip.errors import Fault
-    from photostrip.points import PhotoPoints
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
 
 MICROMETRE = 1e-3  # mm

@@ -14,15 +14,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct, median
+from photostrip.arrays import Flags, Floats, Numbers, distinct, median
 from photostrip.frozen import dataclass
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.independent_models import linking
+from photostrip.triangulation.independent_models.linking import CommonPoints, PointTests, SolvedLinks, StripModels
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.independent_models.linking import CommonPoints, PointTests, SolvedLinks, StripModels
     from photostrip.triangulation.independent_models.settings import LinkSettings
 
 MEDIAN = 2.366  # of chi-square with three degrees of freedom

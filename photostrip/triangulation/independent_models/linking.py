@@ -10,16 +10,12 @@ Source: [001] eq. 145-149 for the similarity; weights and iteration derived, see
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
 
 LEAST_COMMON = 3
 ITERATIONS, CONVERGED = 20, 1e-12

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, Numbers, median
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.independent_models.formation import FormedModels
 
 

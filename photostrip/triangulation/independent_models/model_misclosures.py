@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import replace
 from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.points import ControlPoints
 from photostrip.triangulation.error_propagation import control_errors
+from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.independent_models import model_errors
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.points import ControlPoints
-    from photostrip.triangulation.error_propagation.control_errors import Misclosures
-    from photostrip.triangulation.independent_models.model_errors import ModelErrors
+from photostrip.triangulation.independent_models.model_errors import ModelErrors
 
 
 def misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floats) -> Misclosures:

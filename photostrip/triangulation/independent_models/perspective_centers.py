@@ -9,16 +9,12 @@ Source: derived; see docs/independent-models.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.triangulation.polynomial.terms import POWERS
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats
 
 NEAREST = 3  # points at least that say where the ground below a centre is
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
 
 from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Finding
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
 
 Evidence = dict[str, float | int | str]  # the numbers behind a finding; names end with the unit
 ERROR = "error"

@@ -5,24 +5,18 @@ Which degree they get is decided by evidence: an F test of each step and errors 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cache, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import dataclass
 from photostrip.statistics import f_p_value
 from photostrip.triangulation.polynomial import terms as polynomial_terms
-from photostrip.triangulation.polynomial.least_squares import AxisFit, FitProblem, fit_axes
+from photostrip.triangulation.polynomial.least_squares import AxisFit, FitProblem, Terms, fit_axes
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.polynomial.least_squares import Terms
-
-    Fits = Callable[[Terms], list[AxisFit]]
+Fits = Callable[[Terms], list[AxisFit]]
 
 
 __all__ = ["DEGREES", "GROUPS", "AxisFit", "Evidence", "FitProblem", "Polynomial", "PolynomialSettings", "fit"]

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.triangulation.absolute_orientation import Targets
 from photostrip.triangulation.polynomial import terms as polynomial_terms
 
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats
-    from photostrip.triangulation.absolute_orientation import Targets
-
-    Terms = tuple[tuple[str, ...], ...]  # of the three axes
+Terms = tuple[tuple[str, ...], ...]  # of the three axes
 
 ITERATIONS = 4  # plan-only and height-only points take their missing coordinate from the fit itself
 CONVERGED = 1e-9  # m

@@ -5,25 +5,21 @@ Source: [001] for the elements; precision and criteria are derived.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.points import take_rows
 from photostrip.triangulation.relative_orientation import solution
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from photostrip.arrays import Flags, Floats, Numbers
 
 CONDITION_WARNING = 100.0  # of the column-normalised Jacobian: a band much narrower than the base
 CONDITION_LIMIT = 1e6

@@ -6,20 +6,15 @@ thousand pairs cost little more than one.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.notes import counted
 from photostrip.points import PhotoPoints, take_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
 
 MINIMUM_POINTS = 5  # as many as elements
 BY_ROW = ("pair", "left", "right", "weight", "point", "rows")

@@ -7,17 +7,13 @@ of the source knows half of them, and a single far point that turns a pair makes
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import NamedTuple, replace
 from photostrip.triangulation.relative_orientation import solution
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.triangulation.robust import TUNING, falling_weights, medians, scales
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
 
 STEPS = 10  # what follows is least squares
 SETS = 300  # with a third of the points wrong, 13 % of the sets of five are right

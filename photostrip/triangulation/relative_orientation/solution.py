@@ -9,18 +9,14 @@ Source: [001] for the elements; condition, derivatives, start values and retries
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import NamedTuple
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.relative_orientation.pairs import Pairs
+from photostrip.triangulation.relative_orientation.pairs import Pairs
 
 ELEMENTS = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
 CONVERGED = 1e-10  # rad

@@ -13,18 +13,13 @@ Source: [004a], [001]; base and spread from the points are chosen here.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass
+from photostrip.triangulation.relative_orientation.orientation import Orientation
+from photostrip.triangulation.relative_orientation.pairs import Pairs
 from photostrip.triangulation.relative_orientation.solution import base_rays
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.relative_orientation.pairs import Pairs
-
 
 ZONES = 6
 MINIMUM_LEFT = 6  # a pair keeps at least one redundant point

@@ -5,22 +5,18 @@ Source: [Grunert 1841] in the form of [Haralick 1994] for three points.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import counted
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives
 from photostrip.triangulation.resection.resection import Resection, resect
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Floats, Numbers
 
 LEAST_POINTS = 4  # of a photo: three have up to four solutions
 TRIPLES = 12  # sets of three points that are tried

@@ -5,14 +5,10 @@ With (u, v, w) = R^T (X - S): x = -f u / w, y = -f v / w. Source: derived.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
 
 
 class KnownPhotos(NamedTuple):

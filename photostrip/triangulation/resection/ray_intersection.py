@@ -6,16 +6,12 @@ Source: derived.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 from photostrip.triangulation.strip_formation.non_neighbours import meeting
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
 
 ITERATIONS = 12
 CONVERGED = 1e-12  # of the distance of a point from its photos

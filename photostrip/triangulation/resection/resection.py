@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation.resection.collinearity import KnownPhotos, partials, project
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from photostrip.arrays import Flags, Floats, Numbers
 
 ITERATIONS = 20
 CONVERGED = 1e-10  # rad, and of the distance to the points; the next step would be its square

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats
 
 PARALLEL = 1e-6  # of the principal distance: a smaller x parallax intersects nothing
 

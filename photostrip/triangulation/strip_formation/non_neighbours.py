@@ -8,18 +8,14 @@ Source: derived; see docs/sources.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import replace
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.points import PhotoPoints
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
+from photostrip.points import PhotoPoints
+from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 SMALLEST_ANGLE = 1e-4  # sine of the angle between the rays
 

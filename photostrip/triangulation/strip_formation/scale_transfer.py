@@ -9,22 +9,17 @@ Source: [001] eq. 139-141.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.statistics import normal_quantile
+from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.robust import medians, scales
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 SCALE_TRANSFERS = ("least_squares", "distances")
 LEFT_RAY = "left"

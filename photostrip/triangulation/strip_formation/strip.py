@@ -8,14 +8,16 @@ Source: [001] eq. 125-141.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.solution import base_rays
 from photostrip.triangulation.strip_formation.intersection import Intersection, intersect
 from photostrip.triangulation.strip_formation.scale_transfer import (
@@ -24,12 +26,6 @@ from photostrip.triangulation.strip_formation.scale_transfer import (
     StripFormationSettings,
     transfer_scale,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 STEEPEST_BASE = 1e-6  # cosine of the base inclination
 

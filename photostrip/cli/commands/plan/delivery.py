@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from photostrip.cli.commands.plan.options import Options
 from photostrip.cli.documents import FORMS, Form, Rendering, require_target, write_rule
 from photostrip.cli.options import Silent
+from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.cli.commands.plan.options import Options
-    from photostrip.errors import Fault
     from photostrip.report.page.parts import Document
 
 
@@ -96,8 +95,6 @@ class Delivery:
 
         Faults of the command line are reported at the option that they came from.
         """
-        from photostrip.errors import InputError
-
         given = self.assignments or []
         overruled = {each.partition("=")[0] for each in given}
         names = {

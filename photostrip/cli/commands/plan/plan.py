@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from photostrip.cli.commands.plan.camera import camera
 from photostrip.cli.commands.plan.displacement import displacement
@@ -10,9 +10,6 @@ from photostrip.cli.commands.plan.model import model
 from photostrip.cli.commands.plan.screening import screening
 from photostrip.cli.commands.plan.strip import strip
 from photostrip.cli.option_groups import command_group, subcommand
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 COMMANDS: dict[Callable[..., None], tuple[str, ...]] = {  # examples
     model: (

@@ -5,13 +5,9 @@ from __future__ import annotations
 import csv
 import io
 from importlib import resources
-from typing import TYPE_CHECKING
 
 from photostrip.cli.jobs.sources.worked import worked_numbers
-from photostrip.result.numbers import rounded
-
-if TYPE_CHECKING:
-    from photostrip.result.numbers import Document
+from photostrip.result.numbers import Document, rounded
 
 DIGITS = 3  # decimals
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from photostrip.frozen import NamedTuple
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, compare, source_cameras
 from photostrip.planning.model.plan import source_example
 from photostrip.terrestrial.accuracy import EXAMPLES, worked
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 # [004a]: errors that were put in, found by the residual parallax, found by Grubbs' test, missed; good points rejected
 # and good points altogether

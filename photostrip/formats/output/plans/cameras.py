@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from photostrip.planning.camera_efficiency import (
     suitability,
 )
 from photostrip.result.numbers import Document, micrometres, rounded, significant
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 def camera_document(

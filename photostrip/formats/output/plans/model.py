@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.planning.model.closed_form import ORDER
 from photostrip.planning.model.deformation import TERMS
 from photostrip.planning.model.element_errors import ELEMENTS, FREE
@@ -21,11 +22,6 @@ from photostrip.planning.model.plan import (
 from photostrip.planning.model.single_model import PARAMETERS
 from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
 from photostrip.units import ARCSECONDS, MICROMETRES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats
 
 IN_PHOTO = 2  # decimals of mm: places of points
 AXES = ("x", "y", "z")

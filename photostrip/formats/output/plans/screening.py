@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from photostrip.planning.screening import ARC_MINUTES
+from photostrip.planning.screening import ARC_MINUTES, MethodOutcome, ScreeningOutcome
 from photostrip.result.numbers import Document, micrometres, rounded
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
-
-if TYPE_CHECKING:
-    from photostrip.planning.screening import MethodOutcome, ScreeningOutcome
 
 PERCENT, COUNT, MINUTES = 1, 3, 2  # decimals
 

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, numbers_of
 from photostrip.planning.strip.design import Chosen, DesignReport, Needed, Outcome, along_the_strip
+from photostrip.planning.strip.ideal_strip import IdealStrip
 from photostrip.planning.strip.placement import BestPlaces, worst
 from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.planning.strip.ideal_strip import IdealStrip
 
 RATIO = 3  # decimals of a ratio
 PLACED = 6  # decimals of metres that decide which point is the worst: strips are symmetric

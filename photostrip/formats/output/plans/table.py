@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.plans.strip import along_rows
-
-if TYPE_CHECKING:
-    from photostrip.result.numbers import Document
+from photostrip.result.numbers import Document
 
 TABLES = {
     "displacement": "points",

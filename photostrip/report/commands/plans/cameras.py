@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from photostrip.report.page.numbers import calibrated, fixed, short
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, numbered
 from photostrip.report.page.tables import number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 def camera_sections(document: Document) -> tuple[Section, ...]:

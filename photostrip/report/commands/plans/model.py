@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import fixed, metres, micrometres, short, signed
 from photostrip.report.page.parts import Column, Document, Facts, Section, Table, Words, numbered
-from photostrip.report.page.tables import number, over_plane, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from photostrip.report.page.tables import Shown
+from photostrip.report.page.tables import Shown, number, over_plane, tabulated, words
 
 USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}
 ALIKE = 1e-6  # relative: below it two forms say the same

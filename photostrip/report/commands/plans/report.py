@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from photostrip.report.commands.plans.cameras import camera_sections, source_table_sections
 from photostrip.report.commands.plans.displacement import displacement_sections
 from photostrip.report.commands.plans.model import model_sections, source_example_sections
 from photostrip.report.commands.plans.screening import screening_sections
 from photostrip.report.commands.plans.strip import strip_sections
-
-if TYPE_CHECKING:
-    from photostrip.report.page.parts import Document, Section
+from photostrip.report.page.parts import Document, Section
 
 
 def plan_report(document: Document) -> tuple[str, tuple[Section, ...]]:

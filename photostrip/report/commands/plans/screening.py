@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 from photostrip.report.page.numbers import fixed, short
 from photostrip.report.page.parts import Document, Facts, Section, Table
 from photostrip.report.page.tables import number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 
 def screening_sections(document: Document) -> tuple[Section, ...]:

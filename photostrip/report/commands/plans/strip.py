@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from photostrip.notes import counted, listed
 from photostrip.report.page.numbers import fixed, metres, micrometres, short
 from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Detected = tuple[float | None, bool | None]  # size in metres, whether anything checks the coordinate
 

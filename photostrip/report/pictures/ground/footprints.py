@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 from photostrip.notes import counted
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
-from photostrip.report.pictures.ground.plan_view import middle
+from photostrip.report.pictures.ground.plan_view import Pair, Plan, middle
 from photostrip.report.pictures.ground.sheet import LETTER, LINE, bars, ids, north_arrow, sheet_of
 from photostrip.report.pictures.ground.terrain import footprints, straightened
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.plan_view import Pair, Plan
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.svg import Picture
 
 MARGIN = 20.0
 CELLS = 240  # of the overlap along the picture

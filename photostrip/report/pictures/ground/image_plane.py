@@ -5,14 +5,9 @@ For pictures, not for measuring: distortion is left aside.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from photostrip.frozen import NamedTuple
-from photostrip.report.pictures.ground.plan_view import Grid
-
-if TYPE_CHECKING:
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.plan_view import Pair
+from photostrip.report.page.parts import Document
+from photostrip.report.pictures.ground.plan_view import Grid, Pair
 
 
 class Residual(NamedTuple):

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Container
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import short
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
-from photostrip.report.pictures.ground.sheet import bars, ids, metres, north_arrow, sheet_of
-
-if TYPE_CHECKING:
-    from collections.abc import Container
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.plan_view import Plan, Spot
-    from photostrip.report.pictures.ground.sheet import Sheet
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.ground.plan_view import Plan, Spot
+from photostrip.report.pictures.ground.sheet import Sheet, bars, ids, metres, north_arrow, sheet_of
+from photostrip.report.pictures.svg import Picture
 
 LONGEST = 70.0  # the longest vector or half axis on the plan
 MOST_ELLIPSES = 90  # more of them are a grey cloud: new points go without

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 from photostrip.frozen import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.report.page.parts import Document
+from photostrip.report.page.parts import Document
 
 Pair = tuple[float, float]
 EARTH = 6_371_000.0  # m, for degrees of a body whose size is not said

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from photostrip.notes import counted
 from photostrip.report.page.numbers import short
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
+from photostrip.report.pictures.ground.plan_view import Plan, Spot
 from photostrip.report.pictures.ground.sheet import bars, ids, metres, north_arrow, sheet_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.plan_view import Plan, Spot
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.svg import Picture
 
 CLASSES = 6
 SMALLEST, LARGEST = 2.5, 6.5  # dots of the first and the last class: they differ without colour, too

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 from photostrip.frozen import NamedTuple
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from photostrip.report.pictures.ground.plan_view import Pair
+from photostrip.report.pictures.ground.plan_view import Pair
 
 LOWEST, HIGHEST = 220.0, 560.0  # of a picture
 FOOT = 30.0  # room for the scale bars

@@ -6,23 +6,17 @@ Around each photo it is the plane through the points near by, and what these lie
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photostrip.frozen import NamedTuple
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures.ground.image_plane import cameras_of, frame_of
-from photostrip.report.pictures.ground.plan_view import Grid
+from photostrip.report.pictures.ground.plan_view import Grid, Pair, Plan
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import NDArray
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.plan_view import Pair, Plan
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 # lengths in rms distances from the perspective centre to the photo's points. In simulated relief the rms errors at the
 # borders of photos, in percent of their sides, are 0.5 (on level ground 0.8) with hills of 60 m from 1530 m, 1.7 (2.7)

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 from photostrip.frozen import NamedTuple
 from photostrip.notes import counted
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
-from photostrip.report.pictures.ground.plan_view import middle
+from photostrip.report.pictures.ground.plan_view import Pair, Plan, middle
 from photostrip.report.pictures.ground.sheet import bars, ids, north_arrow, sheet_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.plan_view import Pair, Plan
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.svg import Picture
 
 MOST_PHOTOS = 300  # more of them are drawn as strips
 MOST_HINTS = 1000  # more ties have none

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from photostrip.frozen import NamedTuple
 from photostrip.notes import counted
 from photostrip.report.page.numbers import short
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, Layout, framed, legend, multiples, span, steps
 from photostrip.report.pictures.ground.plan import SHAPES, WORDS
-from photostrip.report.pictures.ground.plan_view import course_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.plan_view import Course, Pair, Plan, Spot
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.ground.plan_view import Course, Pair, Plan, Spot, course_of
+from photostrip.report.pictures.svg import Picture
 
 MOST_STRIPS = 8  # that are drawn one below the other
 AXES = "along", "across", "up"

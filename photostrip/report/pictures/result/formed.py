@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from photostrip.notes import counted
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, framed, framed_by_photos, legend, multiples, span, steps
-from photostrip.report.pictures.ground.plan_view import Grid, course_of
+from photostrip.report.pictures.ground.plan_view import Grid, Pair, Plan, Spot, course_of
 from photostrip.report.pictures.result.along import origin_of, polynomial_at, polynomial_entry
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.plan_view import Pair, Plan, Spot
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.svg import Picture
 
 SHAPES = {"along": "dot", "across": "square", "up": "triangle"}
 KINDS = {"along": "1", "across": "2", "up": "3"}

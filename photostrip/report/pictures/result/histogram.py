@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from statistics import NormalDist, median
-from typing import TYPE_CHECKING
 
 from photostrip.frozen import NamedTuple
 from photostrip.notes import counted
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
-from photostrip.report.pictures.chart import WIDTH, Entry, Layout, framed, legend, steps
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.chart import Panel
-    from photostrip.report.pictures.ground.image_plane import Residual
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.chart import WIDTH, Entry, Layout, Panel, framed, legend, steps
+from photostrip.report.pictures.ground.image_plane import Residual
+from photostrip.report.pictures.svg import Picture
 
 CLASSES = 33  # of a histogram, an odd number
 REACH = 4.5  # standard deviations that a histogram holds, at least

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from photostrip.frozen import NamedTuple
 from photostrip.notes import counted
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, Layout, Panel, framed_by_photos, legend
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.svg import Picture
 
 # as the zones lie in the left photo, by rows: 3 and 4 on top, 1 and 2 on the base, 5 and 6 below
 ZONES = {3: "top left", 4: "top right", 1: "left centre", 2: "right centre", 5: "bottom left", 6: "bottom right"}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from importlib import resources
-from typing import TYPE_CHECKING
 
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures.ground.footprints import footprint_pictures
 from photostrip.report.pictures.ground.plan import plan_picture
 from photostrip.report.pictures.ground.plan_view import plan_of
@@ -16,12 +16,8 @@ from photostrip.report.pictures.result.formed import junction_pictures, scale_pi
 from photostrip.report.pictures.result.parallaxes import parallax_pictures
 from photostrip.report.pictures.result.residuals import residual_pictures
 from photostrip.report.pictures.result.tested import check_pictures, correlation_pictures, position_pictures
+from photostrip.report.pictures.svg import Picture
 from photostrip.visible import visible
-
-if TYPE_CHECKING:
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.svg import Picture
-
 
 SECTIONS = {
     "parallaxes": ("relative",),

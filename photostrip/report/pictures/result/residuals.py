@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 from photostrip.frozen import NamedTuple
 from photostrip.notes import counted
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, WIDTH
-from photostrip.report.pictures.ground.image_plane import Frame, cameras_of, frame_of, residuals_of
-from photostrip.report.pictures.ground.plan_view import middle
+from photostrip.report.pictures.ground.image_plane import Frame, Residual, cameras_of, frame_of, residuals_of
+from photostrip.report.pictures.ground.plan_view import Pair, middle
 from photostrip.report.pictures.result.histogram import histogram_picture, rms
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.ground.image_plane import Residual
-    from photostrip.report.pictures.ground.plan_view import Pair
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.svg import Picture
 
 COLUMNS, ROWS = 6, 4  # of photos on the picture
 TILE, BETWEEN = 142.0, 14.0  # a photo on the picture

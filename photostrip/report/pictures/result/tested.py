@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
 from photostrip.notes import counted
+from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import (
     LEFT,
@@ -20,10 +20,7 @@ from photostrip.report.pictures.chart import (
     unnumbered,
 )
 from photostrip.report.pictures.ground.sheet import ids
-
-if TYPE_CHECKING:
-    from photostrip.report.page.parts import Document
-    from photostrip.report.pictures.svg import Picture
+from photostrip.report.pictures.svg import Picture
 
 LIMITS = {"plan": 2.448, "height": 1.960}  # 95 % of a length in plan by its covariance, and of a height
 CELL = 46.0  # of a correlation matrix

@@ -7,15 +7,11 @@ be looked at as a plain matrix without copying; what such a view shows beyond th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.triangulation.bundle.normal_equations.lapack import lapack
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
 
 STEP = 48  # columns of the inverse that are found at a time
 

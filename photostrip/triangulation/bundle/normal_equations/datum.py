@@ -7,18 +7,14 @@ and with the smallest trace of their cofactors.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import replace
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.parameters import Parameters, ParameterStep, PreparedProblem
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
+from photostrip.triangulation.bundle.parameters import Parameters, ParameterStep, PreparedProblem
 
 DEFECT = SIMILARITY_PARAMETERS
 

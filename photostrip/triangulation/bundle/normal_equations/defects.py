@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Sequence
+from typing import NoReturn
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import similarity_derivatives
@@ -14,14 +15,9 @@ from photostrip.notes import counted, named
 from photostrip.triangulation.bundle.normal_equations import datum
 from photostrip.triangulation.bundle.normal_equations.reduced import Reduced, control_residuals, factored, given_at
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
+from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
+from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
 PARALLEL = 1e-10  # square of the sine of the angle between rays
 LOOSE = 0.1  # standard deviation, as a part of the size of the network, from which a datum parameter is not determined

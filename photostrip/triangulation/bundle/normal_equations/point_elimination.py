@@ -9,17 +9,15 @@ Source: [Granshaw 1980] for the elimination.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, Rays, by_point
+from photostrip.triangulation.bundle.observations.ray_batches import Batch
 from photostrip.triangulation.bundle.structure import triangle
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
 SMALL_GROUP = 24  # points: up to here it pays to bring the numbers of a group together before they are multiplied
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 from photostrip.triangulation.bundle.normal_equations.band import Band
 from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated, blocks_of, eliminate, squares
 from photostrip.triangulation.bundle.normal_equations.sparse import Sparse
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, by_photo
-from photostrip.triangulation.bundle.observations.given_orientations import attitudes_at, positions_at
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
-    from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
+from photostrip.triangulation.bundle.observations.given_orientations import (
+    LinearisedOrientations,
+    attitudes_at,
+    positions_at,
+)
+from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
 Factor = Band | Sparse
 WIDE = 1e11  # multiplications for the factor of a band, some seconds: from there a sparse factor is tried

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
-
-    from photostrip.arrays import Flags, Floats, Numbers
 
 TOGETHER = 64  # photos whose columns of the inverse are found at a time
 

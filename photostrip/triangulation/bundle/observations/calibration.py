@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
+from photostrip.triangulation.bundle.observations.problem import BundleCameras
 from photostrip.triangulation.bundle.settings import CALIBRATION
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.bundle.observations.problem import BundleCameras
 
 PRINCIPAL_DISTANCE = list(CALIBRATION).index("c")
 

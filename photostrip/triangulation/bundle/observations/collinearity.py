@@ -10,15 +10,11 @@ f r. Source: derived.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.observations.ray_batches import Batch
+from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
 PHOTO = 6  # parameters of a photo
 SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0])  # of a photo's parameters, see above

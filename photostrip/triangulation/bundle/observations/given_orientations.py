@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import cross_matrix, to_vector
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.bundle.observations.problem import AttitudeObservations, PositionObservations
+from photostrip.triangulation.bundle.observations.problem import AttitudeObservations, PositionObservations
 
 SMALL = 1e-4  # radians: below it the series of the rotation's derivative is exact
 

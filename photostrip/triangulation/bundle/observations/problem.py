@@ -10,16 +10,13 @@ A sigma that is infinite switches an observation off; a sigma of zero is refused
 from __future__ import annotations
 
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.triangulation.bundle.settings import CALIBRATION
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
 
 
 def _no_rows(*shape: int) -> Floats:

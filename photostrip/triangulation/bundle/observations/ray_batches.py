@@ -12,15 +12,12 @@ Batches are cut so small that what is computed for one stays in the cache of the
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.bundle.observations.problem import ImageObservations
+from photostrip.triangulation.bundle.observations.problem import ImageObservations
 
 LARGEST_GROUP = 64  # points; larger groups are split
 RAYS_OF_BATCH = 6144  # the arrays of a batch then fill some 2 MB

@@ -7,24 +7,22 @@ Y = Z T and M = I + T'Y give the cofactors L^-T M L^-1 of the point and -Y L^-1 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.bundle.normal_equations import datum
+from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
 from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced, factored, given_at, reduce
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS, by_photo, by_point
+from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
+from photostrip.triangulation.bundle.observations.ray_batches import Batch
 from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
-    from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
-    from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
 
 @dataclass(frozen=True, eq=False)

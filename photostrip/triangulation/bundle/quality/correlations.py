@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
+from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 LIMIT = 0.95
 ELEMENTS = (

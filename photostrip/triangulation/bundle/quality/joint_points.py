@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
-from photostrip.triangulation.bundle.quality.cofactors import at_solution, solved_for
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.bundle.quality.cofactors import Factored
-    from photostrip.triangulation.bundle.solution import BundleSolution
+from photostrip.triangulation.bundle.quality.cofactors import Factored, at_solution, solved_for
+from photostrip.triangulation.bundle.solution import BundleSolution
 
 
 def joint_cofactors(solution: BundleSolution, wanted: Numbers) -> Floats:

@@ -6,21 +6,20 @@ number: the share of an error of the observation that shows in its own residual.
 
 from __future__ import annotations
 
+from types import EllipsisType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.rejection import UNCONTROLLED
 from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
+from photostrip.triangulation.bundle.settings import BundleSettings
 
 if TYPE_CHECKING:
-    from types import EllipsisType
-
-    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.settings import BundleSettings
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.statistics import t_p_value
 from photostrip.triangulation.bundle.observations.calibration import corrections
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.settings import CALIBRATION
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
+from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 SIGNIFICANCE = 0.05
 KEPT = 0.3  # of a loose a-priori standard deviation that a parameter keeps which is not determined

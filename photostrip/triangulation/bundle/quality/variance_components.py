@@ -6,19 +6,15 @@ share of the redundancy, until the ratios are one.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
 from photostrip.frozen import dataclass, replace
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.quality import reliability
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from photostrip.arrays import Flags, Floats
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
+from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 LEAST_REDUNDANCY = 3.0  # of a group, below which its residuals say nothing about it
 ITERATIONS = 12

@@ -13,12 +13,13 @@ Source: derived; data snooping with correlated observations.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.statistics import chi2_quantile, f_p_value
@@ -26,12 +27,9 @@ from photostrip.triangulation.gross_errors.pairs.deletion import gains
 from photostrip.triangulation.polynomial import terms
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from photostrip.arrays import Flags, Floats
     from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
 
-    Columns = tuple[int, ...]
+Columns = tuple[int, ...]
 
 
 ALPHA = 0.01  # of rejecting anything in a strip without wrong control

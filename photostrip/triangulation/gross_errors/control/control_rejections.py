@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import NamedTuple, replace
 from photostrip.rejection import Rejection
 from photostrip.statistics import f_quantile, normal_quantile
-from photostrip.triangulation.gross_errors.control.control_deletion import ALPHA, Deletion, adjust
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
-    from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
-
+from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
+from photostrip.triangulation.gross_errors.control.control_deletion import (
+    ALPHA,
+    Columns,
+    Deletion,
+    JointAdjustment,
+    adjust,
+)
 
 EXCHANGED, WRONG_IMAGE, EITHER = "exchanged", "image", "image or coordinates"
 POWER = 0.8  # an error is called detectable when it is found in this share of cases

@@ -10,27 +10,21 @@ Source: derived; data snooping with correlated observations.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.errors import PhotostripError
 from photostrip.frozen import dataclass, replace
-from photostrip.triangulation.gross_errors.control.control_deletion import adjust, projected
+from photostrip.points import ControlPoints
+from photostrip.rejection import Rejection
+from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
+from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment, adjust, projected
 from photostrip.triangulation.gross_errors.control.control_rejections import (
     Found,
     control_rejections,
     kept_of,
     reliability,
 )
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.points import ControlPoints
-    from photostrip.rejection import Rejection
-    from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
-    from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
-
 
 BENT = 2.5  # standard deviation of unit weight beyond which more is wrong with a strip than its control
 

@@ -12,15 +12,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.rejection import UNCONTROLLED
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-
 
 LARGEST = 3  # points of a set
 TRIPLES_OF = 24  # points from which sets of three are formed; those of the best sets of two

@@ -5,23 +5,18 @@ Source: derived; [004a] stops at tests of single residuals. See docs/sources.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from collections.abc import Callable
+from typing import Self
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.frozen import dataclass, replace
 from photostrip.rejection import UNCONTROLLED
 from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, normal_quantile
+from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.robust import MEDIAN_SPREAD
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-
 
 ALPHA = 0.01  # probability that a strip without gross errors fails anywhere
 # scale of residuals of which a fifth are large over that of the others: normal_quantile(13/16) * 1.4826

@@ -16,19 +16,17 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import dataclass, replace
 from photostrip.rejection import Rejection
 from photostrip.triangulation.gross_errors.pairs import deletion
 from photostrip.triangulation.gross_errors.pairs.global_test import FIFTH_WRONG, GlobalTest, ParallaxScatter
-from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again
+from photostrip.triangulation.relative_orientation.orientation import Orientation, assess_pairs, orient_again
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes
 from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT
 from photostrip.triangulation.robust import TUNING, scales
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.relative_orientation.robust import RobustElements
 
 

@@ -13,18 +13,19 @@ Source: [004a]; the two-sided form and the order of work are chosen here, see do
 from __future__ import annotations
 
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import InputError
 from photostrip.frozen import dataclass, replace
+from photostrip.rejection import Rejection
 from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.triangulation.gross_errors.pairs.global_test import by_number, residual_sigma
+from photostrip.triangulation.gross_errors.pairs.global_test import ParallaxScatter, by_number, residual_sigma
 from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, rejection, search
 from photostrip.triangulation.relative_orientation.orientation import (
     LEAST_IN_FRONT,
+    Orientation,
     RelativeSettings,
     orient_again,
     unusable_pairs,
@@ -32,13 +33,6 @@ from photostrip.triangulation.relative_orientation.orientation import (
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import base_rays, in_front_of_cameras, rays_meet_in_front
 from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT, Support, zones
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.rejection import Rejection
-    from photostrip.triangulation.gross_errors.pairs.global_test import ParallaxScatter
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-
 
 METHODS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")
 SEARCHES = {"auto": (True, True), "deletion": (False, True), "robust": (True, False)}  # robust start, sets of points

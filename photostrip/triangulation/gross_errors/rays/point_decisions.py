@@ -11,22 +11,17 @@ Source: [Baarda 1968] for the test; deletion derived, as for pairs; see docs/sou
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY
 from photostrip.statistics import chi2_quantile
+from photostrip.triangulation.bundle.quality.reliability import Limit
 from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST, subsets
 from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.bundle.quality.reliability import Limit
-
 
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
 ROUNDING = 1e-9  # keeps a point that holds its photos alone from stopping the others

@@ -9,12 +9,12 @@ Source: [Baarda 1968], [Pope 1976].
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.rejection import SEVERAL_RAYS, Rejection
@@ -22,11 +22,14 @@ from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up
 from photostrip.triangulation.bundle.normal_equations.defects import refuse_endless
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
-from photostrip.triangulation.bundle.quality.reliability import CONTROL, IMAGE
+from photostrip.triangulation.bundle.quality.reliability import CONTROL, IMAGE, Limit
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, restarted, selected, supported
+from photostrip.triangulation.bundle.settings import BundleSettings
+from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.pairs.pair_search import OUT_TO_ONE_MORE
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
@@ -39,16 +42,6 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import (
 )
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 from photostrip.triangulation.resection.ray_intersection import two_that_meet
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.quality.reliability import Limit
-    from photostrip.triangulation.bundle.settings import BundleSettings
-    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
-
 
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import replace
+from photostrip.rejection import Rejection
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle.observations.problem import (
     BundleCameras,
@@ -20,18 +19,12 @@ from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.gross_errors.pairs.global_test import ALPHA, FIFTH_WRONG
 from photostrip.triangulation.gross_errors.rays.snooping import screen_bundle
+from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
+from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT
 from photostrip.triangulation.robust import MEDIAN_SPREAD, scales
-from photostrip.triangulation.strip_formation.strip import mean_points
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.rejection import Rejection
-    from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
-
+from photostrip.triangulation.strip_formation.strip import FormedStrip, mean_points
 
 LEVEL = 0.012  # of a whole strip, and of what is rejected the part that is not wrong
 

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.points import PhotoPoints
+from photostrip.points import PhotoPoints
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from photostrip.frozen import NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 LEAST_SLIP_SIGMAS = 6.0  # scatters that a slip must have at least

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Flags, median
 from photostrip.frozen import replace
+from photostrip.notes import Finding
 from photostrip.triangulation.plausibility.control.plan_fit import PlanSimilarity, fit_similarity
 from photostrip.triangulation.plausibility.control.straightening import (
     FEET_TOLERANCE,
@@ -18,13 +17,7 @@ from photostrip.triangulation.plausibility.control.straightening import (
     StripPoints,
     straighten,
 )
-from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Flags
-    from photostrip.notes import Finding
-    from photostrip.triangulation.plausibility.finding import Evidence
-
+from photostrip.triangulation.plausibility.finding import Evidence, found
 
 LEAST_OFFSET = 0.1  # of the distance from camera to ground: lists that lie nearer to each other go together
 MOST_ODD_SHARE = 0.6  # of the points of a list: beyond it the list is wrong, not its points

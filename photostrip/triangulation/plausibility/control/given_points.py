@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from photostrip.arrays import column_medians, distinct, median
+from photostrip.arrays import Flags, Floats, Numbers, column_medians, distinct, median
 from photostrip.errors import GeometryError, InputError
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.points import ControlPoints
 from photostrip.triangulation.plausibility.control.straightening import GivenPoints, WrittenAxes
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.points import ControlPoints
-
-    _LevelPoints = tuple[Floats, Callable[[], WrittenAxes]]  # (n, 3) in the level frame; what the written axes are
+_LevelPoints = tuple[Floats, Callable[[], WrittenAxes]]  # (n, 3) in the level frame; what the written axes are
 
 USUAL_SIGMA = 0.1  # metres, of coordinates without one
 FAR = 20.0  # times as far from the middle of a list as a good half of it: strip and map say nothing of such a place

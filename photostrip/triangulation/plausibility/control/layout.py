@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.notes import Finding
-    from photostrip.triangulation.plausibility.finding import Evidence
-
+from photostrip.arrays import Floats
+from photostrip.notes import Finding
+from photostrip.triangulation.plausibility.finding import Evidence, found
 
 ONE_END_SHARE = 0.4  # of the strip's length: control that spans less, all in one half, is at one end
 HALF_SHARE = 0.55

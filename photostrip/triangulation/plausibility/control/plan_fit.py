@@ -11,20 +11,16 @@ from __future__ import annotations
 
 from functools import lru_cache
 from random import Random
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import dataclass
 from photostrip.statistics import SIGMA_FROM_MEDIAN, t_quantile
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from photostrip.arrays import Flags, Floats, Numbers
-
-    Complex = NDArray[np.complex128]
+Complex = NDArray[np.complex128]
 
 LEAST_POINTS = 3  # in plan; two always fit
 PLAN_UNKNOWNS = 2  # complex ones: turn and shift

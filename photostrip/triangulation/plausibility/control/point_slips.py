@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import permutations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Flags, Floats
 from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Flags, Floats
-    from photostrip.notes import Finding
-    from photostrip.triangulation.plausibility.control.plan_fit import RobustFit
-    from photostrip.triangulation.plausibility.control.straightening import GivenPoints, StraightenedStrip, StripPoints
-    from photostrip.triangulation.plausibility.finding import Evidence
-
+from photostrip.notes import Finding
+from photostrip.triangulation.plausibility.control.plan_fit import RobustFit
+from photostrip.triangulation.plausibility.control.straightening import GivenPoints, StraightenedStrip, StripPoints
+from photostrip.triangulation.plausibility.finding import Evidence, found
 
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
 NOWHERE = 1e7  # metres, a quarter of the Earth's circumference: no map reaches so far

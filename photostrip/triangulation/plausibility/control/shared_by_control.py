@@ -15,17 +15,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct
+from photostrip.arrays import Floats, distinct
 from photostrip.errors import PhotostripError
 from photostrip.frozen import NamedTuple
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.statistics import f_p_value
-from photostrip.triangulation.gross_errors.control.control_deletion import HEIGHT, adjust
+from photostrip.triangulation.gross_errors.control.control_deletion import HEIGHT, JointAdjustment, adjust
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats
     from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
-    from photostrip.triangulation.gross_errors.control.control_deletion import JointAdjustment
 
 MORE_THAN_ALONE = 1.0 + 1e-6  # of what one point explains: a list may have one point only
 FALSE_ALARM = 1e-5  # probability of an error of all where there is none

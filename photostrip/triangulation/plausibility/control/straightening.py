@@ -5,11 +5,14 @@ In plan the bending is taken out by a conformal polynomial, with as few terms as
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.triangulation.plausibility.control.plan_fit import (
     LEAST_POINTS,
@@ -21,14 +24,7 @@ from photostrip.triangulation.plausibility.control.plan_fit import (
     upright,
 )
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from photostrip.arrays import Flags, Floats, Numbers
-
-    Complex = NDArray[np.complex128]
+Complex = NDArray[np.complex128]
 
 FOOT = 0.3048  # metres
 KINDS_OF_FEET = "international feet (0.3048 m) and US survey feet (1200/3937 m) differ by 2 ppm, 1.2 m at 600 km"

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import distinct, median
+from photostrip.arrays import Flags, Floats, distinct, median
 from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import EARTH_RADIUS
+from photostrip.notes import Finding
 from photostrip.statistics import t_quantile
 from photostrip.triangulation.plausibility.control.plan_fit import (
     KEPT_SIGMAS,
@@ -31,15 +32,7 @@ from photostrip.triangulation.plausibility.control.straightening import (
     straighten,
     turn_level,
 )
-from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Flags, Floats
-    from photostrip.notes import Finding
-    from photostrip.triangulation.plausibility.finding import Evidence
-
+from photostrip.triangulation.plausibility.finding import Evidence, found
 
 FALSE_ALARM = 1e-5  # probability of a finding where there is nothing to find
 LEAST_SCALE_ERROR = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip

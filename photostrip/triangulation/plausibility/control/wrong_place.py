@@ -6,24 +6,17 @@ readings that would bring them back are tried. A neighbouring zone cannot be see
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
-from photostrip.arrays import column_medians, median
+from photostrip.arrays import Floats, column_medians, median
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import NamedTuple
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.notes import Finding
 from photostrip.triangulation.plausibility.control.straightening import FOOT, KINDS_OF_FEET
-from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Floats
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.notes import Finding
-    from photostrip.triangulation.plausibility.finding import Evidence
-
+from photostrip.triangulation.plausibility.finding import Evidence, found
 
 Area = tuple[float, float, float, float]
 MARGIN_SHARES = (0.6, 0.25)  # of the width and the height of the area: a neighbouring zone is used at times

@@ -8,12 +8,15 @@ the others predict, check points too, but no check point ever takes part in a fi
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
+from photostrip.arrays import Flags
 from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.notes import Finding
 from photostrip.triangulation.plausibility.control import foreign_lists, point_slips, wrong_heights
 from photostrip.triangulation.plausibility.control.plan_fit import (
     LEAST_POINTS,
@@ -30,19 +33,10 @@ from photostrip.triangulation.plausibility.control.straightening import (
     turn_level,
     upright_coordinates,
 )
-from photostrip.triangulation.plausibility.finding import found
+from photostrip.triangulation.plausibility.control.wrong_heights import HeightComparison
+from photostrip.triangulation.plausibility.finding import Evidence, found
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from photostrip.arrays import Flags
-    from photostrip.notes import Finding
-    from photostrip.triangulation.plausibility.control.wrong_heights import HeightComparison
-    from photostrip.triangulation.plausibility.finding import Evidence
-
-    Complex = NDArray[np.complex128]
+Complex = NDArray[np.complex128]
 
 NO_FIT = "P409"
 MIRRORED_SHARE = 0.15  # of the misclosure of the strip as it is, left when it is mirrored

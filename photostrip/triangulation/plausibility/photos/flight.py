@@ -6,20 +6,13 @@ does not disturb it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import column_medians, median
-from photostrip.notes import listed
+from photostrip.arrays import Flags, Floats, Numbers, column_medians, median
+from photostrip.notes import Finding, listed
 from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.notes import Finding
-
 
 MOST_HEIGHT_OFF = 0.2  # of the flying height, from the line of the neighbours
 LONG_BASE, SHORT_BASE = 1.75, 0.5  # of the usual base

@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, median
 from photostrip.frozen import dataclass, replace
-from photostrip.notes import MOST_NAMED, listed
+from photostrip.notes import MOST_NAMED, Finding, listed
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.plausibility.finding import found
 from photostrip.triangulation.plausibility.photos import mosaic
 from photostrip.triangulation.plausibility.photos.units import reading_of
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.notes import Finding
-    from photostrip.points import PhotoPoints
-
-    Toward = Callable[[int, int], complex | None]
-    Against = Callable[[Sequence[int]], list[int]]
-    Closer = Callable[[str, str], tuple[complex, complex] | None]
+Toward = Callable[[int, int], complex | None]
+Against = Callable[[Sequence[int]], list[int]]
+Closer = Callable[[str, str], tuple[complex, complex] | None]
 
 TURNED_BACK = 0.3  # cosine between the directions to both neighbours; -1 in a straight flight
 SURE_COUNT = 3  # common points of a link that may speak against the list

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import median
-from photostrip.points import locate
+from photostrip.arrays import Floats, Numbers, median
+from photostrip.notes import Finding
+from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.notes import Finding
-    from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
-
+from photostrip.triangulation.relative_orientation.orientation import Orientation
+from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 MOST_X_OVER_Y = 5.0  # times the y parallax: how large an error of the x parallax may be
 LEAST_APART_SHARE = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it

@@ -9,23 +9,17 @@ Links do not depend on the principal distance, on the unit, on the order of the 
 from __future__ import annotations
 
 import heapq
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from photostrip.arrays import median
+from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.frozen import NamedTuple, dataclass, replace
+from photostrip.points import PhotoPoints
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.points import PhotoPoints
-
-    Complex = NDArray[np.complex128]
+Complex = NDArray[np.complex128]
 
 LARGEST_LAG = 12  # photos on which a point is followed on; a strip with 90 % end lap has 10
 REWEIGHTINGS = 6  # of the reweighting: a gross error must not turn a link

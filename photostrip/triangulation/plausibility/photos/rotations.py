@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.geometry.rotation import SYSTEMS, from_angles
+from photostrip.notes import Finding
 from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from photostrip.arrays import Floats
-    from photostrip.notes import Finding
-
 
 LEAST_PHOTOS = 3  # photos
 HARMLESS_DEG = 0.3  # rms difference: start values need not be better

@@ -6,20 +6,15 @@ function of the place. What lies far off it is no error of a strip.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import Floats, Numbers, median
 from photostrip.frozen import NamedTuple, dataclass
+from photostrip.notes import Finding
 from photostrip.triangulation.plausibility.control.straightening import LEAST_REDUNDANCY, fit_simplest
 from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.notes import Finding
 
 LEAST_TIES = 1 + LEAST_REDUNDANCY  # a shift fits one tie
 TWO_RAYS = 2

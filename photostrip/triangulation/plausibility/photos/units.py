@@ -7,23 +7,16 @@ than a tenth across the flight. A reach beyond the format or a tenth of it is no
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from photostrip.arrays import distinct, median, quantile
+from photostrip.arrays import Floats, Numbers, distinct, median, quantile
+from photostrip.camera import Camera
 from photostrip.frozen import NamedTuple
-from photostrip.notes import counted, listed
+from photostrip.notes import Finding, counted, listed
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.plausibility.finding import found
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from photostrip.arrays import Floats, Numbers
-    from photostrip.camera import Camera
-    from photostrip.notes import Finding
-    from photostrip.points import PhotoPoints
-
 
 REACH_SHARE = 0.98  # of the image points; the rest may be gross errors
 FEW_SHARE = 0.5  # of the photos of a camera, at most: they are wrong, not all
