@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
+from typing import Any
 
 from photostrip.frozen import dataclass
+
+Document = dict[str, Any]  # of a result, a plan, a comparison: plain values, as JSON has them
 
 MOST_NAMED = 8  # ids in one message
 

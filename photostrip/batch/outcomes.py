@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
+from photostrip.notes import Document
 from photostrip.report.page.messages import findings_of, line_of
-from photostrip.report.page.parts import Document
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, seen_at
 
 # How a project can end beside the verdicts of a result (good, unverified, look, failed), and the exit code of each.

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.notes import Document
+
 if TYPE_CHECKING:
     from photostrip.library.result import Result
-    from photostrip.report.page.parts import Document
 
 DECIMALS = 5  # of degrees: a metre
 

@@ -21,7 +21,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.output.batch import SCHEMA, parsed_record, record_text
 from photostrip.formats.text.source import digest
 from photostrip.formats.text.writing import write_files
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 
 LOCK = ".batch.lock"
 RECORD = "batch.json"

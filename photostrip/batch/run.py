@@ -15,7 +15,7 @@ from photostrip.batch.result_folder import ResultFolder
 from photostrip.batch.selection import ChosenProject
 from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, InputError
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 from photostrip.result.verdict import VERDICTS, exit_code
 
 LAST_REFUSALS = 3  # results in a row that cannot be written before the batch gives up

@@ -6,7 +6,7 @@ from dataclasses import field
 from typing import TYPE_CHECKING
 
 from photostrip.frozen import dataclass
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 
 if TYPE_CHECKING:
     from photostrip.batch.parcel import Parcel

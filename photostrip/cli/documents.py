@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Literal
 
 import typer
 
-from photostrip.cli.stdout import print_json, print_sections
+from photostrip.cli.stdout import Document, print_json, print_sections
 from photostrip.frozen import dataclass
 from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from photostrip.notes import Note
-    from photostrip.report.page.parts import Document, Section
+    from photostrip.report.page.parts import Section
 
 Form = Literal["text", "md", "json", "csv"]
 

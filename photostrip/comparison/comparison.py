@@ -7,20 +7,17 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.comparison.ground import difference_in_plan_and_height, plan_and_height
 from photostrip.comparison.members import members_of, missing_and_new
 from photostrip.comparison.quantities import Quantity, quantities_of
 from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError, incomplete
 from photostrip.frozen import NamedTuple
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.result.numbers import Document
+from photostrip.notes import Document
 
 SCHEMA = 1
 # What is ours, what the other numbers are made of, and what is made of them.

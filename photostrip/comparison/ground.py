@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.geodesy.curvature import meridian_radius, prime_vertical_radius
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.result.numbers import Document
+from photostrip.notes import Document
 
 
 def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Floats, Floats]:

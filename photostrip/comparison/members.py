@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from photostrip.comparison.quantities import name_of
-
-if TYPE_CHECKING:
-    from photostrip.result.numbers import Document
+from photostrip.notes import Document
 
 Member = tuple[str, str, str]  # block, id, what it is
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TypeGuard
 
 from photostrip.frozen import NamedTuple
+from photostrip.notes import Document
 from photostrip.result.description import quantity_at
-
-if TYPE_CHECKING:
-    from photostrip.result.numbers import Document
 
 Number = float | None
 

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.comparison.ground import east_north_up, level, plan_and_height
 from photostrip.errors import Fault, InputError, incomplete
 from photostrip.frozen import replace
+from photostrip.notes import Document
 from photostrip.result.description import Quantity, Table
 from photostrip.result.reading import MOST_FAULTS, faults_of
 from photostrip.statistics import chi2_quantile
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.result.numbers import Document
 
 SCHEMA = 1
 ROLES = ("new", "check", "control")

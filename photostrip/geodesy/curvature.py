@@ -11,14 +11,10 @@ Source: [001] eq. 153; that control is to be reduced as well, and which radius s
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
+from photostrip.arrays import Floats
 
 Ellipsoid = tuple[float, float]
 """Semi-major and semi-minor axis (a, b) of an ellipsoid of revolution, metres."""

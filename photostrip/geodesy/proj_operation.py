@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import EARTH_RADIUS
 
 if TYPE_CHECKING:
     from pyproj import CRS, Transformer
-
-    from photostrip.arrays import Floats
 
 
 DECADE = 10.0  # years

@@ -6,16 +6,11 @@ matrices: the functions work on leading axes of any shape.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 SYSTEMS = ("alpha-omega-kappa", "omega-phi-kappa", "phi-omega-kappa")
 GIMBAL_LIMIT = 1e-12  # 1 - |sine of the middle angle| below which the other two are not separable

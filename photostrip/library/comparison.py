@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from photostrip.comparison import Tolerances, compare_results
 from photostrip.errors import Fault, InputError
 from photostrip.library.result import RESULT, Result
-from photostrip.notes import counted
-
-if TYPE_CHECKING:
-    from photostrip.result.numbers import Document
+from photostrip.notes import Document, counted
 
 BASELINE = "baseline.json"
 TRUTH = "photostrip_truth"  # the key by which truth.json is known

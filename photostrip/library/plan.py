@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from photostrip.library.project import assignments_of, reading_from
-from photostrip.result.numbers import Document
+from photostrip.notes import Document
 
 PlanKind = Literal["model", "strip", "camera", "displacement", "screening"]
 

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError, faults_instead
-from photostrip.notes import named
+from photostrip.notes import Document, named
 from photostrip.result.records import as_lists
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
     from photostrip.library.table import Table
     from photostrip.pipeline import Result as Computed
-    from photostrip.result.numbers import Document
 
 ReportForm = Literal["text", "md", "html", "json"]
 RESULT = "result.json"

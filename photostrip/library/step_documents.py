@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,15 +12,13 @@ from numpy.typing import ArrayLike
 from photostrip.arrays import Floats
 from photostrip.geometry.rotation import angles
 from photostrip.library.step_arguments import sigma0_of
+from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip
+from photostrip.notes import Document
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
+from photostrip.triangulation.resection.closed_form import OrientedPhoto
+from photostrip.triangulation.strip_formation.intersection import Intersection
 from photostrip.units import MICROMETRES
 
-if TYPE_CHECKING:
-    from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip
-    from photostrip.triangulation.resection.closed_form import OrientedPhoto
-    from photostrip.triangulation.strip_formation.intersection import Intersection
-
-Document = dict[str, Any]
 Column = tuple[str, str, int, ArrayLike]  # name, unit, decimals; negative: digits of numbers of any size
 
 MILLION = 1e6

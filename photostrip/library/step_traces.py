@@ -11,8 +11,9 @@ from photostrip.arrays import Floats
 from photostrip.camera import Camera
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.library.step_arguments import Rays, of_rays
-from photostrip.library.step_documents import Column, Document, columns, table
+from photostrip.library.step_documents import Column, columns, table
 from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip, one_pair
+from photostrip.notes import Document
 from photostrip.result.trace.replay import first_rounds
 from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
 from photostrip.triangulation.polynomial.terms import columns as design_columns

@@ -6,16 +6,14 @@ from collections.abc import Iterator
 from math import isclose
 from os.path import normpath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.output.result_json import read_result
 from photostrip.formats.text.source import digest
 from photostrip.library.project import loaded_from
+from photostrip.notes import Document
 from photostrip.result.statement.certificate import result_hash
-
-if TYPE_CHECKING:
-    from photostrip.result.numbers import Document
 
 SCHEMA = 1
 SAME, DIFFERENT = "same", "different"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, median
+from photostrip.camera import Camera
 from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
@@ -21,9 +21,6 @@ from photostrip.triangulation.relative_orientation.orientation import RelativeSe
 from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 from photostrip.triangulation.strip_formation.strip import NOTHING_GIVEN, FirstPhoto
-
-if TYPE_CHECKING:
-    from photostrip.camera import Camera
 
 METHODS = ("similarity", "polynomial", "covariance", "bundle")
 AUTO = "auto"  # polynomial or covariance, strip by strip

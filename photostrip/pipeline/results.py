@@ -14,6 +14,7 @@ from photostrip.frozen import dataclass
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.rejection import Rejection
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.polynomial.correction import Polynomial
 from photostrip.triangulation.relative_orientation.orientation import Orientation
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline.choice import Choice
-    from photostrip.rejection import Rejection
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
     from photostrip.triangulation.bundle.quality.correlations import Correlation

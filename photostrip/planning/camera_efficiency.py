@@ -9,16 +9,13 @@ Source: [004b] eq. 1-8, with the corrections that ``photostrip sources`` lists.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.camera import Distortion
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.triangulation.image_coordinates.lens_distortion import ideal_from_image
 from photostrip.units import MILLIMETRES
-
-if TYPE_CHECKING:
-    from photostrip.camera import Distortion
 
 KILOMETRE = 1e6  # mm
 GRID = 41  # points along and across a model in which a distortion is tried

@@ -14,10 +14,11 @@ from importlib import resources
 from importlib.util import find_spec
 
 from photostrip.errors import Fault, InputError
+from photostrip.notes import Document
 from photostrip.report.commands.batch import batch_page_sections
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.links import link
-from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import Facts, Part, Section, Table, Words
 from photostrip.report.pictures.batch_map import batch_maps
 from photostrip.report.pictures.result.pictures import SECTIONS, pictures_of
 from photostrip.report.pictures.svg import Picture

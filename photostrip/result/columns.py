@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from functools import partial
 
 from photostrip.frozen import NamedTuple, replace
+from photostrip.notes import Document
 from photostrip.result.description import Quantity, table_at
-from photostrip.result.numbers import Document
 from photostrip.result.quantities import angle_decimals, coordinate_decimals
 
 AZIMUTH_DECIMALS = {"deg": 1, "gon": 1, "rad": 3}

@@ -7,8 +7,9 @@ from dataclasses import asdict, fields, is_dataclass
 import numpy as np
 
 from photostrip.geodesy.ground_frame import plural
+from photostrip.notes import Document
 from photostrip.pipeline import Result
-from photostrip.result.numbers import Document, rms
+from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
 
 ROTATION = {

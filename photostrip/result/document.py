@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from photostrip import __version__
-from photostrip.notes import Finding, Note
+from photostrip.notes import Document, Finding, Note
 from photostrip.pipeline import Result
 from photostrip.result import conventions, summary
 from photostrip.result.adjustment import (
@@ -19,7 +19,7 @@ from photostrip.result.adjustment import (
     rejected,
     strips,
 )
-from photostrip.result.numbers import Document, natural_rank
+from photostrip.result.numbers import natural_rank
 from photostrip.result.points import cross_validation, given, ground, image_coordinates, photos, precision
 from photostrip.result.statement.evidence import statement_of
 from photostrip.result.verdict import verdict_of

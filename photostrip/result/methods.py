@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from photostrip import __version__
 from photostrip.errors import PhotostripError
-from photostrip.result.numbers import Document
+from photostrip.notes import Document
 
 SCHEMA = 1
 PARTS = ("count", "rms", "max", "worst", "rms_um")

@@ -5,19 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.units import MICROMETRES
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, DTypeLike
-
-    from photostrip.arrays import Floats, Numbers
-
 Plain = Any  # a number, None or nested lists of them
-Document = dict[str, Any]
 
 GROUND = 4  # decimals of metres
 GEOGRAPHIC = 10  # decimals of degrees: 0.01 mm

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photostrip.notes import Document
 from photostrip.result.description import Quantity, Table, table_at
 from photostrip.result.numbers import (
     DEGREES,
@@ -17,7 +18,6 @@ from photostrip.result.numbers import (
     GROUND,
     IMAGE,
     RADIANS,
-    Document,
     Plain,
     RoundedColumn,
     rounded,

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast, overload
 
+from photostrip.notes import Document
+
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
-    from photostrip.result.numbers import Document, Plain
+    from photostrip.result.numbers import Plain
 
 
 class Records(Sequence[dict[str, Any]]):

@@ -7,12 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from photostrip.arrays import Flags, Floats
+from photostrip.notes import Document
 from photostrip.pipeline import Result
 from photostrip.result.adjustment import links
 from photostrip.result.adjustment.bundle import image_fit
 from photostrip.result.adjustment.pairs import Parallaxes, sigma0
 from photostrip.result.adjustment.rejected import rejected_by_strip
-from photostrip.result.numbers import Document, Plain, rms
+from photostrip.result.numbers import Plain, rms
 from photostrip.result.points.given import Differences, of_used
 from photostrip.result.quantities import record
 

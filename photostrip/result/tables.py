@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from photostrip.frozen import NamedTuple, replace
+from photostrip.notes import Document
 from photostrip.result import columns
 from photostrip.result.description import Quantity, Table, table_at
-from photostrip.result.numbers import Document
 
 # The tables that have records of their own in the document, by the name of their block; a block that a result does not
 # have is an empty table.

@@ -8,14 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
-from photostrip.notes import before, counted, listed
+from photostrip.notes import Document, before, counted, listed
 from photostrip.statistics import SECOND_LOOK, TEST_LEVEL, chi2_quantile, f_p_value
-
-if TYPE_CHECKING:
-    from photostrip.result.numbers import Document
 
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
 

@@ -8,18 +8,14 @@ in mm, reduced to the principal point; ``rotation`` (3, 3) takes the photo to th
 from __future__ import annotations
 
 from math import ceil
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 from photostrip.terrestrial.frame import ground_from_photo, partials
 from photostrip.units import ARCSECONDS
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 LEVEL = 1e-12  # difference of a rotation from that of a level camera
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -12,10 +12,8 @@ from photostrip.cli.documents import FORMS, Form, Rendering, require_target
 from photostrip.cli.failures import failures_as
 from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import Silent
+from photostrip.cli.stdout import Document
 from photostrip.frozen import dataclass
-
-if TYPE_CHECKING:
-    from photostrip.report.page.parts import Document
 
 step = command_group("Single steps of the method, from a table of points: for teaching and checking.")
 

@@ -15,7 +15,7 @@ from photostrip.batch.run import Batch, Run, Stop, on_signals
 from photostrip.batch.selection import choose
 from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.cli.failures import as_fault, failures_as
-from photostrip.cli.stdout import BatchFormat, Format, ascii_only, print_sections
+from photostrip.cli.stdout import BatchFormat, Document, Format, ascii_only, print_sections
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_files, write_text
@@ -23,7 +23,6 @@ from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
 from photostrip.report.page import messages, text
-from photostrip.report.page.parts import Document
 from photostrip.report.page.progress import BatchTable, batch_table
 from photostrip.visible import visible, visible_json
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from photostrip.cli.failures import failures_as
 from photostrip.cli.stderr import Messages
-from photostrip.cli.stdout import Format, print_json, print_sections
+from photostrip.cli.stdout import Document, Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
 from photostrip.formats.text.writing import write_text
 from photostrip.library.project import loaded_from
@@ -17,7 +17,6 @@ from photostrip.pipeline.strips.stages import Stages
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
 from photostrip.result.methods import methods_document
-from photostrip.result.numbers import Document
 
 
 def compare_methods(

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from photostrip import __version__
 from photostrip.formats.output.csv_text import to_csv
-
-if TYPE_CHECKING:
-    from photostrip.result.numbers import Document
+from photostrip.notes import Document
 
 SCHEMA = 1
 COLUMNS = (

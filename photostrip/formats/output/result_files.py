@@ -12,11 +12,12 @@ import numpy as np
 from photostrip.formats.output.result_json import to_json
 from photostrip.formats.text import number_columns
 from photostrip.formats.text.number_columns import Cells
+from photostrip.notes import Document
 from photostrip.pipeline import Result
 from photostrip.result import columns as tables
 from photostrip.result.columns import Column
 from photostrip.result.description import Quantity
-from photostrip.result.numbers import PER_RADIAN, Document
+from photostrip.result.numbers import PER_RADIAN
 from photostrip.result.points.image_coordinates import refined_rows
 from photostrip.result.records import Records
 

@@ -10,11 +10,12 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.output import json_encoder
 from photostrip.formats.output.json_encoder import Encoder
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
+from photostrip.notes import Document
 from photostrip.result.records import Records
 from photostrip.visible import visible_json
 
 if TYPE_CHECKING:
-    from photostrip.result.numbers import Document, Plain
+    from photostrip.result.numbers import Plain
 
 LARGEST_RESULT = 1000 * MEGABYTE
 SCHEMA = 1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -12,10 +11,9 @@ from photostrip.arrays import Floats
 from photostrip.formats.output.simulation_tables import ground_decimals, on_one_line
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.rotation import angles
+from photostrip.notes import Document
 from photostrip.result.numbers import ROTATION, rounded
 from photostrip.simulation import InjectedError, Simulation
-
-Document = dict[str, Any]
 
 TRUE_STEP = 1e-7  # metres to which the truth is rounded
 ANGLE_DECIMALS = 10  # degrees: 2e-12 rad

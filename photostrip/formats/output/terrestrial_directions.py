@@ -9,7 +9,8 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.frozen import NamedTuple
-from photostrip.result.numbers import EXACT, Document, rounded, significant
+from photostrip.notes import Document
+from photostrip.result.numbers import EXACT, rounded, significant
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.frame import Phototheodolite, directions_from_photo, photo_from_directions
 from photostrip.terrestrial.orientation import ANGLES, REFRACTION, OrientationSettings, PhotoOrientation, Sightings

@@ -11,8 +11,8 @@ from photostrip.arrays import Floats
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, Attitude, head
 from photostrip.frozen import NamedTuple
-from photostrip.notes import Note
-from photostrip.result.numbers import Document, natural_rank, rounded, significant
+from photostrip.notes import Document, Note
+from photostrip.result.numbers import natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.displacement import ellipses
 from photostrip.terrestrial.frame import Phototheodolite

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault
 from photostrip.frozen import dataclass, replace
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.table_text import TableText
 
 CONTROL_CHARACTER = re.compile(r"[\x00-\x1f\x7f]")

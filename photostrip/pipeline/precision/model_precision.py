@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.pipeline.precision.check_points import CheckPoints, check_points
 from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.pipeline.results import StripResult
+from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute_orientation
@@ -20,12 +20,9 @@ from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 from photostrip.triangulation.error_propagation.control_errors import FitOperator
 from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL
 from photostrip.triangulation.independent_models import model_errors, model_misclosures, perspective_centers
+from photostrip.triangulation.independent_models.formation import FormedModels
 from photostrip.triangulation.independent_models.model_errors import ModelErrors
 from photostrip.triangulation.polynomial.terms import POWERS
-
-if TYPE_CHECKING:
-    from photostrip.pipeline.strips.absolute import OrientedStrip
-    from photostrip.triangulation.independent_models.formation import FormedModels
 
 
 def variance_factor(formed: FormedModels) -> tuple[float, str]:

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import distinct, median
 from photostrip.notes import Note
+from photostrip.pipeline.inputs import ModelStrip
 from photostrip.points import ModelPoints
+from photostrip.triangulation.independent_models.formation import FormedModels
 from photostrip.triangulation.independent_models.link_screening import LEFT
 from photostrip.triangulation.independent_models.model_errors import far_ends
-
-if TYPE_CHECKING:
-    from photostrip.pipeline.inputs import ModelStrip
-    from photostrip.triangulation.independent_models.formation import FormedModels
 
 ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others
 ANOTHER_UNIT, NOTHING = 100.0, 1e-5  # ratio of residuals to what is stated; below the second there are no errors at all

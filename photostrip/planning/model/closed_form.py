@@ -8,16 +8,11 @@ With ``printed`` the functions compute what stands in print.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.frozen import NamedTuple
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 ORDER = ("dbz", "dkappa", "dalpha", "domega")
 

@@ -9,20 +9,16 @@ Source: [003] eq. 10.7-10.12, with results of Lobanov and of Skiridov.
 from __future__ import annotations
 
 from math import erfc, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.planning.model.element_errors import influence, measured_covariance
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
 from photostrip.triangulation.relative_orientation import six_points
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 TERMS = ("E0", "A", "B", "C", "D")
 LEAST_POINTS = 5

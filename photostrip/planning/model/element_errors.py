@@ -7,17 +7,12 @@ Source: [000] eq. 2 and last paragraphs, rederived; ``photostrip sources`` lists
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.triangulation.relative_orientation import six_points
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 ELEMENTS = ("dby", "dbz", "dkappa", "dalpha", "domega")
 FREE = ("dkappa", "dbz", "dalpha2", "domega")  # dalpha2: the turn against the base, dalpha - dbz / b

@@ -5,10 +5,10 @@ Errors that are given, or misclosures that were found, go to the points of the m
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass
 from photostrip.planning.model import closed_form, deformation
@@ -36,11 +36,6 @@ from photostrip.planning.model.single_model import (
     influence_after_orientation,
 )
 from photostrip.units import MILLIMETRES
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Floats
 
 Place = tuple[float, float]
 Three = tuple[float, float, float]

@@ -16,19 +16,14 @@ Source: [000] eq. 1-8, with the corrections that ``photostrip sources`` lists.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.planning.model.element_errors import free_influence, influence
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from photostrip.arrays import Flags, Floats, Numbers
 
 PARAMETERS = ("dX0", "dY0", "dZ0", "dlambda", "dtheta", "deta", "dxi")
 FLATTEST = 1e-6  # of control in height: A against c1 c2; below that it lies on a line

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from photostrip.formats.text.findings import Findings
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
-from photostrip.notes import Finding, Note, counted
+from photostrip.notes import Document, Finding, Note, counted
 from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior
 from photostrip.pipeline.plausibility import gate
@@ -40,8 +39,6 @@ from photostrip.project.loading import Project, load_project
 from photostrip.project.yaml.tree import fault_at
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.units import MILLIMETRES
-
-Document = dict[str, Any]
 
 LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
 

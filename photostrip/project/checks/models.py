@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 import numpy as np
 
@@ -11,12 +10,11 @@ from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.measured.models import ModelTable
+from photostrip.notes import Document
 from photostrip.pipeline import MeasuredModels
 from photostrip.project.loading import Project
 from photostrip.project.yaml.tree import fault_at, key_path
 from photostrip.units import MICROMETRES
-
-Document = dict[str, Any]
 
 
 def links_of_models(project: Project, models: MeasuredModels) -> Iterator[Fault]:

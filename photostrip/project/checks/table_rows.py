@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +13,10 @@ from photostrip.formats.measured.exterior import OrientationTable, PositionTable
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.tables import Table
 from photostrip.frozen import NamedTuple
+from photostrip.notes import Document
 from photostrip.pipeline import Inputs, MeasuredModels
 from photostrip.project.loading import Project
 from photostrip.project.tables import Tables, rays
-
-Document = dict[str, Any]
 
 IN_NO_STRIP = "its photo belongs to no strip"
 ONCE = "the point is measured on one photo only"

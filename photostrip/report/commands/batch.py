@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from urllib.parse import quote
 
 from photostrip.frozen import replace
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.junit import Case, to_junit
 from photostrip.report.page.numbers import metres
-from photostrip.report.page.parts import DASH, Document, Section, Table, Words
+from photostrip.report.page.parts import DASH, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 COLUMNS = (

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from photostrip.notes import MOST_NAMED, counted, listed
+from photostrip.notes import MOST_NAMED, Document, counted, listed
 from photostrip.report.page.angles import UNITS, AngleUnit
 from photostrip.report.page.numbers import short
-from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
+from photostrip.report.page.parts import DASH, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 # What is printed without --verbose: points with a row each in the table of control, kinds of them when there are more,

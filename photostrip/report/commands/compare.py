@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import short, unit
-from photostrip.report.page.parts import DASH, Document, Part, Section, Words
+from photostrip.report.page.parts import DASH, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 LEAST_PERCENT = 1e-4  # share; smaller ones are shown in parts per million

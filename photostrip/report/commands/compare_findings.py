@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from photostrip.notes import Document
 from photostrip.report.commands.compare import NAMES, allowed_words, lacking_words, what
 from photostrip.report.page.junit import Case
 from photostrip.report.page.messages import EMPTY
 from photostrip.report.page.numbers import short, unit
-from photostrip.report.page.parts import Document
 
 ALONE = {"missing": "there is a baseline and no result", "new": "there is a result and no baseline"}
 MOST = 50  # annotations of one comparison; a server shows no more

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import micrometres, ratio
-from photostrip.report.page.parts import DASH, Document, Part, Section, Words
+from photostrip.report.page.parts import DASH, Part, Section, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
 
 SHOWN = 20  # errors that were not found; --verbose prints all

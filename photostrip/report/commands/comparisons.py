@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from photostrip.notes import counted, listed
+from photostrip.notes import Document, counted, listed
 from photostrip.report.commands.compare import compare_sections, headline
 from photostrip.report.commands.compare_truth import truth_headline, truth_sections
-from photostrip.report.page.parts import Document, Part, Section, Words
+from photostrip.report.page.parts import Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 TRUTH = "photostrip_truth_comparison"

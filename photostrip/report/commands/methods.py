@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from photostrip.report.page.parts import Document, Part, Section, Table, Words
+from photostrip.notes import Document
+from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.decisions import choice_line
 

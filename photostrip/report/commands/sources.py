@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from photostrip.notes import Document
 from photostrip.report.page.numbers import short
-from photostrip.report.page.parts import Document, Part, Section, Words
+from photostrip.report.page.parts import Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 

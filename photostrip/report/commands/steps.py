@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
+from photostrip.notes import Document
 from photostrip.report.page.numbers import fixed, power
-from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
+from photostrip.report.page.parts import DASH, Facts, Part, Section, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
 
 TITLES = {

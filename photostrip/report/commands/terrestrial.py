@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import calibrated, fixed, short
-from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words, numbered
+from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words, numbered
 from photostrip.report.page.tables import number, over_plane, tabulated, words
 
 ANGLE_DECIMALS = 5  # in deg and gon: 0.04 and 0.03 seconds of arc

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import fixed, metres, micrometres, short, signed
-from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 VERDICTS = {True: "moved", False: "", None: "not tested"}

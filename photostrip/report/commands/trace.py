@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import fixed, power, short
-from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 PRIMED = {"alpha1": "α1′", "kappa1": "κ1′", "alpha2": "α2′", "omega2": "ω2′", "kappa2": "κ2′"}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from photostrip.notes import counted, listed
+from photostrip.notes import Document, counted, listed
 from photostrip.report.commands.compare import NAMES, compare_sections
-from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
+from photostrip.report.page.parts import DASH, Facts, Part, Section, Words
 
 DIFFERENT = "different"
 

@@ -7,8 +7,8 @@ photos.
 from __future__ import annotations
 
 from photostrip.frozen import NamedTuple
+from photostrip.notes import Document
 from photostrip.report.page.numbers import Number, fixed
-from photostrip.report.page.parts import Document
 
 
 class AngleUnit(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 
 Name = tuple[str, str]  # what it is, and its id
 

@@ -10,8 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.notes import Finding, Note
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document, Finding, Note
 from photostrip.visible import visible
 
 LEVELS = {"error": "error", "warning": "warning", "note": "notice"}  # ours, and those of GitHub

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from photostrip.frozen import NamedTuple, dataclass
 
-Document = dict[str, Any]  # of a result, a plan, a comparison: plain values, as JSON has them
 DASH = "–"  # stands where there is no value
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from math import cos, dist, radians
 
-from photostrip.notes import counted
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
 from photostrip.report.pictures.ground.sheet import bars, ids, sheet_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 from photostrip.report.pictures.drawing import new_figure
 from photostrip.report.pictures.style import INK, METHODS, SERIES, SMALL_TEXT, USES
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 from photostrip.report.pictures.drawing import as_png, as_svg, check_matplotlib, drawn_alike, isolines, new_figure
 from photostrip.report.pictures.plan_strip import strip_figure
 from photostrip.report.pictures.style import SERIES, SMALL_TEXT, USES

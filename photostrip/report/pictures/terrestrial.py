@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.notes import Document
 from photostrip.report.pictures.drawing import as_svg, check_matplotlib, drawn_alike, isolines, new_figure
 from photostrip.report.pictures.style import MOVED, NOT_SIGNIFICANT, SMALL_TEXT, STABLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from photostrip.report.page.parts import Document
 
 FINE = 81  # points across the photo
 ARROW_SHARE = 0.12  # of the size of the picture: length of the longest displacement

@@ -6,8 +6,9 @@ from collections.abc import Collection, Iterator
 from enum import StrEnum
 
 from photostrip.errors import faults_instead
+from photostrip.notes import Document
 from photostrip.report.page.layout import USUAL
-from photostrip.report.page.parts import Document, Section, Words
+from photostrip.report.page.parts import Section, Words
 from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.decisions import decisions_section, weights_section
 from photostrip.report.sections.findings import findings_sections

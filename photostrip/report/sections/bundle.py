@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.angles import AngleUnit, angle_unit
 from photostrip.report.page.numbers import fixed, power, short, unit
-from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
+from photostrip.report.page.parts import DASH, Facts, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 NAMES = {"image": "image coordinates", "control": "control", "position": "camera positions", "attitude": "attitudes"}

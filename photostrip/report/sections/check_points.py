@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from photostrip.frozen import NamedTuple
-from photostrip.notes import counted, listed
+from photostrip.notes import Document, counted, listed
 from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
-from photostrip.report.page.parts import Document, Part, Section, Table, Words
+from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
 from photostrip.report.sections.points import AXES, DIFFERENCES, IDS_NAMED, given_table, largest
 from photostrip.report.sections.strip import ALL_SHOWN, worst_first

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import fixed, joined, ratio, signed
-from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import worst_first
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import LEAST_PROBABILITY, fixed, metres, micrometres, ratio, short
-from photostrip.report.page.parts import Document, Facts, Section, Words
+from photostrip.report.page.parts import Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import elsewhere
 

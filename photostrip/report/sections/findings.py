@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from itertools import groupby, islice
 from operator import itemgetter
 
-from photostrip.notes import before
+from photostrip.notes import Document, before
 from photostrip.report.page.messages import MOST_OF_A_KIND
-from photostrip.report.page.parts import Document, Part, Section, Words
+from photostrip.report.page.parts import Part, Section, Words
 from photostrip.report.sections.strip import elsewhere
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.angles import angle_unit
 from photostrip.report.page.numbers import fixed, joined, micrometres, percent, ratio, signed
-from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
+from photostrip.report.page.parts import DASH, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import DIRECTIONS, photos_of, worst_first
 

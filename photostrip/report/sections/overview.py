@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
-from photostrip.notes import counted, listed
+from photostrip.notes import Document, counted, listed
 from photostrip.report.page.layout import lay_out
 from photostrip.report.page.numbers import fixed, metres, micrometres, percent
-from photostrip.report.page.parts import Document, Facts, Section, Words
+from photostrip.report.page.parts import Facts, Section, Words
 from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.decisions import choices_in_short, chosen_degrees
 from photostrip.report.sections.findings import cures_section

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from itertools import groupby
 from operator import itemgetter
 
-from photostrip.notes import before, counted, listed
+from photostrip.notes import Document, before, counted, listed
 from photostrip.report.page.numbers import joined, metres, micrometres, ratio, signed, unit
-from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.models import scale_word
 from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN, elsewhere, worst_first

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.angles import angle_unit
 from photostrip.report.page.numbers import fixed, metres, micrometres, ratio
-from photostrip.report.page.parts import Document, Facts, Section, Table, Words
+from photostrip.report.page.parts import Facts, Section, Table, Words
 from photostrip.report.page.tables import angle, number, tabulated, words
 from photostrip.report.sections.strip import ALL_SHOWN, elsewhere
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from math import hypot
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.angles import AngleUnit, angle_unit
 from photostrip.report.page.numbers import fixed, joined, metres, micrometres, short
-from photostrip.report.page.parts import Document, Facts, Section
+from photostrip.report.page.parts import Facts, Section
 from photostrip.report.page.tables import Shown, angle, number, tabulated, words
 from photostrip.report.sections.models import measured, of_models, project_rows, scale_word
 from photostrip.report.sections.strip import worst_first

@@ -6,10 +6,10 @@ import re
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.angles import AngleUnit, angle_unit
 from photostrip.report.page.numbers import LEAST_PROBABILITY, fixed, metres, micrometres, percent, power, short
-from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import Shown, angle, number, tabulated, words
 
 ALL_SHOWN = 24  # rows up to which a table is printed whole

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import fixed, short, unit
-from photostrip.report.page.parts import Document, Part, Section, Words
+from photostrip.report.page.parts import Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.findings import names_of
 from photostrip.report.sections.strip import elsewhere

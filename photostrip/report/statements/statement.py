@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from photostrip.notes import counted, listed
+from photostrip.notes import Document, counted, listed
 from photostrip.report.page.numbers import fixed, metres, signed
-from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 STYLES = {"tested": "good", "reduced": "look", "not met": "failed"}

@@ -12,10 +12,11 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, median
 from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.notes import Document
 from photostrip.pipeline import Result
 from photostrip.pipeline.results import Bundle
 from photostrip.rejection import UNCONTROLLED
-from photostrip.result.numbers import PER_RADIAN, Document, rms
+from photostrip.result.numbers import PER_RADIAN, rms
 from photostrip.result.points.photos import ImageResiduals
 from photostrip.result.quantities import grouped, record, records
 from photostrip.result.records import Records, as_records

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from photostrip.notes import Document
 from photostrip.pipeline import AUTO, Result, StripResult
 from photostrip.pipeline.choice import Choice, Witness
-from photostrip.result.numbers import Document
 from photostrip.result.quantities import record
 
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.notes import Document
 from photostrip.pipeline import Result, StripResult
-from photostrip.result.numbers import Document, natural_rank
+from photostrip.result.numbers import natural_rank
 from photostrip.result.quantities import record, records
 
 if TYPE_CHECKING:

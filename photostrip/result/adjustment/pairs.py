@@ -9,9 +9,9 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.notes import Document
 from photostrip.pipeline import Result, StripResult
 from photostrip.result.adjustment.parallax_limits import parallax_limits
-from photostrip.result.numbers import Document
 from photostrip.result.quantities import grouped, records
 from photostrip.result.records import Records
 from photostrip.triangulation.relative_orientation.orientation import Orientation, RelativeSettings

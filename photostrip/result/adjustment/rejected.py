@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
+from photostrip.notes import Document
 from photostrip.pipeline import Result, StripResult
 from photostrip.pipeline.results import Bundle
 from photostrip.points import PhotoPoints
@@ -12,7 +13,7 @@ from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY, Rejection
 from photostrip.result.adjustment.bundle import Kind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
-from photostrip.result.numbers import Document, natural, rounded
+from photostrip.result.numbers import natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.strip_formation.scale_transfer import depths

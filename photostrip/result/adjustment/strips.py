@@ -12,10 +12,11 @@ from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.notes import Document
 from photostrip.pipeline import Result, StripResult
 from photostrip.result.adjustment import links, pairs
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
-from photostrip.result.numbers import Document, rms
+from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
 from photostrip.triangulation.polynomial.correction import Polynomial
 

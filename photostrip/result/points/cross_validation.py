@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from photostrip.arrays import Floats
+from photostrip.notes import Document
 from photostrip.pipeline import Result
-from photostrip.result.numbers import Document, natural, rms
+from photostrip.result.numbers import natural, rms
 from photostrip.result.points.given import PARTS, differences, size_columns
 from photostrip.result.points.own_precision import chances
 from photostrip.result.points.precision import INSIDE, point_columns

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from photostrip.arrays import Floats
+from photostrip.notes import Document
 from photostrip.pipeline import Result
-from photostrip.result.numbers import EXACT, Document, natural_rank, significant
+from photostrip.result.numbers import EXACT, natural_rank, significant
 from photostrip.result.quantities import grouped
 from photostrip.units import MICROMETRES
 

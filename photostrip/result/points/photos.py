@@ -10,8 +10,9 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import angles
+from photostrip.notes import Document
 from photostrip.pipeline import Result, Strip, StripResult
-from photostrip.result.numbers import PER_RADIAN, Document, Plain, rounded
+from photostrip.result.numbers import PER_RADIAN, Plain, rounded
 from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns
 from photostrip.result.quantities import angle_decimals, grouped, records

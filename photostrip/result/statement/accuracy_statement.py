@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, Fault, InputError
-from photostrip.notes import listed
-from photostrip.result.numbers import Document
+from photostrip.notes import Document, listed
 from photostrip.result.statement.certificate import result_hash
 from photostrip.result.statement.classes import ClassProfile, classified
 from photostrip.result.statement.stating import NOT_MET, REFUSED, STANDARD, TESTED, stated

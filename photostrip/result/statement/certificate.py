@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip import __version__
 from photostrip.geodesy.proj_operation import proj_versions
+from photostrip.notes import Document
 from photostrip.result.records import Records
 
 if TYPE_CHECKING:
     from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.result.numbers import Document
 
 LIBRARIES = ("numpy", "scipy", "pyproj")  # whose version can change a number
 WITHOUT_PROJ = {"local", "geocentric"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from photostrip.frozen import dataclass
-from photostrip.result.numbers import Document
+from photostrip.notes import Document
 
 # What a norm may set a limit to, with the meaning that a statement prints; where it stands in the block `statement`.
 MEASURES = {

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from photostrip.arrays import Flags, Floats
+from photostrip.notes import Document
 from photostrip.pipeline import Result
-from photostrip.result.numbers import Document
 from photostrip.result.points.given import Differences
 from photostrip.result.quantities import record
 from photostrip.result.statement.figures import figures_of

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from math import ceil, hypot, isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.result.numbers import Document, rms
-
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
+from photostrip.arrays import Floats
+from photostrip.notes import Document
+from photostrip.result.numbers import rms
 
 # Radii and half widths that hold so many of normal errors, in standard deviations of one coordinate
 # (FGDC-STD-007.3-1998, appendix 3-A; the 90 % circle: appendix 3-D).

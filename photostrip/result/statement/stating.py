@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from photostrip.result.numbers import Document
+from photostrip.notes import Document
 from photostrip.result.statement.figures import CENTIMETRES, LINE_95
 
 TESTED, REDUCED, NOT_MET, REFUSED = "tested", "reduced", "not met", "refused"

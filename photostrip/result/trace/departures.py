@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from photostrip.frozen import NamedTuple
+from photostrip.notes import Document
 from photostrip.pipeline import Settings
-from photostrip.result.numbers import Document
 
 
 class Choice(NamedTuple):

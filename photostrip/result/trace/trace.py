@@ -10,9 +10,10 @@ from photostrip.arrays import Floats
 from photostrip.frozen import replace
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity, pair_scales
+from photostrip.notes import Document
 from photostrip.pipeline import Result, StripResult
 from photostrip.points import ControlPoints
-from photostrip.result.numbers import EXACT, PER_RADIAN, Document, rounded, significant
+from photostrip.result.numbers import EXACT, PER_RADIAN, rounded, significant
 from photostrip.result.records import as_records
 from photostrip.result.trace.departures import departures_of
 from photostrip.result.trace.replay import PairRound, SimilarityStep, pair_rounds, similarity_steps

@@ -8,18 +8,15 @@ transformation in both hands.
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.camera import Camera
 from photostrip.errors import Fault
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry import plane
 from photostrip.points import PhotoPoints, take_rows
-
-if TYPE_CHECKING:
-    from photostrip.camera import Camera
 
 WRONG_PATTERN = 0.05  # largest misfit over radius of the marks: film and paper stay far below, wrong numbers far above
 QUARTER = np.pi / 2

@@ -6,10 +6,10 @@ A plane transformation takes the marks of a photo to their calibrated coordinate
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import replace
 from photostrip.notes import Note, named
@@ -23,10 +23,7 @@ from photostrip.triangulation.image_coordinates.mark_notes import (
     marks_without_camera,
     notes_on_marks,
 )
-
-if TYPE_CHECKING:
-    from photostrip.camera import Camera
-    from photostrip.triangulation.image_coordinates.settings import InteriorSettings
+from photostrip.triangulation.image_coordinates.settings import InteriorSettings
 
 
 def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: InteriorSettings) -> InteriorOrientation:

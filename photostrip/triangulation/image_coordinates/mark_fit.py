@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,10 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry import plane
+from photostrip.notes import Note
 from photostrip.points import frozen
 from photostrip.triangulation.image_coordinates.fiducial_marks import Marks, fault
-
-if TYPE_CHECKING:
-    from photostrip.notes import Note
-    from photostrip.triangulation.image_coordinates.film_deformation import Deformation
+from photostrip.triangulation.image_coordinates.film_deformation import Deformation
 
 SHAPE = ("scale_x", "scale_y", "rotation", "shear")
 BY_PHOTO = ("photo_ids", "transforms", "marks", "residuals", "sigma0", "redundancy", *SHAPE, "mirrored")

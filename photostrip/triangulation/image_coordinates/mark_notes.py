@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Flags, median
+from photostrip.camera import Camera
 from photostrip.errors import Fault
 from photostrip.notes import Note, named
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates.fiducial_marks import QUARTER, fault
-
-if TYPE_CHECKING:
-    from photostrip.camera import Camera
-    from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
+from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
 
 MICROMETRE = 1e-3  # mm
 POOR_FIT = 0.05  # mm; film that was stored well fits to a third of this

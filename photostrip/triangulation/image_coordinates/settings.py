@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from photostrip.camera import Camera
 from photostrip.frozen import dataclass, replace
-
-if TYPE_CHECKING:
-    from photostrip.camera import Camera
 
 
 @dataclass(frozen=True)

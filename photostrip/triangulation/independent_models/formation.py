@@ -10,7 +10,6 @@ Source: [001] for the chain; seven parameters in place of one derived, see docs/
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,10 +18,8 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.notes import counted
 from photostrip.triangulation.independent_models import linking
+from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
 from photostrip.triangulation.independent_models.linking import CommonPoints, Similarities, StripModels
-
-if TYPE_CHECKING:
-    from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
 
 AGREE = 4.0  # times the critical value of a link, for positions that several links lie between
 NAMED = 4

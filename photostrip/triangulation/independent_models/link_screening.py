@@ -10,7 +10,6 @@ Source: [Baarda 1968]; order and limits derived, see docs/independent-models.md.
 from __future__ import annotations
 
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +19,7 @@ from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.independent_models import linking
 from photostrip.triangulation.independent_models.linking import CommonPoints, PointTests, SolvedLinks, StripModels
-
-if TYPE_CHECKING:
-    from photostrip.triangulation.independent_models.settings import LinkSettings
+from photostrip.triangulation.independent_models.settings import LinkSettings
 
 MEDIAN = 2.366  # of chi-square with three degrees of freedom
 MEDIAN_SPREAD = 1.124  # standard deviation of the ratio of a sample's median to it, times the root of the sample's size

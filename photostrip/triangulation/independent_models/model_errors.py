@@ -10,17 +10,13 @@ Source: derived; see docs/independent-models.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, median
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
-
-if TYPE_CHECKING:
-    from photostrip.triangulation.independent_models.formation import FormedModels
+from photostrip.triangulation.independent_models.formation import FormedModels
 
 
 @dataclass(frozen=True, eq=False)

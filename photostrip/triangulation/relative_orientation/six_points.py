@@ -8,12 +8,9 @@ Source: derived from the linear condition; the weight numbers of the dependent p
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from photostrip.arrays import Floats
+from photostrip.arrays import Floats
 
 
 def cofactors(focal: float, width: float, base: float) -> Floats:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from photostrip.cli.commands.plan.options import Options
 from photostrip.cli.documents import FORMS, Form, Rendering, require_target, write_rule
 from photostrip.cli.options import Silent
+from photostrip.cli.stdout import Document
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass, replace
-
-if TYPE_CHECKING:
-    from photostrip.report.page.parts import Document
 
 
 @dataclass(frozen=True)

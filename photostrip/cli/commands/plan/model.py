@@ -9,11 +9,11 @@ import typer
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import CONTROL_SIGMA, Flight, Options, PlanCamera, PlanFile, PlanOptions, Sets
 from photostrip.cli.failures import failures_as
+from photostrip.cli.stdout import Document
 from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from photostrip.planning.model.plan import ModelSpec
-    from photostrip.report.page.parts import Document
 
 FINE = 41  # points along and across of a picture
 

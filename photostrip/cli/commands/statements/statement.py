@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from photostrip.cli.commands.statements.forms import StatementFormat
 from photostrip.cli.options import Quiet, Width
-from photostrip.cli.stdout import Format, form_of, print_json, print_sections
-
-if TYPE_CHECKING:
-    from photostrip.report.page.parts import Document
-
+from photostrip.cli.stdout import Document, Format, form_of, print_json, print_sections
 
 HTML = ".html"
 

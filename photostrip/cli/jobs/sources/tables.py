@@ -7,7 +7,8 @@ import io
 from importlib import resources
 
 from photostrip.cli.jobs.sources.worked import worked_numbers
-from photostrip.result.numbers import Document, rounded
+from photostrip.notes import Document
+from photostrip.result.numbers import rounded
 
 DIGITS = 3  # decimals
 

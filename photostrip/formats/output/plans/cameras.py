@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from photostrip.notes import Document
 from photostrip.planning.camera_efficiency import (
     PRINTED_TABLE,
     ComparedCamera,
@@ -15,7 +16,7 @@ from photostrip.planning.camera_efficiency import (
     source_cameras,
     suitability,
 )
-from photostrip.result.numbers import Document, micrometres, rounded, significant
+from photostrip.result.numbers import micrometres, rounded, significant
 
 
 def camera_document(

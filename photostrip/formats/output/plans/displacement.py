@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from photostrip.result.numbers import Document, micrometres, rounded, significant
+from photostrip.notes import Document
+from photostrip.result.numbers import micrometres, rounded, significant
 from photostrip.terrestrial.forecast import PLACES, DisplacementSpec, plan_displacements
 
 SMALL = 6  # decimals of metres: displacements are small

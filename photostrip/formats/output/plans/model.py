@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photostrip.arrays import Floats
+from photostrip.notes import Document
 from photostrip.planning.model.closed_form import ORDER
 from photostrip.planning.model.deformation import TERMS
 from photostrip.planning.model.element_errors import ELEMENTS, FREE
@@ -20,7 +21,7 @@ from photostrip.planning.model.plan import (
     source_example,
 )
 from photostrip.planning.model.single_model import PARAMETERS
-from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
+from photostrip.result.numbers import GROUND, micrometres, rms, rounded, significant
 from photostrip.units import ARCSECONDS, MICROMETRES
 
 IN_PHOTO = 2  # decimals of mm: places of points

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from photostrip.arrays import Floats
+from photostrip.notes import Document
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, numbers_of
 from photostrip.planning.strip.design import Chosen, DesignReport, Needed, Outcome, along_the_strip
 from photostrip.planning.strip.ideal_strip import IdealStrip
 from photostrip.planning.strip.placement import BestPlaces, worst
-from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
+from photostrip.result.numbers import GROUND, micrometres, rms, rounded, significant
 
 RATIO = 3  # decimals of a ratio
 PLACED = 6  # decimals of metres that decide which point is the worst: strips are symmetric

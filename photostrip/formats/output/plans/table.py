@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.plans.strip import along_rows
-from photostrip.result.numbers import Document
+from photostrip.notes import Document
 
 TABLES = {
     "displacement": "points",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from photostrip.notes import Document
 from photostrip.report.page.numbers import calibrated, fixed, short
-from photostrip.report.page.parts import Document, Facts, Part, Section, Table, numbered
+from photostrip.report.page.parts import Facts, Part, Section, Table, numbered
 from photostrip.report.page.tables import number, tabulated, words
 
 

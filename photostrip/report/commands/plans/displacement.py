@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from photostrip.notes import Document
 from photostrip.report.page.numbers import calibrated, fixed, short
-from photostrip.report.page.parts import Document, Facts, Section
+from photostrip.report.page.parts import Facts, Section
 from photostrip.report.page.tables import number, tabulated, words
 
 DECIMALS = 4  # of metres

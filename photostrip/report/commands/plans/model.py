@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import fixed, metres, micrometres, short, signed
-from photostrip.report.page.parts import Column, Document, Facts, Section, Table, Words, numbered
+from photostrip.report.page.parts import Column, Facts, Section, Table, Words, numbered
 from photostrip.report.page.tables import Shown, number, over_plane, tabulated, words
 
 USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from photostrip.notes import Document
 from photostrip.report.commands.plans.cameras import camera_sections, source_table_sections
 from photostrip.report.commands.plans.displacement import displacement_sections
 from photostrip.report.commands.plans.model import model_sections, source_example_sections
 from photostrip.report.commands.plans.screening import screening_sections
 from photostrip.report.commands.plans.strip import strip_sections
-from photostrip.report.page.parts import Document, Section
+from photostrip.report.page.parts import Section
 
 
 def plan_report(document: Document) -> tuple[str, tuple[Section, ...]]:

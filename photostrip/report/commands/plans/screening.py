@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from photostrip.notes import Document
 from photostrip.report.page.numbers import fixed, short
-from photostrip.report.page.parts import Document, Facts, Section, Table
+from photostrip.report.page.parts import Facts, Section, Table
 from photostrip.report.page.tables import number, tabulated, words
 
 

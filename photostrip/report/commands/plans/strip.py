@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photostrip.notes import counted, listed
+from photostrip.notes import Document, counted, listed
 from photostrip.report.page.numbers import fixed, metres, micrometres, short
-from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 Detected = tuple[float | None, bool | None]  # size in metres, whether anything checks the coordinate

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from photostrip.notes import counted
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
 from photostrip.report.pictures.ground.plan_view import Pair, Plan, middle

@@ -6,7 +6,7 @@ For pictures, not for measuring: distortion is left aside.
 from __future__ import annotations
 
 from photostrip.frozen import NamedTuple
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 from photostrip.report.pictures.ground.plan_view import Grid, Pair
 
 

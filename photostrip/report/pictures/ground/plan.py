@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Container
 
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import short
-from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
 from photostrip.report.pictures.ground.plan_view import Plan, Spot

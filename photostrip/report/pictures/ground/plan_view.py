@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from photostrip.frozen import NamedTuple
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 
 Pair = tuple[float, float]
 EARTH = 6_371_000.0  # m, for degrees of a body whose size is not said

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.frozen import NamedTuple
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 from photostrip.report.pictures.ground.image_plane import cameras_of, frame_of
 from photostrip.report.pictures.ground.plan_view import Grid, Pair, Plan
 

@@ -7,8 +7,7 @@ from collections.abc import Iterable
 from itertools import combinations
 
 from photostrip.frozen import NamedTuple
-from photostrip.notes import counted
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
 from photostrip.report.pictures.ground.plan_view import Pair, Plan, middle

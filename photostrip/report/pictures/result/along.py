@@ -6,9 +6,8 @@ import re
 from collections.abc import Sequence
 
 from photostrip.frozen import NamedTuple
-from photostrip.notes import counted
+from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import short
-from photostrip.report.page.parts import Document
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, Layout, framed, legend, multiples, span, steps
 from photostrip.report.pictures.ground.plan import SHAPES, WORDS

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from statistics import NormalDist, median
 
 from photostrip.frozen import NamedTuple
-from photostrip.notes import counted
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, Layout, Panel, framed, legend, steps
 from photostrip.report.pictures.ground.image_plane import Residual

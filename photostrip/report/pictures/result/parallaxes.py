@@ -6,8 +6,7 @@ import math
 from collections.abc import Sequence
 
 from photostrip.frozen import NamedTuple
-from photostrip.notes import counted
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, Layout, Panel, framed_by_photos, legend
 from photostrip.report.pictures.svg import Picture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from importlib import resources
 
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document
 from photostrip.report.pictures.ground.footprints import footprint_pictures
 from photostrip.report.pictures.ground.plan import plan_picture
 from photostrip.report.pictures.ground.plan_view import plan_of

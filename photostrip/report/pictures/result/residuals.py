@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from photostrip.frozen import NamedTuple
-from photostrip.notes import counted
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, WIDTH
 from photostrip.report.pictures.ground.image_plane import Frame, Residual, cameras_of, frame_of, residuals_of

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from xml.sax.saxutils import escape
 
-from photostrip.notes import counted
-from photostrip.report.page.parts import Document
+from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import (
     LEFT,
