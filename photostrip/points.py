@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import field, fields
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
@@ -134,6 +135,13 @@ class ControlPoints:
     def take(self, rows: Sequence[int] | Numbers | Flags) -> ControlPoints:
         """Points of some rows, by number or by flag, in their order."""
         return take_rows(self, rows, [column.name for column in fields(self)])
+
+
+def concatenated(tables: Sequence[ControlPoints]) -> ControlPoints:
+    """Points of several tables, one after the other."""
+    columns = {column.name: [getattr(table, column.name) for table in tables] for column in fields(ControlPoints)}
+    ids = tuple(chain.from_iterable(columns.pop("ids")))
+    return ControlPoints(ids=ids, **{name: np.concatenate(parts) for name, parts in columns.items()})
 
 
 @dataclass(frozen=True, eq=False)

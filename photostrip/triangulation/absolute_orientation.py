@@ -198,14 +198,14 @@ def lay(
         xyz = similarity(strip)
         if iteration == LAST_AXES_UPDATE and known is None:
             axes = targets.axes(xyz)
-        plain, free = _design(xyz, targets, axes, half)
+        plain, free = design(xyz, targets, axes, half)
         root = _motion(None if reach is None else similarity(reach), xyz.mean(axis=0), half)
         _refuse_deficient(plain, root, xyz, targets, half)  # weights do not decide what is free
         share = np.sqrt(weight[targets.control.use])
         step = np.asarray(np.linalg.lstsq(plain * share[:, None], free * share, rcond=None)[0], float)
         if watch is not None:
             watch(similarity, step)
-        similarity = _corrected(similarity, step, xyz.mean(axis=0), half)
+        similarity = corrected(similarity, step, xyz.mean(axis=0), half)
         if np.abs(step).max() < CONVERGED * half:
             break
     if similarity.rotation[2, 2] < 0:
@@ -325,7 +325,7 @@ def _start_apart(strip: Floats, targets: Targets) -> Similarity:
     return Similarity(scale, rotation, center + np.array([0.0, 0.0, up]) - scale * rotation @ middle)
 
 
-def _design(xyz: Floats, targets: Targets, axes: Floats, half: float) -> tuple[Floats, Floats]:
+def design(xyz: Floats, targets: Targets, axes: Floats, half: float) -> tuple[Floats, Floats]:
     """Design and free terms of one step: shifts, rotations, scale, all in metres at the strip's end."""
     arm = (xyz - xyz.mean(axis=0)) / half
     columns = np.empty((len(xyz), 3, PARAMETERS))
@@ -337,7 +337,7 @@ def _design(xyz: Floats, targets: Targets, axes: Floats, half: float) -> tuple[F
     return columns[used], free[used]
 
 
-def _corrected(similarity: Similarity, step: Floats, center: Floats, half: float) -> Similarity:
+def corrected(similarity: Similarity, step: Floats, center: Floats, half: float) -> Similarity:
     """Compose the similarity with a small one about a centre."""
     turn = from_vector(step[3:6] / half)
     # control that is wrong beyond measure asks for steps that no number holds

@@ -9,6 +9,7 @@ import numpy as np
 from photostrip.notes import Note
 from photostrip.pipeline.results import Bundle
 from photostrip.triangulation.bundle.common_errors import DISTANCE
+from photostrip.triangulation.bundle.normal_equations import defects
 from photostrip.triangulation.bundle.quality import reliability
 
 OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustment
@@ -43,6 +44,8 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
             "accuracy is relative only"
         )
         yield Note("free-network", text)
+    elif loose := defects.weak(solution.prepared, solution.state):
+        yield Note("weak-datum", loose)
     test = bundle.sigma0
     if np.isfinite(test.lower) and not test.passed:
         text = (

@@ -6,67 +6,80 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, median
+from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.geometry.rotation import from_angles
+from photostrip.geometry.rotation import cross_matrix, from_angles, from_vector
 from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.notes import listed
 from photostrip.pipeline.frames import GroundFrames
-from photostrip.pipeline.given_points import cartesian_of
 from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.strips.absolute import middle_frame
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
 from photostrip.triangulation import absolute_orientation
 
 LEAST_TIES = 3
 ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line
 FREE_BASE = 1000.0  # metres: mean length of the bases where nothing gives a scale
-ROLL_WEIGHT = 1e-4  # of the assumption that cameras look down, where nothing else fixes the roll
+DOWN, TURNED = 0.3, 0.01  # radians: standard deviations of cameras that are taken to look down, of given rotations
+STEPS, CLOSE = 20, 1e-6  # of a start on all that is given; of its half length, the last step
+OF_PHOTO = "of photo {}"  # names a camera among given points
 
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known on the ground, all in the project's Cartesian frame."""
+    """What is known on the ground; Cartesian coordinates are those of the project's Cartesian frame."""
 
     control: ControlPoints
-    frames: tuple[GroundFrame, ...]
+    frames: tuple[GroundFrame, ...]  # of the control lists, of camera positions and of orientations
     output: GroundFrame  # frame of the result
-    centers: dict[str, Floats]  # known positions of antennas or perspective centres, by photo
-    rotations: dict[str, Floats]  # known rotations, photo to Cartesian frame, by photo
+    cameras: ControlPoints  # known antennas or perspective centres, as ``OF_PHOTO`` names them
+    orientations: dict[str, tuple[Floats, Floats]]  # known centres and rotations, Cartesian, by photo
     # (3,): antenna from the perspective centre along the image axes, metres, for photos without a known rotation
     lever: Floats
 
 
 def known_of(inputs: Inputs, control: ControlPoints, ground: GroundFrames) -> Known:
-    """Collect what is known on the ground: control, orientations, camera positions with all three coordinates."""
-    centers: dict[str, Floats] = {}
-    rotations: dict[str, Floats] = {}
-    lever = np.zeros(3)
-    positions, orientations = inputs.positions, inputs.orientations
+    """Collect what is known on the ground: control, orientations, camera positions."""
+    orientations: dict[str, tuple[Floats, Floats]] = {}
+    frames, cameras = list(ground.control), [control.take(np.zeros(0, np.intp))]
+    if inputs.orientations is not None and ground.orientations is not None:
+        given, frame = inputs.orientations, ground.orientations
+        cameras.append(_as_control(given.photos, given.enu, np.ones((len(given.photos), 3), bool), len(frames)))
+        frames.append(frame)
+        centers = frame.cartesian_from_ground(given.enu, ids=cameras[-1].ids)
+        turned = frame.axes_at(centers).transpose(0, 2, 1) @ from_angles(given.angles, given.system)
+        orientations = dict(zip(given.photos, zip(centers, turned, strict=True), strict=True))
+    positions = inputs.positions
     if positions is not None and ground.positions is not None:
-        whole = np.asarray(positions.use.all(axis=1), bool)
-        names = [photo for photo, yes in zip(positions.photos, whole, strict=True) if yes]
-        found = ground.positions.cartesian_from_ground(positions.enu[whole], ids=[f"of photo {name}" for name in names])
-        centers = dict(zip(names, found, strict=True))
-        lever = np.array(positions.lever_arm)
-    if orientations is not None and ground.orientations is not None:
-        ids = [f"of photo {name}" for name in orientations.photos]
-        found = ground.orientations.cartesian_from_ground(orientations.enu, ids=ids)
-        turned = ground.orientations.axes_at(found).transpose(0, 2, 1) @ from_angles(
-            orientations.angles, orientations.system
-        )
-        rotations = dict(zip(orientations.photos, turned, strict=True))
-        centers |= dict(zip(orientations.photos, found, strict=True))
+        others = [row for row, photo in enumerate(positions.photos) if photo not in orientations]
+        every = _as_control(positions.photos, positions.enu, positions.use, len(frames))
+        cameras.append(every.take(np.array(others, np.intp)))
+        frames.append(ground.positions)
     return Known(
         control=control,
-        frames=ground.control,
+        frames=tuple(frames),
         output=ground.output,
-        centers=centers,
-        rotations=rotations,
-        lever=lever,
+        cameras=concatenated(cameras),
+        orientations=orientations,
+        lever=np.zeros(3) if positions is None else np.array(positions.lever_arm),
     )
+
+
+def _as_control(photos: Sequence[str], enu: Floats, use: Flags, frame: int) -> ControlPoints:
+    n = len(photos)
+    ids = tuple(OF_PHOTO.format(photo) for photo in photos)
+    unused = np.zeros(n, bool)
+    return ControlPoints(ids=ids, enu=enu, use=use, check=unused, sigma=np.ones((n, 3)), frame=np.full(n, frame))
+
+
+class Level(NamedTuple):
+    """What is taken to point up in a block, however little the control says of it."""
+
+    up: Floats  # (3,): unit vector
+    sigma: float  # radians
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,34 +124,78 @@ def datum(
     names = tuple(photo for number in group.members for photo in stages[number].strip.photos)
     rows = locate(known.control.ids, observations.point_ids)
     inside = (rows >= 0) & np.isfinite(group.points[rows, 0])
-    control, rows = known.control.take(inside), rows[inside]
-    cameras = [name for name in names if name in known.centers]
+    control, xyz = known.control.take(inside), group.points[rows[inside]]
+    cameras = known.cameras.take(np.isin(known.cameras.ids, [OF_PHOTO.format(name) for name in names]))
     refusal: GeometryError | None = None
     if len(control):
         try:
-            return _by_control(group.points[rows], group.points, control, known), False
+            return _on_given(xyz, control, known, group.points), False
         except GeometryError as error:
             refusal = error
-    if len(cameras) >= 2:
-        return _by_cameras(stages, group, (control, rows), known), False
-    if refusal is not None or not alone or known.centers or known.output.kind != "local":
+    if len(cameras):
+        try:
+            return _with_cameras(stages, group, (xyz, control), cameras, known), False
+        except GeometryError as error:
+            refusal = error
+    if refusal is not None or not alone or len(known.cameras) or known.output.kind != "local":
         what = (
             f"strip {stages[group.members[0]].strip.id}" if len(group.members) == 1 else f"{len(group.members)} strips"
         )
-        message = f"{what}: neither control nor camera positions in x, y and z nor tie points connect it to the ground"
+        message = f"{what}: neither control nor camera positions nor tie points connect it to the ground"
         if refusal is not None:
             message += f" ({refusal})"
         raise GeometryError(message, photos=names, code="strip-not-tied") from refusal
     return _of_its_own(stages, group), True
 
 
-def _by_control(xyz: Floats, every: Floats, control: ControlPoints, known: Known) -> Similarity:
-    """Similarity of a block to its control, plan and height points included."""
-    frame = middle_frame(control, known.frames)
-    targets = absolute_orientation.Targets(control, known.frames, frame)
-    found = absolute_orientation.lay(xyz, targets, control.use.astype(float), every[np.isfinite(every[:, 0])])
-    inner = found.similarity
+def _on_given(xyz: Floats, given: ControlPoints, known: Known, of_block: Floats | Level) -> Similarity:
+    """Similarity of a block to what is given of it, plan and height points included.
+
+    of_block: all its points, to judge whether they are determined; or what is level in it, and they are not judged.
+    """
+    frame = middle_frame(given, known.frames)
+    targets = absolute_orientation.Targets(given, known.frames, frame)
+    if isinstance(of_block, Level):
+        inner = _levelled(xyz, targets, of_block)
+    else:
+        reach = of_block[np.isfinite(of_block[:, 0])]
+        inner = absolute_orientation.lay(xyz, targets, given.use.astype(float), reach).similarity
     return Similarity(inner.scale, frame.axes @ inner.rotation, frame.cartesian_from_intermediate(inner.shift))
+
+
+def _levelled(strip: Floats, targets: absolute_orientation.Targets, level: Level) -> Similarity:
+    """Similarity of a strip to its targets, and level where they leave that open; what else they leave open stays.
+
+    It starts with what is level, the plan of four parameters, and the mean of the heights.
+    Raises GeometryError where the plan gives neither scale nor azimuth.
+    """
+    plan, height = targets.control.use[:, 0], targets.control.use[:, 2]
+    upright = from_vector(np.cross(level.up, [0.0, 0.0, 1.0]))  # nearly: the sine in the place of the angle
+    z, t = ((xyz[plan, 0] + 1j * xyz[plan, 1]) for xyz in (strip @ upright.T, targets.of(np.zeros_like(strip))))
+    dz = z - z.mean()
+    if np.abs(dz).max() <= ON_A_LINE * np.abs(strip).max():
+        names = listed([name for name, used in zip(targets.control.ids, plan, strict=True) if used])
+        message = f"plan coordinates are given in one place only, {names}: scale and azimuth stay free"
+        raise GeometryError(message, code="control-deficient")
+    turn = (dz.conj() @ (t - t.mean())) / (dz.conj() @ dz).real
+    scale = float(abs(turn))
+    rotation = from_vector([0.0, 0.0, float(np.angle(turn))]) @ upright
+    shift = t.mean() - turn * z.mean()
+    found = Similarity(scale, rotation, np.array([shift.real, shift.imag, 0.0]))
+    rise = (targets.of(found(strip)) - found(strip))[height, 2]
+    found = replace(found, shift=found.shift + np.array([0.0, 0.0, rise.mean() if len(rise) else 0.0]))
+    half = float(np.ptp(found(strip), axis=0).max()) / 2
+    for _ in range(STEPS):
+        xyz = found(strip)
+        rows, free = absolute_orientation.design(xyz, targets, targets.axes(xyz), half)
+        up, weight = found.rotation @ level.up, float(np.sqrt((free**2).mean())) / (half * level.sigma)
+        rows = np.concatenate([rows, weight * np.pad(-cross_matrix(up)[:2], ((0, 0), (3, 1)))])
+        free = np.concatenate([free, -weight * half * up[:2]])
+        step = np.asarray(np.linalg.lstsq(rows, free, rcond=absolute_orientation.RANK_LIMIT)[0], float)
+        found = absolute_orientation.corrected(found, step, xyz.mean(axis=0), half)
+        if np.abs(step).max() < CLOSE * half:
+            break
+    return found
 
 
 class _OrientedPhotos(NamedTuple):
@@ -157,48 +214,37 @@ def _oriented(stages: Sequence[FormedPhotos], group: JoinedStrips) -> _OrientedP
     return _OrientedPhotos(tuple(names), np.concatenate(centers), np.concatenate(rotations))
 
 
-def _by_cameras(
-    stages: Sequence[FormedPhotos], group: JoinedStrips, given: tuple[ControlPoints, Numbers], known: Known
+def _with_cameras(
+    stages: Sequence[FormedPhotos],
+    group: JoinedStrips,
+    on_ground: tuple[Floats, ControlPoints],
+    cameras: ControlPoints,
+    known: Known,
 ) -> Similarity:
-    """Similarity of a block to known positions and orientations of its cameras, and to full control points.
+    """Similarity of a block to its control, to known positions and orientations of its cameras.
 
-    Where all of them lie on one line, cameras are taken to look down: that is a start, the adjustment decides.
+    Known rotations say what is level; without any its cameras are taken to look down, more or less: that is a start,
+    the adjustment decides what is determined.
     """
     names, centers, rotations = _oriented(stages, group)
-    rows = np.flatnonzero([name in known.centers for name in names])
-    source, target = centers[rows], np.array([known.centers[names[row]] for row in rows])
-    control, numbers = given
-    full = np.asarray(control.use.all(axis=1), bool)
-    source = np.concatenate([source, group.points[numbers[full]]])
-    target = np.concatenate([target, cartesian_of(control.take(full), known.frames)])
-    weight = np.ones(len(source))
-    scale = np.linalg.norm(target - target.mean(axis=0)) / np.linalg.norm(source - source.mean(axis=0))
-    arm = _depth(stages, group)
-    turned = [(row, known.rotations[names[row]]) for row in rows if names[row] in known.rotations]
-    for axis in range(3):
-        if turned:
-            index = np.array([row for row, _ in turned], np.intp)
-            ends = np.array([known.centers[names[row]] + scale * arm * turn[:, axis] for row, turn in turned])
-            source = np.concatenate([source, centers[index] + arm * rotations[index][:, :, axis]])
-            target = np.concatenate([target, ends])
-            weight = np.concatenate([weight, np.ones(len(index))])
-    if collinearity(target, weight) < ON_A_LINE or len(target) < LEAST_TIES:
-        up = known.output.level_axes_at(target[: len(rows)])[:, 2]
-        source = np.concatenate([source, centers[rows] - arm * rotations[rows][:, :, 2]])
-        target = np.concatenate([target, target[: len(rows)] - scale * arm * up])
-        weight = np.concatenate([weight, np.full(len(rows), ROLL_WEIGHT)])
-    found = Similarity.from_points(source, target, weight)
-    if known.lever.any():  # the rotations are known now: from antennas to perspective centres
-        antenna = np.array([names[row] not in known.rotations for row in rows])
-        target[: len(rows)] -= np.where(antenna[:, None], (found.rotation @ rotations[rows]) @ known.lever, 0.0)
-        found = Similarity.from_points(source, target, weight)
+    rows = locate(cameras.ids, [OF_PHOTO.format(name) for name in names])
+    turned = [row for row in rows.tolist() if names[row] in known.orientations]
+    if turned:
+        given = [known.orientations[names[row]] for row in turned]
+        ups = known.output.level_axes_at(np.array([center for center, _ in given]))[:, 2]
+        up = sum(rotations[row] @ turn.T @ above for row, (_, turn), above in zip(turned, given, ups, strict=True))
+    else:
+        up = rotations[:, :, 2].sum(axis=0)
+    up = np.asarray(up / np.linalg.norm(up), float)
+    level = Level(up, TURNED if turned else DOWN)
+    xyz, control = on_ground
+    given_of_all = concatenated([control, cameras])
+    found = _on_given(np.concatenate([xyz, centers[rows]]), given_of_all, known, level)
+    if known.lever.any():  # the scale is known now: from perspective centres to antennas
+        antenna = np.array([names[row] not in known.orientations for row in rows])
+        arms = np.where(antenna[:, None], rotations[rows] @ (known.lever / found.scale), 0.0)
+        found = _on_given(np.concatenate([xyz, centers[rows] + arms]), given_of_all, known, level)
     return found
-
-
-def _depth(stages: Sequence[FormedPhotos], group: JoinedStrips) -> float:
-    """Distance from a camera to the ground, in the unit of the block."""
-    formed = stages[group.members[0]].formed
-    return median(np.linalg.norm(formed.xyz - formed.xyz.mean(axis=0), axis=1))
 
 
 def _of_its_own(stages: Sequence[FormedPhotos], group: JoinedStrips) -> Similarity:

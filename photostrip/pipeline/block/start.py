@@ -31,7 +31,7 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import BlockStart, StripResult
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
 from photostrip.triangulation.plausibility.photos.tied_strips import odd_ties
 from photostrip.triangulation.resection.closed_form import approximate
 from photostrip.triangulation.resection.collinearity import KnownPhotos
@@ -125,15 +125,15 @@ class _Block:
         others = known.control.take(np.array([name not in given for name in known.control.ids], bool))
         scale = np.linalg.norm(np.ptp(cartesian, axis=0)) / np.linalg.norm(np.ptp(stage.formed.xyz, axis=0))
         sigma = max(1e-3, 1e-5 * float(scale * np.linalg.norm(np.ptp(stage.formed.xyz, axis=0))))
-        count = len(chosen)
-        control = ControlPoints(
-            ids=(*others.ids, *ids),
-            enu=np.concatenate([others.enu, ground]),
-            use=np.concatenate([others.use, np.ones((count, 3), bool)]),
-            check=np.concatenate([others.check, np.zeros(count, bool)]),
-            sigma=np.concatenate([others.sigma, np.full((count, 3), sigma)]),
-            frame=np.concatenate([others.frame, np.full(count, len(known.frames), np.intp)]),
+        of_ties = ControlPoints(
+            ids=ids,
+            enu=ground,
+            use=np.ones(ground.shape, bool),
+            check=np.zeros(len(ids), bool),
+            sigma=np.full(ground.shape, sigma),
+            frame=np.full(len(ids), len(known.frames), np.intp),
         )
+        control = concatenated([others, of_ties])
         return adjust_formed(stage, control, (*known.frames, known.output), self.tied)
 
     def place(self, stages: Sequence[FormedPhotos], group: JoinedStrips) -> bool:
@@ -235,8 +235,8 @@ def _single(photo: str, focal: float, points: Floats, observations: PhotoPoints,
     number = observations.photo_ids.index(photo)
     rows = np.flatnonzero((observations.photo == number) & np.isfinite(points[observations.point, 0]))
     xy, xyz = observations.xy[rows], points[observations.point[rows]]
-    if photo in known.centers and photo in known.rotations:
-        given = known.centers[photo], known.rotations[photo]
+    if photo in known.orientations:
+        given = known.orientations[photo]
         found = _resected(xy, xyz, focal, given)
         if found.solved:
             return found

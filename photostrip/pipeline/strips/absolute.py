@@ -290,7 +290,7 @@ def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> Inter
             enu[~chosen.use[rows, 2], 2] = mean
             cartesian[rows] = frame.cartesian_from_ground(enu, ids=[chosen.ids[i] for i in np.flatnonzero(rows)])
     if not len(chosen):
-        msg = "no control point gives a plan position"
+        msg = "nothing that is given has a plan position"
         raise GeometryError(msg, points=control.ids, code="too-little-control")
     if frames[0].kind == "local":
         return IntermediateFrame.at_local_centre(cartesian, 0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
-from photostrip.triangulation.bundle.parameters import PreparedProblem
+from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,11 @@ class BundleSolution:
     free: bool  # true when the datum came from inner constraints on the points: no control, no positions
     steps: tuple[IterationStep, ...]  # the way from the start, one entry for each step that was taken or refused
     prepared: PreparedProblem  # the problem as it was laid out; spares the precision that work
+
+    @property
+    def state(self) -> Parameters:
+        """The values of all parameters, laid out for the prepared problem."""
+        return parameters_from(self.prepared, self.centers, self.rotations, self.points, self.common)
 
     @property
     def sigma0(self) -> float:

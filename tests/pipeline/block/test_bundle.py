@@ -187,7 +187,7 @@ UNDETERMINED: dict[str, tuple[Spec, Callable[[Simulation], Inputs]]] = {
         lambda s: replace(with_control(s, []), positions=positions(s)),
     ),
     "neither control nor camera positions": (BLOCK, lambda s: with_control(s, corners(s)[:2])),
-    "nor camera positions in x, y and z": (
+    "nothing that is given has a plan position": (
         BLOCK,
         lambda s: replace(with_control(s, []), positions=heights(positions(s))),
     ),

@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct, median
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import similarity_derivatives
@@ -17,7 +17,7 @@ from photostrip.triangulation.bundle.normal_equations.reduced import Reduced, co
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
-from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
+from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
 
 PARALLEL = 1e-10  # square of the sine of the angle between rays
 LOOSE = 0.1  # standard deviation, as a part of the size of the network, from which a datum parameter is not determined
@@ -25,7 +25,7 @@ ALIKE = 0.95  # part of a named movement that lies among the undetermined ones
 ALONG = 0.94  # cosine of 20 degrees: a line counts as the flight line
 LEFT_OVER = 1e-11  # part of its information that the other parameters leave a common parameter
 STRAIGHT = 1e-3  # breadth of control on one line, as part of its length
-NARROW = 0.2  # rms distance of what is given from one line over that of all points, told where nothing converges
+GROWN = 4.0  # times the standard deviation of a given coordinate, rms of the points, from which a movement is told
 FAR_OFF = 10.0  # standard deviations of a control coordinate that is told then
 ITERATIONS = 3
 MOST_FAILED = 8  # adjustments of a search that may fail: each takes six times as long as one that converges
@@ -78,6 +78,16 @@ class Held:
     # (7, 7): information on shift (in units of its size), rotation about the mean of what is given and scale
     normal: Floats
     control: Floats  # (c, 3): positions that are given at all, of points and photos
+    motion: Floats  # (7, 7): mean square motion of points and photos by the same parameters, square metres
+    sigma: float  # median of the standard deviations of the given coordinates, metres
+
+    @property
+    def weakest(self) -> tuple[float, Floats]:
+        """The movement that is held least: standard deviation of points and photos by it, rms, metres; and itself."""
+        root = np.linalg.inv(np.linalg.cholesky(self.motion))
+        values, vectors = np.linalg.eigh(root @ self.normal @ root.T)
+        move = root.T @ vectors[:, 0]
+        return float(max(values[0], TINY) ** -0.5), move / np.linalg.norm(move)
 
 
 def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
@@ -93,29 +103,37 @@ def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
         loose = vectors[:, values < LOOSE**-2.0]
         if loose.shape[1]:
             names = [prepared.problem.photo_name(number) for number in photos.tolist()]
+            reason = _reason(held, unknown_errors=bool(prepared.problem.positions.offset_sigma.any()))
             whole = "" if len(parts) == 1 else f" of {named('photo', names)}"
-            message = f"what is given does not determine {_moves(state, held, loose)}{whole}: {_reason(held)}"
+            message = f"what is given does not determine {_moves(state, held, loose)}{whole}: {reason}"
             raise GeometryError(message, photos=() if len(parts) == 1 else names, code="bundle-rank")
+
+
+def weak(prepared: PreparedProblem, state: Parameters) -> str:
+    """Name the movement of the network that what is given hardly determines, with its size; nothing without one."""
+    for held in (_held(prepared, state, photos) for photos in _parts(prepared)):
+        metres, move = held.weakest
+        if metres > GROWN * held.sigma:
+            return (
+                f"what is given hardly determines {_moves(state, held, move[:, None])}: the points move by "
+                f"{metres:.2g} m (standard deviation, rms) with it, and a given coordinate has {held.sigma:.2g} m"
+            )
+    return ""
 
 
 def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> GeometryError:
     """Say that an adjustment does not converge (``bundle-diverged``), and what speaks against it.
 
-    That is control nearly on one line, whose errors turn the block about it; else the control that is farthest off.
+    That is a movement that is hardly determined; else the control that is farthest off.
     """
     message = f"the bundle adjustment did not converge in {counted(steps, 'step')}"
-    control = prepared.problem.control
-    given = np.concatenate([_held(prepared, state, photos).control for photos in _parts(prepared)])
-    length, breadth = _extent(given)
-    points = prepared.problem.start.points
-    _, of_points = _extent(points[np.isfinite(points).all(axis=1)])
+    control, start = prepared.problem.control, prepared.problem.start
+    begun = parameters_from(prepared, start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
+    loose = "" if datum.is_free(prepared.problem) else weak(prepared, begun)
     with np.errstate(invalid="ignore"):
         off = np.nan_to_num(np.abs(control_residuals(prepared, state)) / control.sigma)
-    if len(given) > 1 and breadth < NARROW * of_points:
-        message += (
-            f": all control and camera positions lie within {breadth:.0f} m (rms) of a line of {length:.0f} m and "
-            "hardly determine the rotation about it; give control beside the line"
-        )
+    if loose:
+        message += f": {loose}"
     elif off.max(initial=0.0) > FAR_OFF:
         row, axis = np.unravel_index(int(off.argmax()), off.shape)
         point = prepared.problem.point_name(int(control.point[row]))
@@ -138,15 +156,6 @@ def refuse_endless(problem: BundleProblem, rejected: Sequence[int], adjustments:
     if worst:
         message += f"; most were rejected on {named('photo', worst)}: were points there named wrongly?"
     raise GeometryError(message, photos=worst, code="search-ended")
-
-
-def _extent(places: Floats) -> tuple[float, float]:
-    """Length of given positions along the line that fits them best, and rms distance from it."""
-    if len(places) < 2:
-        return 0.0, 0.0
-    middle = places - places.mean(axis=0)
-    _, spread, axes = np.linalg.svd(middle, full_matrices=False)
-    return float(np.ptp(middle @ axes[0])), float(np.sqrt((spread[1:] ** 2).sum() / len(places)))
 
 
 def _parts(prepared: PreparedProblem) -> list[Numbers]:
@@ -186,7 +195,16 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     of_photos = datum.photo_generators(prepared, state, origin)[prepared.structure.rank] * units
     for linear in (positions, attitudes):
         normal += _information(linear, of_photos, inside, prepared)
-    return Held(photos, normal, places)
+    motions = similarity_derivatives(everything, origin).reshape(-1, datum.DEFECT) * units
+    sigmas = np.concatenate([control.sigma[given].ravel(), problem.positions.sigma[at].ravel()])
+    sigmas = sigmas[np.isfinite(sigmas)]
+    return Held(
+        photos=photos,
+        normal=normal,
+        control=places,
+        motion=motions.T @ motions / len(everything) + TINY * radius**2 * np.eye(datum.DEFECT),
+        sigma=median(sigmas) if len(sigmas) else np.inf,
+    )
 
 
 def _information(linear: LinearisedOrientations, moves: Floats, inside: Flags, prepared: PreparedProblem) -> Floats:
@@ -218,8 +236,9 @@ def _moves(state: Parameters, held: Held, loose: Floats) -> str:
         *((name, np.concatenate([zero, axis, [0.0]])) for name, axis in turns.items()),
         ("scale", np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])),
     ]
-    found = [name for name, move in candidates if np.linalg.norm(loose.T @ move) > ALIKE]
-    return ", ".join(dict.fromkeys(found)) or f"{loose.shape[1]} of the seven parameters of shift, rotation and scale"
+    parts = [float(np.linalg.norm(loose.T @ move)) for _, move in candidates]
+    found = [name for (name, _), part in zip(candidates, parts, strict=True) if part > ALIKE]
+    return ", ".join(dict.fromkeys(found)) or candidates[int(np.argmax(parts))][0]
 
 
 def _flight_axes(state: Parameters, photos: Numbers) -> Floats:
@@ -242,14 +261,14 @@ def _line(control: Floats) -> Floats | None:
     return axes[0] if straight else None
 
 
-def _reason(held: Held) -> str:
+def _reason(held: Held, *, unknown_errors: bool) -> str:
     if not len(held.control):
         return "no control and no camera positions"
     if len(np.unique(held.control, axis=0)) == 1:
         return "one given position only"
     if _line(held.control) is not None:
-        return "all control on one line"
-    return "too few of its coordinates are given"
+        return "all of it lies on one line"
+    return "too few coordinates are given" + (", and unknown errors stand for some of them" if unknown_errors else "")
 
 
 def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats | None) -> NoReturn:

@@ -21,7 +21,7 @@ from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Red
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS, by_photo, by_point
 from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
 from photostrip.triangulation.bundle.observations.ray_batches import Batch
-from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
+from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 
@@ -104,7 +104,7 @@ class Factored(NamedTuple):
 def at_solution(solution: BundleSolution) -> Factored:
     """Factor the reduced normal equations at the solution."""
     prepared = solution.prepared
-    state = parameters_from(prepared, solution.centers, solution.rotations, solution.points, solution.common)
+    state = solution.state
     reduced = reduce(prepared, state)
     blocks = reduced.blocks[prepared.structure.diagonal]
     band = factored(prepared, reduced, datum.anchor(prepared, state, blocks) if solution.free else None)

@@ -51,6 +51,8 @@ def test_the_flight_of_one_photo_is_its_x_axis() -> None:
 )
 def test_a_line_of_control_within_20_degrees_of_an_axis_has_its_name(degrees: float, name: str) -> None:
     line = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0.0])
-    held = defects.Held(np.arange(5), np.zeros((7, 7)), np.arange(3)[:, None] * 1000.0 * line)
+    none = np.zeros((7, 7))
+    places = np.arange(3)[:, None] * 1000.0 * line
+    held = defects.Held(photos=np.arange(5), normal=none, control=places, motion=none, sigma=1.0)
     loose = np.concatenate([np.zeros(3), line, [0.0]])[:, None]
     assert defects._moves(state(flown(0.0)), held, loose).split(", ")[0] == name
