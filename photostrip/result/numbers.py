@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from math import isfinite
 from typing import Any
 
@@ -54,8 +55,8 @@ class RoundedColumn(Sequence[Plain]):
         return RoundedColumn(self.values[place]) if isinstance(place, slice) else plain(self.values[place])
 
     def __iter__(self) -> Iterator[Plain]:
-        for start in range(0, len(self), AT_ONCE):
-            yield from plain(self.values[start : start + AT_ONCE])
+        parts = (plain(self.values[start : start + AT_ONCE]) for start in range(0, len(self), AT_ONCE))
+        return chain.from_iterable(parts)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:  # noqa: FBT001 (numpy asks so)
         return np.asarray(self.values, dtype, copy=copy)

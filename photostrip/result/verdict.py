@@ -33,6 +33,7 @@ NAMED = 3  # pairs, photos, findings or notes of one kind that are named
 
 def verdict_of(document: Document) -> Document:
     """Return status, accuracy in a sentence and what to look at, from a document that has no verdict yet."""
+    document = {**document, "control": list(document["control"])}  # gone through many times
     errors = list(_findings(document, "error"))
     failed = [*_tolerances(document), *errors]
     look_at = [

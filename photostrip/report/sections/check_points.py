@@ -10,7 +10,7 @@ from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
 from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
 from photostrip.report.sections.points import AXES, DIFFERENCES, IDS_NAMED, given_table, largest
-from photostrip.report.sections.strip import ALL_SHOWN, worst_first
+from photostrip.report.sections.strip import ALL_SHOWN, column_of, worst_first
 
 PARTS = "plan", "height"
 UNKNOWN = dict.fromkeys(("plan", "height", "p_plan", "p_height", "sigma_x", "sigma_y", "sigma_z"))
@@ -48,10 +48,11 @@ def _tested(document: Document, given: Sequence[Document], *, everything: bool, 
         given, lambda row: _unlikely(tested.get(row["id"], UNKNOWN)), where, everything=everything, most=most
     )
     names = {row["id"] for row in worst}
-    points = {row["id"]: row for row in document["points"] if row["id"] in names}
+    points = document["points"]
+    places = {point: place for place, point in enumerate(column_of(points, "id")) if point in names}
     shown = []
     for row in worst:
-        point, z = points.get(row["id"], UNKNOWN), tested.get(row["id"], UNKNOWN)
+        point, z = points[places[row["id"]]] if row["id"] in places else UNKNOWN, tested.get(row["id"], UNKNOWN)
         sigma = {key: point[key] for key in ("sigma_x", "sigma_y", "sigma_z")}
         likely = {"z_plan": z["plan"], "z_height": z["height"], "p_plan": z["p_plan"], "p_height": z["p_height"]}
         shown.append({**row, **sigma, **likely})

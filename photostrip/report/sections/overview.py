@@ -23,7 +23,15 @@ from photostrip.report.sections.points import (
     standing_rejections,
 )
 from photostrip.report.sections.project import adjustment_of, camera_line, counts_rows, interior_line
-from photostrip.report.sections.strip import DIRECTIONS, GROUND_AXES, degree_of, elsewhere, not_taken, photos_of
+from photostrip.report.sections.strip import (
+    DIRECTIONS,
+    GROUND_AXES,
+    column_of,
+    degree_of,
+    elsewhere,
+    not_taken,
+    photos_of,
+)
 from photostrip.report.sections.verdict import verdict_section
 
 Rows = Iterator[tuple[str, str]]
@@ -38,6 +46,7 @@ AROUND = 4  # lines of the title and of the end
 
 def overview(document: Document, width: int) -> tuple[Section, ...]:
     """Return the sections of the short report for a page of a width."""
+    document = {**document, "control": list(document["control"])}  # gone through many times
     for most in MOST_OF_A_KIND:
         sections = _overview(document, most)
         if len(lay_out("", sections, width)) <= MOST_LINES - AROUND:
@@ -237,10 +246,11 @@ def _likewise(rest: Sequence[Document]) -> str:
     return f" (and {len(rest)} more like this: --section notes)"
 
 
-def _worst_of(rows: Iterable[Document], key: str, most: int) -> list[Document]:
+def _worst_of(rows: Sequence[Document], key: str, most: int) -> list[Document]:
     """Return the rows with the largest values of a key, where it is known."""
-    known = (row for row in rows if row.get(key) is not None)
-    return sorted(known, key=lambda row: float(row[key]), reverse=True)[:most]
+    values = column_of(rows, key)
+    known = [place for place, value in enumerate(values) if value is not None]
+    return [rows[place] for place in sorted(known, key=lambda place: float(values[place]), reverse=True)[:most]]
 
 
 def _rejection(row: Document) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 from photostrip.notes import Document, counted
 from photostrip.report.page.angles import AngleUnit, angle_unit
@@ -39,6 +40,12 @@ def worst_first(
         return list(rows), ""
     chosen = sorted(rows, key=badness, reverse=True)[: min(most, WORST_SHOWN)]
     return chosen, f"worst first; {elsewhere(len(rows) - len(chosen), *where)}"
+
+
+def column_of(rows: Sequence[Document], key: str) -> list[Any]:
+    """Return the values of a key; from records that are kept as columns without making them."""
+    columns = getattr(rows, "columns", None)
+    return [row.get(key) for row in rows] if columns is None else list(columns[key])
 
 
 def elsewhere(rest: int, what: str, section: str, block: str) -> str:
