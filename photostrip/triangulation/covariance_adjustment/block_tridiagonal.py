@@ -1,24 +1,16 @@
-"""Symmetric block-tridiagonal systems that are not positive definite: solution, and the inverse near the diagonal.
+"""Symmetric block-tridiagonal systems that are not positive definite: solution, and the inverse on the diagonal.
 
 Source: derived; block elimination from the first block on, and the backward recursion for the inverse.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import NamedTuple, dataclass
-
-
-class InverseRow(NamedTuple):
-    """Blocks of one row of the inverse, (b, b) each, 0 beyond the end."""
-
-    diagonal: Floats
-    following: Floats  # the next block, and
-    after: Floats  # the one after that
+from photostrip.frozen import dataclass
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,18 +30,13 @@ class Factors:
             result[number] -= self.shares[number] @ result[number + 1]
         return result
 
-    def inverse(self) -> Iterator[tuple[int, InverseRow]]:
-        """Yield the rows of blocks of the inverse Z, from the last to the first.
-
-        Z(i,k) = -P_i^-1 B_i Z(i+1,k) for k > i, Z(i,i) = P_i^-1 - Z(i,i+1) (P_i^-1 B_i)^T.
-        """
-        zero = np.zeros_like(self.inverses[0])
-        diagonal, beside = zero, zero
-        for number in range(len(self.inverses) - 1, -1, -1):
-            share = self.shares[number]
-            following, after = -(share @ diagonal), -(share @ beside)
-            diagonal, beside = self.inverses[number] - following @ share.T, following
-            yield number, InverseRow(diagonal, following, after)
+    @cached_property
+    def diagonal_of_inverse(self) -> Floats:
+        """Blocks (n, b, b) on the diagonal of the inverse: Z_i = P_i^-1 + P_i^-1 B_i Z_(i+1) (P_i^-1 B_i)^T."""
+        result = self.inverses.copy()
+        for number in range(len(result) - 2, -1, -1):
+            result[number] += self.shares[number] @ result[number + 1] @ self.shares[number].T
+        return result
 
 
 def eliminate(diagonal: Floats, beside: Floats) -> Factors:

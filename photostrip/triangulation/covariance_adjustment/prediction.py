@@ -16,7 +16,6 @@ from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import gamma_cdf, normal_quantile
 from photostrip.triangulation.covariance_adjustment import system
-from photostrip.triangulation.covariance_adjustment.block_tridiagonal import InverseRow
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of
 from photostrip.triangulation.error_propagation import joint_covariances
 from photostrip.triangulation.error_propagation.covariances import NearImages, along_strip, local_covariances
@@ -73,8 +72,9 @@ def predict(found: system.System, tables: Sequence[ErrorRows]) -> tuple[list[Pre
     """Predict the errors of points and photos, and say how well they are known.
 
     With b the column of a row: its covariances with the conditions and its coefficients of the unknowns, e = b^T
-    [lambda; y] and Cov = C - b^T K^-1 b. A row has to do with its own block and the two beside it, so that only the
-    inverse near the diagonal is needed.
+    [lambda; y] and Cov = C - b^T K^-1 b. A row has to do with its own block and the two beside it. With K eliminated
+    from the first block on, b becomes r in these, and b^T K^-1 b = r1^T P1^-1 r1 + r2^T P2^-1 r2 + r3^T Z3 r3: the
+    block of the inverse on the diagonal says what all later ones add.
 
     Returns cofactors: (n,), of the correlates of the conditions.
     """
@@ -82,32 +82,12 @@ def predict(found: system.System, tables: Sequence[ErrorRows]) -> tuple[list[Pre
     columns = [_Columns.of(found, rows.take(order)) for rows, order in zip(tables, orders, strict=True)]
     predicted = [Predicted.empty(rows) for rows in tables]
     layout = found.layout
-    cofactors = np.zeros(len(layout.block))
-    ends = np.searchsorted(layout.block, np.arange(layout.blocks + 1))
-    zero = np.zeros((layout.height, layout.height))
-    none = InverseRow(zero, zero, zero)
-
-    made = [each.blocks(range(layout.blocks - 1, -1, -1)) for each in columns]
-    around = np.empty((3, layout.height, 3, layout.height))  # the inverse of a block and its neighbours
-
-    def visit(before: InverseRow, middle: InverseRow, after: InverseRow) -> None:
-        around[0, :, 0], around[1, :, 1], around[2, :, 2] = before.diagonal, middle.diagonal, after.diagonal
-        around[0, :, 1], around[1, :, 2], around[0, :, 2] = before.following, middle.following, before.after
-        around[1, :, 0], around[2, :, 1], around[2, :, 0] = before.following.T, middle.following.T, before.after.T
-        flat = around.reshape(3 * layout.height, -1)
-        for each, blocks, result in zip(columns, made, predicted, strict=True):
-            each.predict(next(blocks), flat, result)
-
-    middle = after = none
-    for number, before in found.factors.inverse():
-        position = layout.position[ends[number] : ends[number + 1]]
-        cofactors[ends[number] : ends[number + 1]] = before.diagonal[position, position]
-        if number + 1 < layout.blocks:
-            visit(before, middle, after)
-        middle, after = before, middle
-    visit(none, middle, after)
+    for each, result in zip(columns, predicted, strict=True):
+        for block in each.blocks(range(layout.blocks)):
+            each.predict(block, result)
+    cofactors = found.factors.diagonal_of_inverse[layout.block, layout.position, layout.position]
     for each, result, order in zip(columns, predicted, orders, strict=True):
-        formed = local_covariances(found.errors, each.rows, NearImages.of(found.errors, each.rows))
+        formed = local_covariances(found.errors, each.rows, each.near)
         back = np.argsort(order, kind="stable")
         result.covariance[:] = (formed - result.covariance)[back]
         result.error[:] = result.error[back]
@@ -143,6 +123,7 @@ class _Columns:
 
     found: system.System
     rows: ErrorRows
+    near: NearImages  # what enters them directly
     by_unknowns: Floats  # (n, d, 7): by the unknowns of the first model
     shared: system.SameImages  # image points in common with conditions, ordered by rows
 
@@ -153,42 +134,48 @@ class _Columns:
         return cls(
             found=found,
             rows=rows,
+            near=NearImages.of(found.errors, rows),
             by_unknowns=rows.by_similarity @ found.conditions.local.to_common[rows.first],
             shared=system.SameImages(shared.first[order], shared.second[order], shared.value[order, :, 0]),
         )
 
     def blocks(self, numbers: range) -> Iterator[BlockColumns]:
-        """Go through consecutive blocks, up or down; a few are made together."""
-        for start in range(0, len(numbers), AT_A_TIME):
-            some = numbers[start : start + AT_A_TIME]
-            made = self._made(min(some), max(some) + 1)
-            yield from made if some[0] == made[0].number else reversed(made)
+        """Go through consecutive blocks; a few are made together."""
+        for low in numbers[::AT_A_TIME]:
+            yield from self._made(low, min(low + AT_A_TIME, numbers.stop))
 
-    def predict(self, block: BlockColumns, around: Floats, result: Predicted) -> None:
-        """Fill in error b^T [lambda; y] and b^T K^-1 b of one block, given the inverse of it and its neighbours."""
-        layout, size = self.found.layout, self.rows.by_similarity.shape[1]
+    def predict(self, block: BlockColumns, result: Predicted) -> None:
+        """Fill in error b^T [lambda; y] and b^T K^-1 b of one block."""
         number, rows, columns = block
-        count = rows.stop - rows.start
+        size, found, count = self.rows.by_similarity.shape[1], self.found, rows.stop - rows.start
         if not count:
             return
-        solution = np.zeros((3, layout.height))
-        inside = slice(max(number - 1, 0), number + 2)
-        solution[inside.start - number + 1 :][: len(self.found.solution[inside])] = self.found.solution[inside]
-        flat = columns.reshape(3 * layout.height, -1)
-        result.error[rows] = (solution.ravel() @ flat).reshape(-1, size)
-        split = flat.reshape(len(flat), count, size).transpose(1, 2, 0)
-        result.covariance[rows] = split @ (around @ flat).reshape(len(flat), count, size).transpose(1, 0, 2)
+        before, after = max(number - 1, 0), min(number + 1, found.layout.blocks - 1)
+        solution = np.zeros_like(columns[:, :, 0])
+        solution[before - number + 1 : after - number + 2] = found.solution[before : after + 1]
+        result.error[rows] = (solution.ravel() @ columns.reshape(solution.size, -1)).reshape(count, size)
+        first, own, last = columns  # beyond the ends they are 0
+        own = own - found.factors.shares[before].T @ first
+        last = last - found.factors.shares[number].T @ own
+        reduced = np.concatenate([first, own, last])
+        inverses, later = found.factors.inverses, found.factors.diagonal_of_inverse
+        weights = inverses[before], inverses[number], later[after]
+        weighted = np.concatenate([weight @ each for weight, each in zip(weights, (first, own, last), strict=True)])
+        left, right = (each.reshape(-1, count, size) for each in (reduced, weighted))
+        result.covariance[rows] = left.transpose(1, 2, 0) @ right.transpose(1, 0, 2)
 
     def _made(self, low: int, high: int) -> list[BlockColumns]:
         """Make the columns of blocks: covariances with conditions around, coefficients of unknowns, common images."""
         layout, size = self.found.layout, self.rows.by_similarity.shape[1]
         models = len(layout.start)
-        model = np.arange(low * layout.width, min(high * layout.width, models))
-        ends = np.searchsorted(self.rows.first, [*model, model[-1] + 1])
-        bounds = ends[np.minimum(np.arange(high - low + 1) * layout.width, len(model))].tolist()
+        some = range(low * layout.width, min(high * layout.width, models))
+        ends = np.searchsorted(self.rows.first, [*some, some.stop])
+        bounds = ends[np.minimum(np.arange(high - low + 1) * layout.width, len(some))].tolist()
         columns = [np.zeros((3, layout.height, (stop - start) * size)) for start, stop in pairwise(bounds)]
-        part, slots = self.rows.part(*ends[[0, -1]].tolist()), self.found.padded.by_component.shape[2]
-        padded = system.PaddedRows.of(self.found.errors, part, slots, range(int(model[0]), int(model[-1]) + 1))
+        begin, end = ends[[0, -1]].tolist()
+        part, near = self.rows.part(begin, end), self.near.with_components[begin:end]
+        slots = self.found.padded.by_component.shape[1]
+        padded = system.PaddedRows.of(self.found.errors, part, near, slots, some)
         starts, unknowns, reached = layout.start.tolist(), layout.unknown.tolist(), ends.tolist()
         # the place of each model's rows: its block, and its columns there
         places = [
@@ -197,19 +184,17 @@ class _Columns:
             for first in [bounds[place // layout.width]]
         ]
         for apart in range(-layout.width, layout.width + 1):
-            inside = np.flatnonzero((model + apart >= 0) & (model + apart < models))
-            if not len(inside):
+            others = range(max(some.start + apart, 0), min(some.stop + apart, models))
+            if not others:
                 continue
-            values = system.products(padded, self.found.padded, model[inside], apart)
-            for place, value in zip(inside.tolist(), values, strict=True):
-                block, across = places[place]
-                other = place + int(model[0]) + apart
+            values = system.products(self.found.padded, padded, others, -apart)
+            for other, value in zip(others, values, strict=True):
+                block, across = places[other - apart - some.start]
                 beside = other // layout.width - (low + block) + 1
                 top, height = starts[other], unknowns[other]
-                count = across.stop - across.start
-                columns[block][beside, top:height, across] = value[:count, : height - top].T
+                columns[block][beside, top:height, across] = value[: height - top, : across.stop - across.start]
         for number, (block, across) in enumerate(places):
-            unknown = unknowns[number + int(model[0])]
+            unknown = unknowns[number + some.start]
             by_unknowns = self.by_unknowns[reached[number] : reached[number + 1]].reshape(-1, SIMILARITY_PARAMETERS)
             columns[block][1, unknown : unknown + SIMILARITY_PARAMETERS, across] = by_unknowns.T
         made = [
@@ -225,9 +210,10 @@ class _Columns:
         layout, size = self.found.layout, self.rows.by_similarity.shape[1]
         inside = slice(*np.searchsorted(self.shared.first, [made.rows.start, made.rows.stop]).tolist())
         row, condition, value = (column[inside] for column in self.shared)
-        block, position = layout.block[condition] - made.number + 1, layout.position[condition]
-        place = (row - made.rows.start)[:, None] * size + np.arange(size)
-        np.add.at(made.values, (block[:, None], position[:, None], place), value)
+        place = (layout.block[condition] - made.number + 1) * layout.height + layout.position[condition]
+        across = (row - made.rows.start)[:, None] * size + np.arange(size)
+        # flat places: three indices take ten times as long
+        np.add.at(made.values.reshape(-1), place[:, None] * made.values.shape[2] + across, value)
 
 
 def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
@@ -260,7 +246,8 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
 def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     """Covariances (n, n) of what is left of the errors of rows with d = 1: C - b^T K^-1 b, as ``predict`` has them.
 
-    With K eliminated from the first block on, b^T K^-1 b = sum r^T P^-1 r with the reduced columns r of each block.
+    With K eliminated as in ``predict``: what later blocks add to two rows is said by the inverse on the diagonal where
+    both have all of their columns behind them.
     """
     order = np.argsort(rows.first, kind="stable")
     rows = rows.take(order)
@@ -271,16 +258,18 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     reduced = np.zeros((layout.height, 0))
     for number in range(layout.blocks):
         near = blocks[max(number - 1, 0) : number + 2]
-        reached, shift = near[-1].rows.stop, min(number, 1)  # later columns begin in later blocks
-        right = np.zeros((layout.height, reached))
-        for place, (_, at, values) in enumerate(near):
-            right[:, at] = values[1 + shift - place]
+        right = np.zeros((layout.height, near[-1].rows.stop))  # later columns begin in later blocks
+        for block, at, values in near:
+            right[:, at] = values[1 + number - block]
         if number:
             right[:, : reduced.shape[1]] -= factors.shares[number - 1].T @ reduced
         reduced = right
-        covariance[:reached, :reached] -= reduced.T @ (factors.inverses[number] @ reduced)
+        for block, at, _ in near:
+            weight = factors.diagonal_of_inverse[number] if block < number else factors.inverses[number]
+            covariance[: at.stop, at] -= reduced[:, : at.stop].T @ (weight @ reduced[:, at])
+    upper = np.triu(covariance)
     result = np.empty_like(covariance)
-    result[np.ix_(order, order)] = covariance
+    result[np.ix_(order, order)] = upper + np.triu(upper, 1).T
     return result
 
 

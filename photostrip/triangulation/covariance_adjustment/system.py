@@ -24,66 +24,68 @@ from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 @dataclass(frozen=True, eq=False)
 class PaddedRows:
-    """Rows with d = 1 of p consecutive models, model by model, r places for each model, empty places 0."""
+    """Rows with d = 1 of p consecutive models, model by model, r places for each model, empty places 0.
+
+    The places come last, so that products of many models need no copies.
+    """
 
     begin: int  # the first of the models
-    by_component: Floats  # (p, r, s, 6)
-    images: Floats  # (p, r, s + 4, 6): covariances of their image coordinates with components
-    whole: Floats  # (p, r, s + 4, 6): covariances of the whole rows, without similarities, with components
+    by_component: Floats  # (p, s, 6, r)
+    images: Floats  # (p, s + 4, 6, r): covariances of their image coordinates with components
+    whole: Floats  # (p, s + 4, 6, r): covariances of the whole rows, without similarities, with components
 
     @classmethod
-    def of(cls, errors: StripErrors, rows: ErrorRows, slots: int, models: range) -> Self:
+    def of(cls, errors: StripErrors, rows: ErrorRows, with_components: Floats, slots: int, models: range) -> Self:
         """Put rows that are ordered by their first models into places of these; one of d coordinates takes d places.
 
-        ``slots`` is the number of models over which any row reaches.
+        with_components: covariances of their image points with components, as ``NearImages`` has them.
+        slots: number of models over which any row reaches.
         """
         first, size, have = rows.first - models.start, rows.by_similarity.shape[1], rows.by_component.shape[1]
         rank = rank_in_model(first, len(models))
         places = max(int(rank.max(initial=0)) + 1, 1) * size
-        by_component = np.zeros((len(models), places, slots, COMPONENTS))
-        images = np.zeros((len(models), places, slots + 2 * REACH, COMPONENTS))
+        by_component = np.zeros((len(models), slots, COMPONENTS, places))
+        images = np.zeros((len(models), slots + 2 * REACH, COMPONENTS, places))
         at = rank[:, None] * size + np.arange(size)
-        with_components = NearImages.of(errors, rows).with_components
-        by_component[first[:, None], at, :have] = rows.by_component.transpose(0, 2, 1, 3)
-        images[first[:, None], at, : have + 2 * REACH] = with_components
+        by_component[first[:, None], :have, :, at] = rows.by_component.transpose(0, 2, 1, 3)
+        images[first[:, None], : have + 2 * REACH, :, at] = with_components
         whole = images + _with_components(errors.component_covariances, by_component, models)
         return cls(begin=models.start, by_component=by_component, images=images, whole=whole)
 
 
 def _with_components(covariances: Floats, by_component: Floats, models: range) -> Floats:
     """Covariances of sums of components with the components from two models before to two after."""
-    _, places, slots, _ = by_component.shape
-    result = np.zeros((len(models), places, slots + 2 * REACH, COMPONENTS))
+    _, slots, _, places = by_component.shape
+    result = np.zeros((len(models), slots + 2 * REACH, COMPONENTS, places))
     for slot in range(slots):
         for apart in range(-REACH, REACH + 1):
             low = max(models.start, -apart - slot)
-            model = np.arange(low, max(min(models.stop, len(covariances) - slot - max(apart, 0)), low))
-            if len(model):
-                mixed = covariances[model + slot + min(apart, 0), abs(apart)]
-                mixed = mixed if apart >= 0 else mixed.transpose(0, 2, 1)
-                row = slice(low - models.start, low - models.start + len(model))
-                result[row, :, slot + apart + REACH] += by_component[row, :, slot] @ mixed
+            high = max(min(models.stop, len(covariances) - slot - max(apart, 0)), low)
+            mixed = covariances[low + slot + min(apart, 0) : high + slot + min(apart, 0), abs(apart)]
+            mixed = mixed.transpose(0, 2, 1) if apart >= 0 else mixed
+            row = slice(low - models.start, high - models.start)
+            result[row, slot + apart + REACH] += mixed @ by_component[row, slot]
     return result
 
 
-def products(a: PaddedRows, b: PaddedRows, models: Numbers, apart: int) -> Floats:
+def products(a: PaddedRows, b: PaddedRows, models: range, apart: int) -> Floats:
     """Covariances (m, r_a, r_b) of rows of models with rows of models apart.
 
     Products of image coordinates that both use directly are left out; ``same_images`` gives them.
     """
-    other, count = models + apart - b.begin, len(models)
-    models = models - a.begin
-    total = np.zeros((count, a.by_component.shape[1], b.by_component.shape[1]))
+    of_a = slice(models.start - a.begin, models.stop - a.begin)
+    of_b = slice(models.start + apart - b.begin, models.stop + apart - b.begin)
+    total = np.zeros((len(models), a.by_component.shape[3], b.by_component.shape[3]))
     for first, second, low in (
-        (a.whole[models], b.by_component[other], apart + REACH),
-        (a.by_component[models], b.images[other], apart - REACH),
+        (a.whole[of_a], b.by_component[of_b], apart + REACH),
+        (a.by_component[of_a], b.images[of_b], apart - REACH),
     ):
         skip_first, skip_second = max(low, 0), max(-low, 0)
-        length = min(first.shape[2] - skip_first, second.shape[2] - skip_second)
+        length = min(first.shape[1] - skip_first, second.shape[1] - skip_second)
         if length > 0:
-            left = first[:, :, skip_first : skip_first + length].reshape(count, total.shape[1], -1)
-            right = second[:, :, skip_second : skip_second + length].reshape(count, total.shape[2], -1)
-            total += left @ right.transpose(0, 2, 1)
+            left = first[:, skip_first : skip_first + length].reshape(len(total), -1, total.shape[1])
+            right = second[:, skip_second : skip_second + length].reshape(len(total), -1, total.shape[2])
+            total += left.transpose(0, 2, 1) @ right
     return total
 
 
@@ -160,26 +162,19 @@ def rank_in_model(first: Numbers, models: int) -> Numbers:
 class BlockMatrix:
     """A symmetric matrix of blocks on and beside the diagonal."""
 
+    layout: SystemLayout
     # diagonal, beside: (g, b, b): blocks on the diagonal and to the right of them
     diagonal: Floats
     beside: Floats
 
-    def add(self, row: tuple[Numbers, Numbers], column: tuple[Numbers, Numbers], values: Floats, *, both: bool) -> None:
-        """Add values (k,) at rows and columns given by block and position.
-
-        With ``both`` each value stands at its mirrored place too; otherwise the mirrored values are given themselves.
-        """
-        height = self.diagonal.shape[1]
-        inside = row[1] * height + column[1]
-        mirrored = column[1] * height + row[1]
-        same, right, left = (np.flatnonzero(column[0] == row[0] + apart) for apart in (0, 1, -1))
-        block = row[0] * height**2
-        # flat places: three indices take ten times as long
-        np.add.at(self.diagonal.reshape(-1), (block + inside)[same], values[same])
-        np.add.at(self.beside.reshape(-1), (block + inside)[right], values[right])
-        if both:
-            np.add.at(self.diagonal.reshape(-1), (block + mirrored)[same], values[same])
-            np.add.at(self.beside.reshape(-1), (column[0] * height**2 + mirrored)[left], values[left])
+    def add(self, model: int, rows: slice, other: int, columns: slice, values: Floats) -> None:
+        """Add values at rows of a model's block, columns of that of the same or a later model, and mirrored."""
+        block, target = model // self.layout.width, other // self.layout.width
+        if target > block:
+            self.beside[block, rows, columns] += values
+        else:
+            self.diagonal[block, rows, columns] += values
+            self.diagonal[block, columns, rows] += values.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,11 +200,11 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     rows = wanted.rows
     slots = max(rows.by_component.shape[1], errors.points.by_component.shape[1], REACH)
     layout = SystemLayout.of(rows.first, errors.models, min(slots, errors.models))
-    padded = PaddedRows.of(errors, rows, slots, range(errors.models))
+    padded = PaddedRows.of(errors, rows, NearImages.of(errors, rows).with_components, slots, range(errors.models))
     shape = (layout.blocks, layout.height, layout.height)
-    matrix = BlockMatrix(np.zeros(shape), np.zeros(shape))
-    _add_covariances(matrix, layout, padded, rows)
-    _add_design(matrix, layout, wanted)
+    matrix = BlockMatrix(layout, np.zeros(shape), np.zeros(shape))
+    _add_covariances(matrix, padded, rows)
+    _add_design(matrix, wanted)
     matrix.diagonal[layout.block, layout.position, layout.position] += wanted.noise / factor
     blocks, places = layout.empty()
     matrix.diagonal[blocks, places, places] = 1.0
@@ -236,34 +231,31 @@ def _solution(layout: SystemLayout, factors: block_tridiagonal.Factors, value: F
     return np.asarray(factors.solve(right)[:, :, 0], float)
 
 
-def _add_covariances(matrix: BlockMatrix, layout: SystemLayout, padded: PaddedRows, rows: ErrorRows) -> None:
+def _add_covariances(matrix: BlockMatrix, padded: PaddedRows, rows: ErrorRows) -> None:
     """Add Q, the covariances of the conditions."""
-    models = len(layout.start)
-    number = np.full((models, padded.by_component.shape[1]), -1)
-    number[rows.first, layout.rank] = np.arange(len(layout.rank))
-
-    def places(conditions: Numbers) -> tuple[Numbers, Numbers]:
-        return layout.block[conditions], layout.position[conditions]
-
-    for apart in range(min(layout.width, models - 1) + 1):
-        model = np.arange(models - apart)
-        values = products(padded, padded, model, apart)
-        first, second = number[model], number[model + apart]
-        m, i, j = np.nonzero((first[:, :, None] >= 0) & (second[:, None, :] >= 0))
-        matrix.add(places(first[m, i]), places(second[m, j]), values[m, i, j], both=apart > 0)
+    layout = matrix.layout
+    inside = [slice(*bounds) for bounds in zip(layout.start.tolist(), layout.unknown.tolist(), strict=True)]
+    for apart in range(min(layout.width, len(inside) - 1) + 1):
+        values = products(padded, padded, range(len(inside) - apart), apart) / (1 if apart else 2)
+        for model, (one, other, value) in enumerate(zip(inside, inside[apart:], values, strict=False)):
+            part = value[: one.stop - one.start, : other.stop - other.start]
+            matrix.add(model, one, model + apart, other, part)
     shared = same_images(rows, rows)  # every pair in both orders
-    matrix.add(places(shared.first), places(shared.second), shared.value[:, 0, 0], both=False)
+    block, position = ((each[shared.first], each[shared.second]) for each in (layout.block, layout.position))
+    place = (block[0] * layout.height + position[0]) * layout.height + position[1]
+    for apart, blocks in enumerate((matrix.diagonal, matrix.beside)):
+        there = np.flatnonzero(block[1] == block[0] + apart)
+        np.add.at(blocks.reshape(-1), place[there], shared.value[there, 0, 0])
 
 
-def _add_design(matrix: BlockMatrix, layout: SystemLayout, wanted: Conditions) -> None:
+def _add_design(matrix: BlockMatrix, wanted: Conditions) -> None:
     """Add A: the unknowns of each condition's own model, and of the next one."""
-    first = wanted.rows.first
-    linked = np.flatnonzero(np.abs(wanted.following).sum(axis=1) > 0)
-    for condition, model, values in (
-        (np.arange(len(first)), first, wanted.rows.by_similarity[:, 0]),
-        (linked, first[linked] + 1, wanted.following[linked]),
-    ):
-        for column in range(SIMILARITY_PARAMETERS):
-            row = layout.block[condition], layout.position[condition]
-            target = model // layout.width, layout.unknown[model] + column
-            matrix.add(row, target, values[:, column], both=True)
+    layout, rows = matrix.layout, wanted.rows
+    models = len(layout.start)
+    ends = np.searchsorted(rows.first, np.arange(models + 1)).tolist()
+    unknowns = [slice(place, place + SIMILARITY_PARAMETERS) for place in layout.unknown.tolist()]
+    for model, (start, unknown) in enumerate(zip(layout.start.tolist(), unknowns, strict=True)):
+        inside, conditions = slice(start, unknown.start), slice(ends[model], ends[model + 1])
+        matrix.add(model, inside, model, unknown, rows.by_similarity[conditions, 0])
+        if model + 1 < models:
+            matrix.add(model, inside, model + 1, unknowns[model + 1], wanted.following[conditions])
