@@ -32,7 +32,7 @@ import numpy as np  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.geodesy.tying import tie_frames  # noqa: E402
 from photostrip.geometry.rotation import from_vector  # noqa: E402
-from photostrip.pipeline import triangulate  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
 from photostrip.triangulation.polynomial import correction, terms  # noqa: E402
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
     from photostrip.simulation.simulation import Simulation
 
     Floats = NDArray[np.float64]

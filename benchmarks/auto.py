@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Inputs
+    from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.results import StripResult
     from photostrip.simulation.simulation import Simulation
 

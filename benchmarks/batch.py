@@ -86,7 +86,7 @@ def write_strips(folder: Path, strips: int, photos: int) -> list[Path]:
 def plain_loop(folders: Sequence[str]) -> dict[str, float]:
     """Compute strips one after the other; give seconds of computing: of the loop, of adjusting alone, at the start."""
     from photostrip.formats.output.result_files import result_files
-    from photostrip.pipeline import triangulate
+    from photostrip.pipeline.run import triangulate
     from photostrip.project.loading import load_project
     from photostrip.result.document import document_of
 

@@ -27,9 +27,9 @@ from benchmarks import plausibility
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geometry.rotation import angles, from_angles
-from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.pipeline.plausibility import gate
+from photostrip.pipeline.run import triangulate
 from photostrip.points import locate
 from photostrip.simulation import (
     DIGITAL,
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from photostrip.notes import Finding
-    from photostrip.pipeline import Inputs, Settings
+    from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.simulation.simulation import Simulation
 
     Rng = np.random.Generator

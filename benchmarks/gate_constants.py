@@ -38,8 +38,8 @@ from benchmarks.ablation import put, scaled  # noqa: E402
 from benchmarks.false_alarms import Sound  # noqa: E402
 from photostrip.errors import PhotostripError  # noqa: E402
 from photostrip.pipeline import plausibility as around_tests  # noqa: E402
-from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.pipeline.plausibility import gate  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.simulation import Image, Spec  # noqa: E402
 from photostrip.triangulation import plausibility as tests  # noqa: E402
 
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from photostrip.notes import Finding
-    from photostrip.pipeline import Inputs, Settings
+    from photostrip.pipeline.inputs import Inputs, Settings
 
 # what things are, not where a limit lies: numbers of unknowns, axes, units, guards against a division by nothing
 FACTS = {"CIRCLE_DEG", "DEGREES", "EARTH_RADIUS", "FOOT", "GONS", "HEIGHT", "INCH", "MILLION", "PLAN_UNKNOWNS", "TINY"}

@@ -39,8 +39,8 @@ import numpy as np  # noqa: E402
 
 from photostrip.errors import PhotostripError  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
-from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.pipeline.inputs import CameraPositions  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.points import locate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
@@ -52,7 +52,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Inputs, Result, Settings
+    from photostrip.pipeline.inputs import Inputs, Settings
+    from photostrip.pipeline.results import Result
     from photostrip.points import ControlPoints
     from photostrip.simulation.simulation import Simulation
 

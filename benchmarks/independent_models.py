@@ -24,7 +24,8 @@ import numpy as np  # noqa: E402
 
 from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.geometry.rotation import from_vector  # noqa: E402
-from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, triangulate  # noqa: E402
+from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.models import form_models, link_strip  # noqa: E402
 from photostrip.points import ModelPoints, PhotoPoints  # noqa: E402

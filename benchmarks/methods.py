@@ -25,7 +25,7 @@ limit_threads()  # before numpy is imported
 import numpy as np  # noqa: E402
 
 from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
-from photostrip.pipeline import triangulate  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.simulation import Control, Flight, Points, Spec, simulate  # noqa: E402
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
     from photostrip.simulation import Simulation
 
     Floats = NDArray[np.float64]

@@ -31,7 +31,8 @@ import numpy as np  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.geodesy.tying import tie_frames  # noqa: E402
-from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
+from photostrip.pipeline.inputs import Inputs, Settings, Strip  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
 from photostrip.planning.model.plan import (  # noqa: E402

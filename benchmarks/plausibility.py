@@ -26,9 +26,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywher
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geometry.rotation import angles, from_angles
-from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.pipeline.plausibility import gate
+from photostrip.pipeline.run import triangulate
 from photostrip.simulation import (
     DIGITAL,
     FILM,
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.notes import Finding
-    from photostrip.pipeline import Inputs, Settings
+    from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.simulation.simulation import Simulation
 

@@ -34,7 +34,8 @@ import numpy as np  # noqa: E402
 from benchmarks import accuracy  # noqa: E402
 from photostrip.camera import Camera  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of  # noqa: E402
-from photostrip.pipeline import Settings, triangulate  # noqa: E402
+from photostrip.pipeline.inputs import Settings  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
@@ -50,7 +51,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.pipeline import Inputs, StripResult
+    from photostrip.pipeline.inputs import Inputs
+    from photostrip.pipeline.results import StripResult
 
     Floats = NDArray[np.float64]
 

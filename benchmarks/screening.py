@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Inputs
+    from photostrip.pipeline.inputs import Inputs
     from photostrip.planning.screening import MethodOutcome
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 

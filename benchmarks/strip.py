@@ -39,9 +39,9 @@ from photostrip.formats.output.result_files import result_files  # noqa: E402
 from photostrip.formats.output.result_json import read_result  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of, project_files  # noqa: E402
 from photostrip.formats.text.writing import write_files  # noqa: E402
-from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.pipeline.plausibility import gate  # noqa: E402
 from photostrip.pipeline.precision import photo_precision  # noqa: E402
+from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.project.loading import load_project  # noqa: E402
 from photostrip.report.page import console  # noqa: E402
 from photostrip.report.sections.accuracy_report import chosen_sections, title_of  # noqa: E402

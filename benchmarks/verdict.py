@@ -23,7 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywher
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Inputs, Settings, triangulate
+from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Points, Spec, Terrain

@@ -15,8 +15,10 @@ from photostrip.threads import limit_threads
 from tests.forked import Forks
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
+
+    from photostrip.pipeline.results import Result
 
 limit_threads()  # before a test imports numpy
 
@@ -54,19 +56,20 @@ def _quick_start(forks: Forks, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def _adjusted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def _adjusted_once(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
     """Let commands take over what the same data gave before, where a test looks at what is done with a result."""
-    from tests.results import known  # not for tests without any
+    from photostrip.pipeline import run  # not for tests without any
+    from tests.results import known
 
-    monkeypatch.setattr("photostrip.pipeline.triangulate", known)
+    triangulate = run.triangulate
+    monkeypatch.setattr(run, "triangulate", known)
+    return triangulate
 
 
 @pytest.fixture
-def _adjusted_each_time(_adjusted_once: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def _adjusted_each_time(_adjusted_once: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
     """Adjust anew among tests that do not: for what comes out again."""
-    from photostrip.pipeline.run import triangulate
-
-    monkeypatch.setattr("photostrip.pipeline.triangulate", triangulate)
+    monkeypatch.setattr("photostrip.pipeline.run.triangulate", _adjusted_once)
 
 
 @pytest.fixture

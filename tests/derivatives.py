@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import triangulate
 from photostrip.pipeline.precision.photo_precision import propagation
+from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.simulation.simulation import simulate
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.pipeline import Inputs, Result
+    from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.precision.check_points import Propagation
+    from photostrip.pipeline.results import Result
     from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip
+from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 from tests.strips import LOCAL
 

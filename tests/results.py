@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.formats.output.simulation import inputs_of, project_files
 from photostrip.geodesy.frame_spec import FrameSpec
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, GrossError, Ground, Image, Points, Spec
@@ -20,8 +21,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Inputs, Result
     from photostrip.pipeline.frames import TiedFrames
+    from photostrip.pipeline.inputs import Inputs
+    from photostrip.pipeline.results import Result
     from photostrip.pipeline.strips.stages import Stages
 
 Document = dict[str, Any]

@@ -12,7 +12,7 @@ from photostrip.camera import Camera
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import Inputs, Strip
+from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.absolute_orientation import Targets
 from photostrip.triangulation.relative_orientation.orientation import orient_pairs

@@ -17,7 +17,7 @@ from photostrip.library.result import Result
 from photostrip.notes import counted
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Result as Computed
+    from photostrip.pipeline.results import Result as Computed
     from photostrip.pipeline.strips.stages import Stages
     from photostrip.project.checks.check import Checked
     from photostrip.project.loading import Project as Loaded

@@ -16,7 +16,7 @@ from photostrip.result.records import as_lists
 
 if TYPE_CHECKING:
     from photostrip.library.table import Table
-    from photostrip.pipeline import Result as Computed
+    from photostrip.pipeline.results import Result as Computed
 
 ReportForm = Literal["text", "md", "html", "json"]
 RESULT = "result.json"

@@ -20,8 +20,7 @@ from photostrip.geodesy.curvature import mean_radius, radius_in_azimuth
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geometry.rotation import from_angles
-from photostrip.pipeline import Settings, Strip
-from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
+from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.project.schema.cameras import Camera, Distortion, FirstPhoto
 from photostrip.project.schema.ground import CameraPositions as PositionsBlock

@@ -18,8 +18,9 @@ from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding, Note
-from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Result, Settings
 from photostrip.pipeline.frames import TiedFrames
+from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings
+from photostrip.pipeline.results import Result
 from photostrip.points import PhotoPoints
 from photostrip.project import conversion
 from photostrip.project.hints import hints
@@ -113,7 +114,7 @@ def adjust_project(project: Project, stages: Stages | None = None) -> Result:
 
     stages: what runs of it by other methods have made.
     """
-    from photostrip.pipeline import triangulate  # what only reads a project does without
+    from photostrip.pipeline.run import triangulate  # what only reads a project does without
 
     with project.places():
         return triangulate(

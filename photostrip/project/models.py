@@ -13,7 +13,7 @@ from photostrip.formats.measured.models import ModelTable, read_models
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import counted, listed
-from photostrip.pipeline import MeasuredModels, ModelStrip
+from photostrip.pipeline.inputs import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
 from photostrip.project.schema.measurements import Models
 from photostrip.project.yaml.references import listed_photos

@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.errors import Fault
 from photostrip.frozen import replace
 from photostrip.notes import Finding
-from photostrip.pipeline import ModelStrip, Strip
+from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.project.tables import Tables
 from photostrip.project.yaml.tree import Node, steps
 

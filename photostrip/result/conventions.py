@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.geodesy.ground_frame import plural
 from photostrip.notes import Document
-from photostrip.pipeline import Result
+from photostrip.pipeline.results import Result
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
 

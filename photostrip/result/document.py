@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from photostrip import __version__
 from photostrip.notes import Document, Finding, Note
-from photostrip.pipeline import Result
+from photostrip.pipeline.results import Result
 from photostrip.result import conventions, summary
 from photostrip.result.adjustment import (
     bundle,

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats
 from photostrip.notes import Document
-from photostrip.pipeline import Result
+from photostrip.pipeline.results import Result
 from photostrip.result.adjustment import links
 from photostrip.result.adjustment.bundle import image_fit
 from photostrip.result.adjustment.pairs import Parallaxes, sigma0

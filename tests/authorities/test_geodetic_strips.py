@@ -11,7 +11,8 @@ import pytest
 from photostrip.camera import Camera
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import geocentric_from_geodetic
-from photostrip.pipeline import Inputs, Settings, Strip, triangulate
+from photostrip.pipeline.inputs import Inputs, Settings, Strip
+from photostrip.pipeline.run import triangulate
 from photostrip.triangulation.polynomial import correction
 from tests.strips import control_points, measured
 from tests.vectors import section, vector
@@ -19,7 +20,7 @@ from tests.vectors import section, vector
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
 
     Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import load_project
 from photostrip.result.document import document_of
 from tests.loops import nonempty
@@ -18,7 +18,7 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
 
 DATA = ROOT / "tests" / "data" / "authorities" / "sxb-bundle"
 SAMPLES = ROOT / "sample_data"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.pipeline import METHODS
+from photostrip.pipeline.inputs import METHODS
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 

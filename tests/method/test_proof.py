@@ -20,7 +20,8 @@ from pyproj import Proj
 
 from photostrip.camera import Camera, Distortion
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.pipeline import Inputs, Settings, triangulate
+from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.result.document import document_of
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
 
     Floats = NDArray[np.float64]
 

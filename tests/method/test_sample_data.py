@@ -20,8 +20,8 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import Strip
+from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.project.loading import Project, load_project
 from photostrip.result.document import document_of
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Inputs, Result, Settings
-    from photostrip.pipeline.results import StripResult
+    from photostrip.pipeline.inputs import Inputs, Settings
+    from photostrip.pipeline.results import Result, StripResult
 
     Floats = NDArray[np.float64]
 

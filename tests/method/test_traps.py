@@ -12,7 +12,8 @@ from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, GeometryError, InputErr
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import Inputs, Settings, triangulate
+from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.simulation import Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
 from photostrip.triangulation import absolute_orientation
@@ -22,7 +23,7 @@ from tests.loops import nonempty
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result, StripResult
+    from photostrip.pipeline.results import Result, StripResult
 
     Floats = NDArray[np.float64]
 

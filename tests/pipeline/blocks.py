@@ -10,8 +10,8 @@ import numpy as np
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import angles
-from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
+from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Gnss, Image, Spec, simulate
 
 if TYPE_CHECKING:
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Inputs, Result
+    from photostrip.pipeline.inputs import Inputs
+    from photostrip.pipeline.results import Result
     from photostrip.simulation import Simulation
 
     Floats = NDArray[np.float64]

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.pipeline import AUTO, METHODS, Result, triangulate
 from photostrip.pipeline.choice import POLYNOMIAL, Witness, method_of
+from photostrip.pipeline.inputs import AUTO, METHODS
+from photostrip.pipeline.results import Result
+from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips import choosing
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import sections_of

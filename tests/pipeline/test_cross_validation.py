@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Inputs, Settings
 from photostrip.pipeline.cross_validation import FOLDS
+from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.strips import forming
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.report.sections.accuracy_report import sections_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Spec
 from photostrip.simulation.simulation import simulate
 

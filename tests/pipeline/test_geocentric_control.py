@@ -11,7 +11,9 @@ from photostrip.errors import InputError
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import Inputs, Result, triangulate
+from photostrip.pipeline.inputs import Inputs
+from photostrip.pipeline.results import Result
+from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Spec, simulate
 

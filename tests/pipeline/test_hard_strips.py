@@ -8,7 +8,7 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from tests.pipeline import blocks
 

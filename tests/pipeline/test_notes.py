@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.notes import polynomial_notes
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Spec, simulate
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Inputs, Strip
+    from photostrip.pipeline.inputs import Inputs, Strip
     from photostrip.triangulation.polynomial.correction import Polynomial
 
 

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.pipeline import Result, Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.results import Result
+from photostrip.pipeline.run import triangulate
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings as Relative
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 from tests.strips import Flown, control_points, fly, project

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.pipeline.frames import tie_ground_frames
 from photostrip.pipeline.image_coordinates import heights_of, orient_interior
+from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.stages import Stages
 from photostrip.simulation import simulate
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings

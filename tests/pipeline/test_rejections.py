@@ -17,7 +17,7 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.formats.output.result_files import rejected_csv
 from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, GrossError, Points, Spec
@@ -27,7 +27,7 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from photostrip.pipeline import Inputs
+    from photostrip.pipeline.inputs import Inputs
     from photostrip.simulation.simulation import Simulation
 
 STAGES = {"relative", "rays", "control"}

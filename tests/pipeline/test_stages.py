@@ -11,7 +11,8 @@ import pytest
 
 from photostrip.errors import GeometryError
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import METHODS, Settings, triangulate
+from photostrip.pipeline.inputs import METHODS, Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips import absolute, forming
 from photostrip.pipeline.strips.stages import Stages, alike
 from photostrip.result.document import document_of
@@ -21,7 +22,7 @@ from tests.loops import nonempty
 from tests.results import spec
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Inputs
+    from photostrip.pipeline.inputs import Inputs
 
 
 def all_stages() -> Stages:

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import adjust_project, load_project
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
 
 SAMPLE = Path("sample_data/simulated-20")
 # modules that tie frames of a project

@@ -12,7 +12,7 @@ import pytest
 from photostrip.camera import Distortion
 from photostrip.errors import InputError
 from photostrip.geodesy.frame_spec import FrameSpec
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.project.loading import Project, load_project
 from tests.project.samples import CONTROL, MARKED_FILES, OBSERVATIONS, PROJECT, Sample, sample
 

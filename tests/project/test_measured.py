@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.formats.output.simulation import project_files
 from photostrip.formats.text.writing import write_files
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.project.loading import load_project
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec

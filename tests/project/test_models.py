@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.project.checks.check import check_project
 from photostrip.project.loading import load_project
 from tests.loops import nonempty

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings
-from photostrip.pipeline.inputs import Strip
+from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.report.html import to_html
 from photostrip.result.records import as_lists
 from photostrip.simulation import Control, Flight, Models, Spec

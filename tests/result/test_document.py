@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.notes import Note
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.result.document import document_of
 from photostrip.result.numbers import natural, rounded, significant
 from photostrip.result.records import Records

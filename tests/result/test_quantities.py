@@ -12,7 +12,7 @@ import pytest
 
 from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.result.columns import photos_csv, points_csv, rejected_csv, reliability_csv
 from photostrip.result.description import Quantity, described, quantity_at
 from photostrip.result.quantities import rounded_as

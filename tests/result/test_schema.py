@@ -10,7 +10,8 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.result.records import as_lists
 from photostrip.result.schema import result_page, result_schema

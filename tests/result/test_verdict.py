@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import chosen_sections
 from photostrip.result.points.standing_out import stand_out

@@ -15,7 +15,8 @@ from scipy.spatial.transform import Rotation
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, GeometryError, InputError
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Flight, Ground, Spec, simulate
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, Targets, orient, weights
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
     from photostrip.points import ControlPoints
     from tests.vectors import Vector
 

@@ -12,7 +12,7 @@ from photostrip.cli.stdout import Document, Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
 from photostrip.formats.text.writing import write_text
 from photostrip.library.project import loaded_from
-from photostrip.pipeline import AUTO, METHODS
+from photostrip.pipeline.inputs import AUTO, METHODS
 from photostrip.pipeline.strips.stages import Stages
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress

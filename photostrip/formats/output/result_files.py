@@ -13,7 +13,7 @@ from photostrip.formats.output.result_json import to_json
 from photostrip.formats.text import number_columns
 from photostrip.formats.text.number_columns import Cells
 from photostrip.notes import Document
-from photostrip.pipeline import Result
+from photostrip.pipeline.results import Result
 from photostrip.result import columns as tables
 from photostrip.result.columns import Column
 from photostrip.result.description import Quantity

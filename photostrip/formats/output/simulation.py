@@ -17,7 +17,7 @@ from photostrip.frozen import replace
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted
-from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, Strip
+from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.simulation import Simulation
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings

@@ -11,7 +11,7 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.measured.models import ModelTable
 from photostrip.notes import Document
-from photostrip.pipeline import MeasuredModels
+from photostrip.pipeline.inputs import MeasuredModels
 from photostrip.project.loading import Project
 from photostrip.project.yaml.tree import fault_at, key_path
 from photostrip.units import MICROMETRES

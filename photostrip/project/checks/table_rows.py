@@ -14,7 +14,7 @@ from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.tables import Table
 from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
-from photostrip.pipeline import Inputs, MeasuredModels
+from photostrip.pipeline.inputs import Inputs, MeasuredModels
 from photostrip.project.loading import Project
 from photostrip.project.tables import Tables, rays
 

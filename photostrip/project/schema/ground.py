@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 from photostrip.geometry.rotation import SYSTEMS
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.project.schema.measurements import COLUMNS, ControlColumns
 from photostrip.project.schema.sections import Rule, Section, key, wrong
 from photostrip.project.schema.values import Axes, Flag, Height, Number, Positive, Sigma3, Triple, Words, choice

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.pipeline import ADJUSTMENTS, Settings
+from photostrip.pipeline.inputs import ADJUSTMENTS, Settings
 from photostrip.project.schema.cameras import Parameter
 from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong
 from photostrip.project.schema.values import (

@@ -13,8 +13,7 @@ from photostrip.arrays import Floats, Numbers, median
 from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Document
-from photostrip.pipeline import Result
-from photostrip.pipeline.results import Bundle
+from photostrip.pipeline.results import Bundle, Result
 from photostrip.rejection import UNCONTROLLED
 from photostrip.result.numbers import PER_RADIAN, rms
 from photostrip.result.points.photos import ImageResiduals

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from photostrip.notes import Document
-from photostrip.pipeline import AUTO, Result, StripResult
 from photostrip.pipeline.choice import Choice, Witness
+from photostrip.pipeline.inputs import AUTO
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.quantities import record
 
 

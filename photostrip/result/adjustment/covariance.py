@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Document
-from photostrip.pipeline import Result, StripResult
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.numbers import natural_rank
 from photostrip.result.quantities import record, records
 

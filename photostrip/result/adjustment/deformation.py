@@ -11,7 +11,7 @@ from photostrip.arrays import Numbers
 from photostrip.frozen import dataclass
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
-from photostrip.pipeline import Result, StripResult
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.planning.model.deformation import LEAST_POINTS, Paraboloid, determines_paraboloid, fit_paraboloid
 from photostrip.result.quantities import record
 from photostrip.statistics import t_p_value

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.notes import Document
-from photostrip.pipeline import Result, StripResult
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.quantities import records
 from photostrip.result.records import Records
 from photostrip.triangulation.strip_formation.strip import FormedStrip

@@ -7,7 +7,7 @@ import numpy as np
 from photostrip.arrays import Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.notes import Document
-from photostrip.pipeline import Result, StripResult
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import grouped, record, records

@@ -10,7 +10,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.notes import Document
-from photostrip.pipeline import Result, StripResult
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.adjustment.parallax_limits import parallax_limits
 from photostrip.result.quantities import grouped, records
 from photostrip.result.records import Records

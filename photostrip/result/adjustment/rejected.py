@@ -6,8 +6,7 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.notes import Document
-from photostrip.pipeline import Result, StripResult
-from photostrip.pipeline.results import Bundle
+from photostrip.pipeline.results import Bundle, Result, StripResult
 from photostrip.points import PhotoPoints
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY, Rejection
 from photostrip.result.adjustment.bundle import Kind, kinds, names_of_observation

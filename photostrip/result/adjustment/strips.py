@@ -13,7 +13,7 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.notes import Document
-from photostrip.pipeline import Result, StripResult
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.adjustment import links, pairs
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import rms

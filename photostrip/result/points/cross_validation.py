@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.notes import Document
-from photostrip.pipeline import Result
+from photostrip.pipeline.results import Result
 from photostrip.result.numbers import natural, rms
 from photostrip.result.points.given import PARTS, differences, size_columns
 from photostrip.result.points.own_precision import chances

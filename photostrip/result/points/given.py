@@ -11,8 +11,8 @@ from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
-from photostrip.pipeline import Result
 from photostrip.pipeline.given_points import rejected_control
+from photostrip.pipeline.results import Result
 from photostrip.points import locate
 from photostrip.result.numbers import natural_rank
 from photostrip.result.points.own_precision import chances, normalised

@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
-from photostrip.pipeline import Result
+from photostrip.pipeline.results import Result
 from photostrip.result.numbers import natural_rank, rounded
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns

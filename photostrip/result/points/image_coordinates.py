@@ -6,7 +6,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.notes import Document
-from photostrip.pipeline import Result
+from photostrip.pipeline.results import Result
 from photostrip.result.numbers import EXACT, natural_rank, significant
 from photostrip.result.quantities import grouped
 from photostrip.units import MICROMETRES

@@ -7,8 +7,8 @@ from math import erfc, sqrt
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.pipeline import Result
 from photostrip.pipeline.given_points import axes_of
+from photostrip.pipeline.results import Result
 
 
 def turned(covariances: Floats, axes: Floats) -> Floats:

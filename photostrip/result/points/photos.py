@@ -11,7 +11,8 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import angles
 from photostrip.notes import Document
-from photostrip.pipeline import Result, Strip, StripResult
+from photostrip.pipeline.inputs import Strip
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.numbers import PER_RADIAN, Plain, rounded
 from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns

@@ -8,7 +8,7 @@ from photostrip.arrays import Floats, median
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
 from photostrip.notes import Document
-from photostrip.pipeline import Result, StripResult
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.numbers import PER_RADIAN, rms
 from photostrip.result.points.given import Differences
 from photostrip.result.points.own_precision import chances, turned

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats
 from photostrip.notes import Document
-from photostrip.pipeline import Result
+from photostrip.pipeline.results import Result
 from photostrip.result.points.given import Differences
 from photostrip.result.quantities import record
 from photostrip.result.statement.figures import figures_of

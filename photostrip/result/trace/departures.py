@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 
 
 class Choice(NamedTuple):

@@ -6,15 +6,19 @@ step; that they end where the run ended is tested.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline.results import Result, StripResult
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, solve_elements, start_values
+
+if TYPE_CHECKING:  # single steps need none of it
+    from photostrip.pipeline.results import Result, StripResult
 
 START_DIGITS = 1  # of radians: where a pair starts whose start values do not lead to its solution
 SAME_ELEMENTS = 1e-6  # radians

@@ -11,7 +11,7 @@ from photostrip.frozen import replace
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity, pair_scales
 from photostrip.notes import Document
-from photostrip.pipeline import Result, StripResult
+from photostrip.pipeline.results import Result, StripResult
 from photostrip.points import ControlPoints
 from photostrip.result.numbers import EXACT, PER_RADIAN, rounded, significant
 from photostrip.result.records import as_records

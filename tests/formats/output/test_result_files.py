@@ -16,7 +16,7 @@ import pytest
 from photostrip.errors import InputError
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.result_json import read_result, to_json
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from tests.loops import nonempty
 from tests.results import FRAMES, case, solved

@@ -10,7 +10,7 @@ import pytest
 
 from photostrip.errors import GeometryError
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Strip
+from photostrip.pipeline.inputs import Strip
 from photostrip.points import PhotoPoints
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Image, Spec, Terrain
@@ -19,8 +19,7 @@ from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from photostrip.pipeline import Inputs
-    from photostrip.pipeline.inputs import CameraPositions
+    from photostrip.pipeline.inputs import CameraPositions, Inputs
     from photostrip.simulation import Simulation
 
 pytestmark = pytest.mark.usefixtures("_no_findings")

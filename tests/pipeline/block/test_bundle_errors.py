@@ -11,7 +11,7 @@ import pytest
 from benchmarks.variance_components import TRUE, factors
 from photostrip.errors import GeometryError
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
 from photostrip.triangulation.bundle.quality import reliability
@@ -20,7 +20,7 @@ from tests.loops import nonempty
 from tests.pipeline.blocks import adjusted, corners, errors, positions, simulate, with_control
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
     from photostrip.simulation import Simulation
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
@@ -153,7 +153,7 @@ def test_what_the_user_keeps_stays() -> None:
     (error,) = simulation.truth.errors
     inputs = inputs_of(simulation)
     from photostrip.formats.output.simulation import settings_of
-    from photostrip.pipeline import triangulate
+    from photostrip.pipeline.run import triangulate
 
     settings = replace(settings_of(simulation), adjustment="bundle")
     keep = replace(settings, relative=replace(settings.relative, keep=[f"{error.photo}/{error.point}"]))

@@ -17,7 +17,7 @@ from photostrip.triangulation.bundle.normal_equations.defects import GROWN, LOOS
 from tests.pipeline.blocks import adjusted, errors, photos_of, positions, simulate
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Inputs
+    from photostrip.pipeline.inputs import Inputs
     from photostrip.simulation import Simulation
 
 pytestmark = [pytest.mark.usefixtures("_no_findings"), pytest.mark.slow]

@@ -11,7 +11,8 @@ from photostrip.comparison import compare_results
 from photostrip.errors import GeometryError
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.pipeline import Inputs, Strip, triangulate
+from photostrip.pipeline.inputs import Inputs, Strip
+from photostrip.pipeline.run import triangulate
 from photostrip.report.html import to_html
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of

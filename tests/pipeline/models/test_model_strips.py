@@ -11,7 +11,9 @@ import pytest
 from photostrip.errors import InputError
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, StripResult, triangulate
+from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings
+from photostrip.pipeline.results import StripResult
+from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.models import form_models, link_strip
 from photostrip.report.sections.accuracy_report import sections_of

@@ -11,7 +11,7 @@ import pytest
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Strip
+    from photostrip.pipeline.inputs import Strip
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 

@@ -16,9 +16,9 @@ from photostrip.cli.main import main
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
 from photostrip.geometry.rotation import angles
-from photostrip.pipeline import Settings, triangulate
-from photostrip.pipeline.inputs import GivenOrientations
+from photostrip.pipeline.inputs import GivenOrientations, Settings
 from photostrip.pipeline.plausibility import evidence, gate, image_evidence
+from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
 from photostrip.simulation import (
     DIGITAL,
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.notes import Finding
-    from photostrip.pipeline import Inputs
+    from photostrip.pipeline.inputs import Inputs
     from photostrip.simulation import Simulation
 
     Floats = NDArray[np.float64]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions
+from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Spec
 from photostrip.simulation.simulation import simulate

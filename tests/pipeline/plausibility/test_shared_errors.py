@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions
+from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, GrossError, Spec, Terrain
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Gnss

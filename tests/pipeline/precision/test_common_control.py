@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.precision import photo_precision
+from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Image, Points, Spec, simulate
 from photostrip.triangulation.polynomial import correction
 from tests.derivatives import UNSCREENED, oriented_of
@@ -19,7 +20,7 @@ from tests.derivatives import UNSCREENED, oriented_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Inputs
+    from photostrip.pipeline.inputs import Inputs
 
     Floats = NDArray[np.float64]
 

@@ -8,7 +8,8 @@ import pytest
 
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.geodesy import proj_operation
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Points, Spec

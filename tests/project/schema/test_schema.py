@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.project.editors import schema_of
 from photostrip.project.schema.ground import Output
 from photostrip.project.schema.processing import Processing

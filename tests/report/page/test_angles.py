@@ -14,7 +14,7 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.report.html import to_html
 from photostrip.report.page.angles import UNITS
 from photostrip.report.page.parts import Table

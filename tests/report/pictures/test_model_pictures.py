@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.report.html import to_html
 from photostrip.report.pictures.result.pictures import pictures_of
 from photostrip.simulation import Models, simulate

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.report.page.parts import Table
 from photostrip.report.sections.models import links_section
 from photostrip.report.sections.strip import ALL_SHOWN

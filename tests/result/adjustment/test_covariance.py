@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.simulation.simulation import simulate

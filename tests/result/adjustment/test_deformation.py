@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.run import triangulate
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.adjustment.deformation import model_deformations
 from photostrip.result.document import document_of
@@ -18,7 +18,7 @@ from photostrip.simulation import Control, Flight, Points, Spec, Terrain, simula
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
 
 FOCAL = 153.0
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.report.pictures.result.pictures import pictures_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import GrossError

@@ -11,7 +11,7 @@ import numpy as np
 
 from photostrip.formats.output.result_files import refined_csv, result_files
 from photostrip.formats.output.simulation import inputs_of
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.parts import Table
 from photostrip.report.sections.accuracy_report import SectionName, chosen_sections
 from photostrip.simulation import Models, simulate

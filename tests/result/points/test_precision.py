@@ -12,7 +12,8 @@ import pytest
 
 from photostrip.formats.output.result_files import result_files
 from photostrip.geometry.rotation import SYSTEMS, angle_rates, angles, from_angles, from_vector
-from photostrip.pipeline import Precision, Settings
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.results import Precision
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.result.document import document_of

@@ -13,7 +13,7 @@ from scipy.spatial.distance import pdist
 from scipy.spatial.transform import Rotation
 
 from photostrip.cli.main import main
-from photostrip.pipeline import Settings
+from photostrip.pipeline.inputs import Settings
 from photostrip.report.commands.trace import _left_over, trace_sections, trace_title
 from photostrip.report.page.text import to_text
 from photostrip.result.trace.departures import CHOICES

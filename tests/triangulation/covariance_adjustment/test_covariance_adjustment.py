@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.pipeline import Inputs, Result, Settings, StripResult, triangulate
+from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.results import Result, StripResult
+from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.report.sections.project import project_section

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.triangulation.error_propagation import covariances as precision
 from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.triangulation.error_propagation import covariances as precision
 from photostrip.triangulation.error_propagation import joint_covariances
 from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out

@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline import ModelStrip, Settings
+from photostrip.pipeline.inputs import ModelStrip, Settings
 from photostrip.pipeline.strips.models import form_models, models_of
 from photostrip.triangulation.independent_models import link_screening, linking
 from photostrip.triangulation.independent_models.settings import LinkSettings

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from scipy.stats import f as f_distribution
 
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline import Settings as RunSettings
-from photostrip.pipeline import triangulate
+from photostrip.pipeline.inputs import Settings as RunSettings
+from photostrip.pipeline.run import triangulate
 from photostrip.triangulation.absolute_orientation import weights
 from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.polynomial.correction import FitProblem, PolynomialSettings, fit
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
     from photostrip.triangulation.polynomial.correction import Evidence, Polynomial
     from tests.strips import Flown
     from tests.vectors import Vector

@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.notes import counted
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again, orient_pairs
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, collect_pairs

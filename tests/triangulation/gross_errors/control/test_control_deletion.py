@@ -17,7 +17,8 @@ from scipy.stats import norm
 from benchmarks.gross_errors import much_wrong_run
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.result.document import document_of
 from photostrip.triangulation.error_propagation import strip_at_control
@@ -33,7 +34,7 @@ from tests.strips import MICROMETRE, control_points, fly, project
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
     from photostrip.triangulation.gross_errors.control.control_deletion import JointAdjustment
     from tests.strips import Flown
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.result.document import document_of
@@ -18,7 +19,7 @@ from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
     from photostrip.points import ControlPoints
     from tests.strips import Flown
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.result.document import document_of
 from photostrip.triangulation.gross_errors.rays import point_decisions, snooping, strip_network
@@ -19,7 +20,7 @@ from tests.strips import MICROMETRE, control_points, fly, project
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result
+    from photostrip.pipeline.results import Result
     from photostrip.triangulation.bundle.quality.reliability import Limit
     from photostrip.triangulation.gross_errors.rays.point_decisions import Decision, PointRays
     from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
