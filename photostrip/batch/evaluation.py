@@ -7,17 +7,22 @@ import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from photostrip.batch.outcomes import BROKEN, FAULTY, WEAK, failure, out_of_memory, outcome_of
 from photostrip.batch.parcel import Parcel, unpack_grids
-from photostrip.batch.places import place_of
 from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.source import Source, digest, reading_from
 from photostrip.library.project import loaded_from
+from photostrip.notes import Document
 from photostrip.report.page.messages import result_findings
 
 if TYPE_CHECKING:
+    from photostrip.library.result import Result
     from photostrip.project.loading import Project
+
+DECIMALS = 5  # of degrees: a metre
 
 
 def evaluate(task: Task) -> Answer:
@@ -50,7 +55,7 @@ def _computed(task: Task, source: Source) -> Answer:
         project = loaded_from(Path(task.project), task.overrides)
         result = project.run()
         files = result.files(html=task.html)
-    outcome = outcome_of(result.document, result_findings(result.document)) | place_of(result)
+    outcome = outcome_of(result.document, result_findings(result.document)) | _place_of(result)
     return Answer(number=task.number, outcome=outcome, files=files, inputs=_inputs(project.loaded, source))
 
 
@@ -61,3 +66,24 @@ def _inputs(project: Project, source: Source) -> dict[str, str | None]:
         grid = project.grid_folder / name
         inputs[str(project.directory / name)] = digest(grid.read_bytes()) if grid.is_file() else None
     return inputs
+
+
+def _place_of(result: Result) -> Document:
+    """Return longitude and latitude of the first and the last photo of each strip, degrees, and the body's radius.
+
+    None where the frame is local: only the project knows where it lies.
+    """
+    found = result.computed
+    if found is None or found.output.kind == "local":
+        return {"body": None, "track": None}
+    frame, photos = found.output, result.document["photos"]
+    strips: dict[str, list[Document]] = {}
+    for photo in photos:
+        strips.setdefault(photo["strip"], []).append(photo)
+    ends = [end for group in strips.values() for end in (group[0], group[-1])]
+    given = np.array([[end["x"], end["y"], end["z"]] for end in ends], float)
+    internal = np.empty_like(given)
+    internal[:, list(frame.order)] = given
+    degrees = np.degrees(frame.geodetic(frame.cartesian_from_ground(internal))[:, :2]).round(DECIMALS).tolist()
+    radius = frame.ellipsoid[0] if frame.ellipsoid else 6378137.0
+    return {"body": radius, "track": [degrees[n : n + 2] for n in range(0, len(degrees), 2)]}

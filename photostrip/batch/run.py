@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any
 
 from photostrip.batch.local_pool import Executor
 from photostrip.batch.outcomes import FAULTY, UNWRITTEN, failure, not_run
@@ -21,13 +21,8 @@ from photostrip.result.verdict import VERDICTS, exit_code
 LAST_REFUSALS = 3  # results in a row that cannot be written before the batch gives up
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
-
-class Listener(Protocol):
-    """Who hears what happens."""
-
-    def finished(self, outcome: Document, answer: Answer | None) -> None:
-        """Take notice of a project that is done; without an answer, its result was there already."""
-        ...
+# hears of a project that is done; without an answer, its result was there already
+Listener = Callable[[Document, Answer | None], None]
 
 
 @dataclass
@@ -150,7 +145,7 @@ class Run:
         if outcome["status"] in VERDICTS:
             line["exit_code"] = exit_code(outcome["status"], strict=self.strict)
         self.batch.outcomes[chosen.number] = line
-        listener.finished(line, answer)
+        listener(line, answer)
 
 
 def named(outcome: Document, chosen: ChosenProject, *, written: bool) -> Document:

@@ -28,6 +28,14 @@ class Format(StrEnum):
     GITHUB = "github"
 
 
+class StatementFormat(StrEnum):
+    """Forms in which a statement and a verification are printed."""
+
+    TEXT = "text"
+    JSON = "json"
+    MD = "md"
+
+
 class BatchFormat(StrEnum):
     """Forms in which the summary of a batch is printed."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -40,30 +40,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.resection import resection as exterior
 
 NEW, CONTROL, CHECK = "new", "control", "check"
-
-
-class StripShape(Protocol):
-    """Points and perspective centres of a strip as it was formed, in the frame and scale of its first model."""
-
-    @property
-    def point(self) -> Numbers:
-        """Numbers of the points, ascending, shape (q,)."""
-
-    @property
-    def xyz(self) -> Floats:
-        """Strip coordinates of the points, shape (q, 3): means over the models that hold them."""
-
-    @property
-    def model_count(self) -> Numbers:
-        """Number of those models, shape (q,)."""
-
-    @property
-    def centers(self) -> Floats:
-        """Perspective centres in flight order, shape (n, 3); NaN where one is not known."""
-
-    @property
-    def ends(self) -> Floats:
-        """Two places between which the strip runs, shape (2, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +114,8 @@ class StripResult:
         return self.of_models.strip if self.photo_stages is None else self.photo_stages.strip
 
     @property
-    def formed(self) -> StripShape:
+    def formed(self) -> FormedStrip | FormedModels:
+        """The strip in the frame and scale of its first model."""
         return self.of_models.formed if self.photo_stages is None else self.photo_stages.formed
 
     @property

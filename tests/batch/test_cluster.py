@@ -169,7 +169,7 @@ def test_one_of_two_machines_dies_in_the_middle(tmp_path: Path, monkeypatch: pyt
                     workers[0].send_signal(signal.SIGKILL)
 
         with opened(Path("out")) as folder, clusters.cluster(address, 1, Limits()) as executor:
-            batch = Run(choose(["strips"]), (), folder, force=False).go(executor, Killing(), Stop())
+            batch = Run(choose(["strips"]), (), folder, force=False).go(executor, Killing().finished, Stop())
     assert workers[0].returncode == -signal.SIGKILL
     assert [each["status"] for each in batch.outcomes] == ["good"] * number  # nothing lost
     assert set(count.times.values()) == {1}  # nothing written twice
@@ -193,7 +193,7 @@ def test_a_project_that_crashes_or_hangs_leaves_the_machine_alone(
     count = Count()
     limits = Limits(seconds=4.0, megabytes=500.0)
     with clusters.cluster(cluster, 1, limits, work=WORK) as executor:
-        Run(choose(["strips"]), (), None, force=False).go(executor, count, Stop())
+        Run(choose(["strips"]), (), None, force=False).go(executor, count.finished, Stop())
     assert count.statuses == {"segfault": "crashed", "hang": "timeout", "memory": "memory", "good": "good"}
 
 

@@ -64,7 +64,7 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
         trouble: list[PhotostripError] = []
         try:
             with executor_of(options, len(projects), table) as executor:
-                run.go(executor, BatchMessages(table, len(projects), quiet=quiet, verbose=verbose), stop)
+                run.go(executor, BatchMessages(table, len(projects), quiet=quiet, verbose=verbose).finished, stop)
         except PhotostripError as error:  # nobody computes: the cluster is gone, or no process starts
             trouble.append(error)
         finally:

@@ -20,7 +20,7 @@ from photostrip.geometry.similarity import Similarity, similarity_derivatives
 from photostrip.pipeline.choice import Deformation
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
-from photostrip.pipeline.results import StripResult, StripShape
+from photostrip.pipeline.results import StripResult
 from photostrip.points import ControlPoints
 from photostrip.rejection import Rejection
 from photostrip.triangulation import absolute_orientation
@@ -30,9 +30,11 @@ from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
 from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
 from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
+from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+    from photostrip.triangulation.independent_models.formation import FormedModels
 
 
 Errors = TypeVar("Errors")  # derivatives of a strip on the ground by what was measured
@@ -46,7 +48,7 @@ class StripStage(Protocol[Errors]):
         """What was flown."""
 
     @property
-    def formed(self) -> StripShape:
+    def formed(self) -> FormedStrip | FormedModels:
         """Points and perspective centres, in the scale of the first model."""
 
     @property
@@ -214,7 +216,9 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
     return reject_wrong_control(oriented, settings) if images else ScreenedStrip(oriented, screened)
 
 
-def control_of(formed: StripShape, control: ControlPoints, point_ids: Sequence[str]) -> tuple[ControlPoints, Numbers]:
+def control_of(
+    formed: FormedStrip | FormedModels, control: ControlPoints, point_ids: Sequence[str]
+) -> tuple[ControlPoints, Numbers]:
     """Control points that have strip coordinates, and their rows there."""
     rows = rows_of_given(control.ids, formed.point, point_ids)
     inside = rows >= 0

@@ -48,12 +48,12 @@ def _map(number: int, projects: Sequence[Document]) -> svg.Picture:
     ways = [_ahead(spot, sheet.place(ground(each["track"][0][1]))) for each, spot in zip(projects, spots, strict=True)]
     found += ids(zip(map(_name, projects), spots, strict=True), [*spots, *ways], (WIDTH, sheet.height - 30.0))
     places = ", ".join(f"{_name(each)} ({each['status']})" for each in projects[:NAMED])
-    texts = svg.Texts(
+    texts = (
         f"{counted(len(projects), 'project')} on a body of {projects[0]['body'] / 1000:.0f} km radius",
         f"A line for each strip, a mark at its first photo; north is up, true lengths at latitude {middle:.1f}°",
         f"Strips of {places}",
     )
-    return svg.picture(f"map-{number}", (WIDTH, max(sheet.height, TOP)), texts, found)
+    return svg.picture(f"map-{number}", (WIDTH, max(sheet.height, TOP)), found, *texts)
 
 
 def _ahead(start: svg.Point, end: svg.Point) -> svg.Point:

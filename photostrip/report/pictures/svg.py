@@ -26,14 +26,6 @@ class Picture(NamedTuple):
     svg: str  # the picture; its title and description are those for readers who cannot see it
 
 
-class Texts(NamedTuple):
-    """The words of a picture."""
-
-    title: str
-    caption: str
-    description: str  # for readers who cannot see it
-
-
 class Axis(NamedTuple):
     """A scale from numbers to places on the picture."""
 
@@ -138,9 +130,10 @@ def tested(place: Point, hint: str, inside: tuple[str, str], size: float, *, out
     return mark(place, shape, kind, hint, size)
 
 
-def picture(name: str, size: Point, texts: Texts, content: Iterable[str]) -> Picture:
-    head = element("title", escape(texts.title), id=f"picture-{name}-title") + element(
-        "desc", escape(texts.description), id=f"picture-{name}-desc"
+def picture(name: str, size: Point, content: Iterable[str], title: str, caption: str, description: str) -> Picture:
+    """Return a picture with its words; the description is for readers who cannot see it."""
+    head = element("title", escape(title), id=f"picture-{name}-title") + element(
+        "desc", escape(description), id=f"picture-{name}-desc"
     )
     svg = element(
         "svg",
@@ -150,7 +143,7 @@ def picture(name: str, size: Point, texts: Texts, content: Iterable[str]) -> Pic
         role="img",
         aria_labelledby=f"picture-{name}-title picture-{name}-desc",
     )
-    return Picture(name=name, title=texts.title, caption=texts.caption, svg=svg)
+    return Picture(name=name, title=title, caption=caption, svg=svg)
 
 
 def frame(x: Axis, y: Axis, labels: tuple[str, str]) -> list[str]:

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.commands.statements.forms import StatementFormat
 from photostrip.cli.options import Quiet, Width
-from photostrip.cli.stdout import Document, Format, form_of, print_json, print_sections
+from photostrip.cli.stdout import Document, Format, StatementFormat, form_of, print_json, print_sections
 
 HTML = ".html"
 

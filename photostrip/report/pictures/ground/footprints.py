@@ -45,9 +45,7 @@ def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
         f"The largest footprint is that of photo {largest}, {_size(outlines[largest]) / 1e6:.3g} km²."
     )
     words = f"{counted(len(outlines), 'footprint')}; at most {max(counts, default=0)} photos show the same ground."
-    return [
-        svg.picture("footprints", (WIDTH, sheet.height), svg.Texts("Footprints and overlap", caption, words), drawn)
-    ]
+    return [svg.picture("footprints", (WIDTH, sheet.height), drawn, "Footprints and overlap", caption, words)]
 
 
 def _holds(outline: Sequence[svg.Point], name: str) -> bool:

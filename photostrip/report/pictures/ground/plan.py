@@ -64,8 +64,7 @@ def plan_picture(document: Document, plan: Plan) -> Picture:
     )
     counts = counted(len(plan.strips), "strip"), counted(len(plan.spots), "point")
     words = f"{', '.join(counts)}; the tables of control and check points have the numbers."
-    texts = svg.Texts(f"Plan of {document['name']}", caption, words)
-    return svg.picture("plan", (WIDTH, sheet.height), texts, drawn)
+    return svg.picture("plan", (WIDTH, sheet.height), drawn, f"Plan of {document['name']}", caption, words)
 
 
 def place_of(spot: Spot, sheet: Sheet) -> svg.Point:

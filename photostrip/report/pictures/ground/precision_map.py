@@ -74,7 +74,7 @@ def _map(plan: Plan, part: str, title: str, known: Sequence[tuple[Spot, float]])
     what = "larger semi-axis of the standard error ellipse" if part == "plan" else "standard deviation of the height"
     caption = f"The {what} of each point: strong, large dots are known worst. The ids are those of the worst points."
     words = f"{counted(len(known), 'point')}; the largest is {short(largest, 3)} m at {spot.id}."
-    return svg.picture(f"precision-{part}", (WIDTH, sheet.height), svg.Texts(title, caption, words), drawn)
+    return svg.picture(f"precision-{part}", (WIDTH, sheet.height), drawn, title, caption, words)
 
 
 def _radius(level: int) -> float:

@@ -100,7 +100,7 @@ def _picture(plan: Plan, nodes: dict[str, Pair], ties: list[Tie], what: str) -> 
     if lone:
         caption += f" Without a common point: {', '.join(lone[:8])}."
     words = f"{counted(len(nodes), what)}, {counted(len(ties), 'tie')}; {counted(groups, 'connected group')}."
-    return svg.picture("ties", (WIDTH, sheet.height), svg.Texts(f"Ties between {what}s", caption, words), drawn)
+    return svg.picture("ties", (WIDTH, sheet.height), drawn, f"Ties between {what}s", caption, words)
 
 
 def _lines(ties: list[Tie], at: dict[str, svg.Point], strongest: int) -> list[str]:

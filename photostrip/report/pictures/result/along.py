@@ -72,8 +72,7 @@ def deformation_pictures(document: Document, plan: Plan) -> list[Picture]:
         largest, name, axis = max(sizes)
         words += f"; the largest difference is {largest:.3f} m at {name}, {axis}"
     title = "Differences at given points" + (", before and after" if any(strip.before for strip in shown) else "")
-    texts = svg.Texts(title, f"{caption}.", f"{words}.")
-    return [svg.picture("deformation", (WIDTH, layout.whole), texts, drawn)]
+    return [svg.picture("deformation", (WIDTH, layout.whole), drawn, title, f"{caption}.", f"{words}.")]
 
 
 def _strips(document: Document, plan: Plan) -> list[Strip]:
@@ -209,5 +208,5 @@ def precision_pictures(document: Document) -> list[Picture]:
     points = document["precision"]["points"]
     worst = [f"{name} {short(points[name]['max'], 3)} m at {points[name]['worst']}" for name in ("plan", "height")
              if points[name]["max"] is not None]  # fmt: skip
-    texts = svg.Texts("Precision along the strip", caption, "; ".join(worst) or "Not known.")
-    return [svg.picture("precision", (WIDTH, shown.layout.whole), texts, drawn)]
+    extent, words = (WIDTH, shown.layout.whole), "; ".join(worst) or "Not known."
+    return [svg.picture("precision", extent, drawn, "Precision along the strip", caption, words)]

@@ -47,8 +47,8 @@ def junction_pictures(document: Document) -> list[Picture]:
     scale = "model" if document.get("links") else "photo"
     caption = f"Rms differences of the common points of two models at {scale} scale, at the photo that joins them."
     words = f"{counted(len(rows), 'junction')}; the largest gap is at photo {max(rows, key=_gap)['photo']}."
-    texts = svg.Texts("Gaps between models", f"{caption}{shown.some}", words)
-    return [svg.picture("junctions", (WIDTH, shown.layout.whole), texts, drawn)]
+    extent = WIDTH, shown.layout.whole
+    return [svg.picture("junctions", extent, drawn, "Gaps between models", caption + shown.some, words)]
 
 
 def _gap(row: Document) -> float:
@@ -114,8 +114,8 @@ def _scale_picture(document: Document, plan: Plan, found: dict[str, list[Pair]])
     )
     worst = max(sizes, key=lambda strip: sizes[strip])
     words = f"{counted(len(sizes), 'strip')}; the largest departure is {sizes[worst]:.0f} ppm in strip {worst}."
-    texts = svg.Texts("Drift of the scale", f"{caption}{shown.some}", words)
-    return svg.picture("scale", (WIDTH, shown.layout.whole), texts, drawn)
+    extent = WIDTH, shown.layout.whole
+    return svg.picture("scale", extent, drawn, "Drift of the scale", caption + shown.some, words)
 
 
 def _polynomial(document: Document, plan: Plan, strip: str, values: Sequence[Pair]) -> list[Pair]:

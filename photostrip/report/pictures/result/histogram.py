@@ -62,8 +62,7 @@ def histogram_picture(document: Document, used: Sequence[Residual]) -> Picture:
             f" {counted(beyond, 'residual')} beyond the axis {'is' if beyond == 1 else 'are'} counted at its ends."
         )
     words = " ".join(_words(each) for each in samples)
-    texts = svg.Texts("Distribution of the residuals", caption, words)
-    return svg.picture("histogram", (WIDTH, layout.whole), texts, drawn)
+    return svg.picture("histogram", (WIDTH, layout.whole), drawn, "Distribution of the residuals", caption, words)
 
 
 def rms(values: Sequence[float]) -> float:

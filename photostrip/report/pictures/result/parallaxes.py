@@ -66,8 +66,7 @@ def parallax_pictures(document: Document) -> list[Picture]:
         caption += " Upright lines part the strips."
     largest = f"{worst.size:.1f} µm at point {worst.point} of {worst.names}"
     words = f"{counted(pairs, 'pair')}; the largest parallax is {largest}."
-    texts = svg.Texts("y parallaxes by standard zone", caption, words)
-    return [svg.picture("parallaxes", (WIDTH, layout.whole), texts, drawn)]
+    return [svg.picture("parallaxes", (WIDTH, layout.whole), drawn, "y parallaxes by standard zone", caption, words)]
 
 
 def _limit(everything: Sequence[Parallax]) -> float:

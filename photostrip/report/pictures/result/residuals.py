@@ -102,8 +102,7 @@ def _vectors(document: Document, found: Sequence[Residual]) -> list[Picture]:
     worst = max(sizes, key=lambda photo: sizes[photo])
     words = f"{counted(len(by_photo), 'photo')}; the largest rms is {sizes[worst]:.1f} µm in photo {worst}."
     height = 62.0 + rows * (tall + 30.0)
-    texts = svg.Texts("Image residuals by photo", caption, words)
-    return [svg.picture("image-residuals", (WIDTH, height), texts, drawn)]
+    return [svg.picture("image-residuals", (WIDTH, height), drawn, "Image residuals by photo", caption, words)]
 
 
 def _grids(document: Document, used: Sequence[Residual]) -> list[Picture]:
@@ -146,8 +145,7 @@ def _grids(document: Document, used: Sequence[Residual]) -> list[Picture]:
         "short and mixed. Dots grow with the number of residuals."
     )
     words = f"{counted(len(shown), 'camera')}; the largest mean is {max(lengths):.2f} µm."
-    texts = svg.Texts("Mean residuals of the image plane", caption, words)
-    return [svg.picture("image-plane", (WIDTH, top + 20.0), texts, drawn)]
+    return [svg.picture("image-plane", (WIDTH, top + 20.0), drawn, "Mean residuals of the image plane", caption, words)]
 
 
 class Cell(NamedTuple):

@@ -65,8 +65,7 @@ def check_pictures(document: Document) -> list[Picture]:
         "covariance, in height with its sign. 95 % lie inside the band when these standard deviations are right."
     )
     words = f"{counted(len(rows), 'check point')}, {outside} outside the limits in plan or height."
-    texts = svg.Texts("Check points against their precision", caption, words)
-    return [svg.picture("check", (WIDTH, layout.whole), texts, drawn)]
+    return [svg.picture("check", (WIDTH, layout.whole), drawn, "Check points against their precision", caption, words)]
 
 
 def position_pictures(document: Document) -> list[Picture]:
@@ -99,7 +98,7 @@ def position_pictures(document: Document) -> list[Picture]:
     caption = "Adjusted minus given camera positions, photo by photo, offset and drift taken off."
     worst = max(rows, key=lambda row: max(abs(row[key] or 0.0) for key, _ in POSITIONS))
     words = f"{counted(len(rows), 'camera position')}; the largest difference is at photo {worst['photo']}."
-    return [svg.picture("positions", (WIDTH, layout.whole), svg.Texts("Camera positions", caption, words), drawn)]
+    return [svg.picture("positions", (WIDTH, layout.whole), drawn, "Camera positions", caption, words)]
 
 
 def correlation_pictures(document: Document) -> list[Picture]:
@@ -142,5 +141,5 @@ def correlation_pictures(document: Document) -> list[Picture]:
     )
     strongest = f"{largest[0]:.2f}, of {largest[1]} with {largest[2]}"
     words = f"{counted(count, 'parameter')}; the largest correlation is {strongest}."
-    texts = svg.Texts("Correlations of the calibration", caption, words)
-    return [svg.picture("correlations", (WIDTH, top + count * cell + 24.0), texts, drawn)]
+    extent = WIDTH, top + count * cell + 24.0
+    return [svg.picture("correlations", extent, drawn, "Correlations of the calibration", caption, words)]
