@@ -429,7 +429,7 @@ def wrong_images(seed: int) -> Sound:
     size = float(np.random.default_rng([26, seed]).uniform(100, 1000))
     spec = plausibility.with_ties(2)(seed).spec
     simulation = simulate(replace(spec, gross_errors=(GrossError("image", count=8, size_um=size, axis="x"),)))
-    return Sound(inputs_of(simulation), settings_of(simulation), simulation.spec)
+    return Sound(inputs_of(simulation), settings_of(simulation), simulation.spec, frozenset({"P304"}))
 
 
 def large_block(seed: int) -> Sound:

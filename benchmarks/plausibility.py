@@ -1089,7 +1089,7 @@ MISTAKES = (
     Mistake("one id for two points", same_id, ("P301",)),
     Mistake("one id for two points of two strips", same_id_in_two_strips, ("P301",), block),
     Mistake("one id for two points of two strips, bundle", same_id_in_two_strips, ("P301",), block, "bundle"),
-    Mistake("one id for two points nearby in two strips", same_id_nearby, ("P301",), with_ties(2)),
+    Mistake("one id for two points nearby in two strips", same_id_nearby, ("P301", "P304"), with_ties(2)),
     Mistake("one id in strips that do not overlap", same_id_far_away, ("P301",), with_ties(3)),
     Mistake("two ids for one point", two_ids, ("P302",)),
     Mistake("ids of one photo in the next row", ids_in_the_next_row, ("P303",)),

@@ -94,7 +94,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         checks = inputs.control.check
         findings += units.find_wrong_sigmas_of_given(predicted.off[checks], inputs.control.sigma[checks])
     for ties in compared_strips(stages, points.point_ids):
-        findings += tied_strips.find_shared_ids_of_strips(ties)
+        findings += tied_strips.find_shared_ids_of_strips(ties, joined=result.bundle is not None)
     findings += given_cameras.centers(inputs, points, images.strips, directory)
     findings += _of_rotations(result, formed, directory)
     if result.bundle is not None:

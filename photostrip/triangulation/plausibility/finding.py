@@ -37,6 +37,7 @@ KINDS: dict[str, Kind] = {
     "P301": Kind("one id for two points", WARNING),
     "P302": Kind("two ids for one point", WARNING),
     "P303": Kind("point ids of a photo that do not go with its neighbours", ERROR),
+    "P304": Kind("a point at two places in two strips", WARNING),
     "P401": Kind("control axes exchanged or left-handed", ERROR),
     "P402": Kind("control outside its coordinate reference system", ERROR),
     "P403": Kind("control in feet", ERROR),

@@ -1,7 +1,8 @@
 """Ids that stand for two points in two strips: ties that do not go with the other ties of the same strips.
 
 Two strips, each on its own control, put a common point at two places that differ by the errors of both: a smooth
-function of the place. What lies far off it is no error of a strip.
+function of the place. What lies far off it is no error of a strip: it is two points, or, where one of the strips has
+two rays of it, perhaps an image coordinate that is wrong along the base, which nothing in the strip shows.
 """
 
 from __future__ import annotations
@@ -40,51 +41,58 @@ class TiesOfStrips:
 class OddTies(NamedTuple):
     """Ties that do not go with the others."""
 
-    rows: Numbers  # those
+    rows: Numbers  # those that stand for two points
+    unsure: Numbers  # those that may have a wrong image coordinate along the base instead
     far: Floats  # (t,): how far each tie is off, metres
     limit: Floats  # (t,): how far chance may bring it, metres
 
 
 def odd_ties(ties: TiesOfStrips) -> OddTies | None:
-    """Find the ties of two points by their places in plan; None where nothing is odd at first sight.
-
-    A wrong image coordinate along the base moves a point of two rays, and nothing in its strip shows it.
-    """
+    """Find the ties of two points by their places in plan; None where nothing is odd at first sight."""
     if len(ties.names) < LEAST_TIES:
         return _of_few(ties)
     place, off = ties.plan[:, 0] + 1j * ties.plan[:, 1], ties.difference[:, 0] + 1j * ties.difference[:, 1]
-    least = np.where(ties.rays > TWO_RAYS, MANY_RAYS_SHARE, ONE_RAY_SHARE) * ties.depth
     middle = complex(median(off.real), median(off.imag))
-    if (np.abs(off - middle) <= least).all():
+    if (np.abs(off - middle) <= MANY_RAYS_SHARE * ties.depth).all():
         return None  # none is far from the others even if the strips share no bend
     local = (place - place.mean()) / max(float(np.abs(place - place.mean()).max()), 1e-9)
     columns = [np.ones_like(local), local, np.conj(local), local**2, np.abs(local) ** 2, np.conj(local) ** 2]
     _, fit = fit_simplest(columns, 1, off, np.ones(len(off), bool), ties.sigma)
     far = np.abs(fit.residual)
-    return OddTies(np.flatnonzero(fit.odd & (far > least)), far, fit.limit)
+    odd = fit.odd & (far > MANY_RAYS_SHARE * ties.depth)
+    two = (ties.rays > TWO_RAYS) | (far > ONE_RAY_SHARE * ties.depth)
+    return OddTies(rows=np.flatnonzero(odd & two), unsure=np.flatnonzero(odd & ~two), far=far, limit=fit.limit)
 
 
 def _of_few(ties: TiesOfStrips) -> OddTies:
     far = np.hypot(*ties.difference.T)
     limit = np.full(len(far), FEW_TIES_SHARE * ties.depth)
-    return OddTies(np.flatnonzero(far > limit), far, limit)
+    return OddTies(rows=np.flatnonzero(far > limit), unsure=np.zeros(0, np.intp), far=far, limit=limit)
 
 
-def find_shared_ids_of_strips(ties: TiesOfStrips) -> Iterator[Finding]:
-    """Find ids of two points by the ties of two strips."""
+def find_shared_ids_of_strips(ties: TiesOfStrips, *, joined: bool = False) -> Iterator[Finding]:
+    """Find ids of two points by the ties of two strips, and ties of which that or a wrong image coordinate is true.
+
+    joined: the strips were adjusted together, which tests the image coordinates.
+    """
     odd = odd_ties(ties)
     if odd is None:
         return
     one, other = ties.strips
-    for row in odd.rows.tolist():
-        far = float(odd.far[row])
-        message = (
-            f"point {ties.names[row]} stands for two points: strip {other} puts it {far:.4g} m away from where "
-            f"strip {one} puts it{_others(np.delete(odd.far, row))}"
+    for row in odd.rows.tolist() if joined else [*odd.rows.tolist(), *odd.unsure.tolist()]:
+        far, name, sure = float(odd.far[row]), ties.names[row], row in odd.rows
+        apart = (
+            f"strip {other} puts it {far:.4g} m away from where strip {one} puts it{_others(np.delete(odd.far, row))}"
         )
         evidence = {"distance_m": far, "limit_m": float(odd.limit[row])}
-        fix = f"give it another id on the photos of strip {other}"
-        yield found("P301", message, fix, evidence, points=(ties.names[row],), strips=ties.strips)
+        if sure:
+            message, fix = f"stands for two points: {apart}", f"give it another id on the photos of strip {other}"
+        else:
+            message = f"stands for two points, or is measured wrong along the base: {apart}"
+            fix = "look at it on the photos of both strips: two rays do not show which of them is wrong"
+        yield found(
+            "P301" if sure else "P304", f"point {name} {message}", fix, evidence, points=(name,), strips=ties.strips
+        )
 
 
 def _others(far: Floats) -> str:
