@@ -12,6 +12,7 @@ from typing import Any, get_type_hints
 import typer
 
 from photostrip.cli.command_table import HELP_NAMES
+from photostrip.cli.failures import failures_as
 
 Command = Callable[..., None]
 
@@ -27,7 +28,7 @@ def subcommand(of: typer.Typer, name: str, epilog: str) -> Callable[[Command], C
 
 
 def _with_groups(command: Command) -> Command:
-    """Let a command that takes groups of options show typer every option of its own.
+    """Let a command that takes groups of options show typer every option of its own, and fail in its form.
 
     A parameter whose type is a dataclass stands for the fields of it, in their order and with their defaults.
     """
@@ -39,9 +40,10 @@ def _with_groups(command: Command) -> Command:
 
     @wraps(command)
     def run(**given: Any) -> None:  # noqa: ANN401 (what typer read)
-        for name, kind in groups.items():
-            given[name] = kind(**{each.name: given.pop(each.name) for each in fields(kind)})
-        command(**given)
+        with failures_as(given["form"]):
+            for name, kind in groups.items():
+                given[name] = kind(**{each.name: given.pop(each.name) for each in fields(kind)})
+            command(**given)
 
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in options}

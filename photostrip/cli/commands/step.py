@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal
 import typer
 
 from photostrip.cli.documents import FORMS, Form, Rendering, require_target
-from photostrip.cli.failures import failures_as
 from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import Silent
 from photostrip.cli.stdout import Document
@@ -89,13 +88,12 @@ def interior(
     delivery: Delivery,
 ) -> None:
     """Fit the transformation of measured fiducial marks to calibrated ones, mm."""
-    with failures_as(delivery.form):
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        ids, (measured, calibrated) = _read(file, "interior", delivery)
-        found = steps.interior(measured, calibrated, transform)
-        document = step_documents.interior(ids, found)
-        delivery.deliver(document, lambda: step_traces.interior(ids, measured, calibrated, found))
+    ids, (measured, calibrated) = _read(file, "interior", delivery)
+    found = steps.interior(measured, calibrated, transform)
+    document = step_documents.interior(ids, found)
+    delivery.deliver(document, lambda: step_traces.interior(ids, measured, calibrated, found))
 
 
 @_command("refine", "point, x, y", "points.csv -f 152.12 --principal-point 0.012,-0.004 --k 2.5e-8,0,0")
@@ -118,17 +116,16 @@ def refine(
     delivery: Delivery,
 ) -> None:
     """Reduce photo coordinates, mm, to the principal point, and correct lens distortion and refraction."""
-    with failures_as(delivery.form):
-        from photostrip.camera import Camera, Distortion
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.camera import Camera, Distortion
+    from photostrip.library import step_documents, step_traces, steps
 
-        ids, (xy,) = _read(file, "refine", delivery)
-        k1, k2, k3 = _numbers(k, 3, "--k")
-        x0, y0 = _numbers(principal_point, 2, "--principal-point")
-        lens = Distortion(model="brown", direction="image_to_ideal", k=(k1, k2, k3)) if any((k1, k2, k3)) else None
-        camera = Camera(name="camera", principal_distance=focal, principal_point=(x0, y0), distortion=lens)
-        refined = steps.refine(xy, camera, flying_height=flying_height, ground_height=ground_height)
-        delivery.deliver(step_documents.refine(ids, xy, refined), lambda: step_traces.refine(ids, xy, refined, camera))
+    ids, (xy,) = _read(file, "refine", delivery)
+    k1, k2, k3 = _numbers(k, 3, "--k")
+    x0, y0 = _numbers(principal_point, 2, "--principal-point")
+    lens = Distortion(model="brown", direction="image_to_ideal", k=(k1, k2, k3)) if any((k1, k2, k3)) else None
+    camera = Camera(name="camera", principal_distance=focal, principal_point=(x0, y0), distortion=lens)
+    refined = steps.refine(xy, camera, flying_height=flying_height, ground_height=ground_height)
+    delivery.deliver(step_documents.refine(ids, xy, refined), lambda: step_traces.refine(ids, xy, refined, camera))
 
 
 @_command("relative", "point, x_left, y_left, x_right, y_right", "pair.csv -f 153 --base 920 --unit m")
@@ -143,13 +140,12 @@ def relative(
 
     The elements stand relative to the base, and as bx, by, bz and angles of the right photo in the system of the left.
     """
-    with failures_as(delivery.form):
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        ids, (left, right) = _read(file, "relative", delivery)
-        found = steps.relative(left, right, model.focal, base=model.base)
-        document = step_documents.relative(ids, found, model.base, unit)
-        delivery.deliver(document, lambda: step_traces.relative(ids, left, right, model.focal, found, model.base))
+    ids, (left, right) = _read(file, "relative", delivery)
+    found = steps.relative(left, right, model.focal, base=model.base)
+    document = step_documents.relative(ids, found, model.base, unit)
+    delivery.deliver(document, lambda: step_traces.relative(ids, left, right, model.focal, found, model.base))
 
 
 @_command(
@@ -175,17 +171,16 @@ def intersection(
     delivery: Delivery,
 ) -> None:
     """Intersect the rays of two photos of known orientation; points stand relative to the left perspective centre."""
-    with failures_as(delivery.form):
-        import numpy as np
+    import numpy as np
 
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        ids, (one, other) = _read(file, "intersection", delivery)
-        turned = _rotation(_numbers(left, 3, "--left")), _rotation(_numbers(right, 3, "--right"))
-        b = np.array(_numbers(base, 3, "--base"))
-        found = steps.intersection(one, other, focal, base=b, rotations=turned, left_ray=left_ray)
-        document = step_documents.intersection(ids, found, unit)
-        delivery.deliver(document, lambda: step_traces.intersection(ids, (one, other), focal, b, turned))
+    ids, (one, other) = _read(file, "intersection", delivery)
+    turned = _rotation(_numbers(left, 3, "--left")), _rotation(_numbers(right, 3, "--right"))
+    b = np.array(_numbers(base, 3, "--base"))
+    found = steps.intersection(one, other, focal, base=b, rotations=turned, left_ray=left_ray)
+    document = step_documents.intersection(ids, found, unit)
+    delivery.deliver(document, lambda: step_traces.intersection(ids, (one, other), focal, b, turned))
 
 
 @_command("chain", "photo, omega, phi, kappa (degrees)", "strip.csv")
@@ -194,27 +189,25 @@ def chain(*, file: Table, delivery: Delivery) -> None:
 
     The first photo is given in the system of the strip: 0, 0, 0, or its angles there.
     """
-    with failures_as(delivery.form):
-        import numpy as np
+    import numpy as np
 
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        ids, (given,) = _read(file, "chain", delivery)
-        rotations = np.array([_rotation(each) for each in given.tolist()])
-        handed = steps.chain(rotations[1:], rotations[0])
-        delivery.deliver(step_documents.chain(ids, handed), lambda: step_traces.chain(ids, rotations, handed))
+    ids, (given,) = _read(file, "chain", delivery)
+    rotations = np.array([_rotation(each) for each in given.tolist()])
+    handed = steps.chain(rotations[1:], rotations[0])
+    delivery.deliver(step_documents.chain(ids, handed), lambda: step_traces.chain(ids, rotations, handed))
 
 
 @_command("scale", "point, x, y, z, x_next, y_next, z_next", "junction.csv")
 def scale(*, file: Table, delivery: Delivery) -> None:
     """Bring a model to the scale of the one before it by common points, each from the perspective centre of both."""
-    with failures_as(delivery.form):
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        ids, (first, second) = _read(file, "scale", delivery)
-        factor, departures = steps.scale_transfer(first, second)
-        document = step_documents.scale(ids, factor, departures)
-        delivery.deliver(document, lambda: step_traces.scale(ids, first, second, factor))
+    ids, (first, second) = _read(file, "scale", delivery)
+    factor, departures = steps.scale_transfer(first, second)
+    document = step_documents.scale(ids, factor, departures)
+    delivery.deliver(document, lambda: step_traces.scale(ids, first, second, factor))
 
 
 @_command("strip", "photo, point, x, y", "images.csv -f 153 --base 92 --unit mm")
@@ -232,26 +225,24 @@ def strip(
 
     Image coordinates in mm. The steps in between are `relative`, `chain`, `intersection` and `scale`.
     """
-    with failures_as(delivery.form):
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        photos, points, rays = _read_rays(file, delivery)
-        names = photos, points
-        found = steps.strip(rays, model.focal, base=model.base, scale_transfer=scale_transfer, names=names)
-        document = step_documents.strip(photos, points, found, unit)
-        delivery.deliver(document, lambda: step_traces.strip(photos, found))
+    photos, points, rays = _read_rays(file, delivery)
+    names = photos, points
+    found = steps.strip(rays, model.focal, base=model.base, scale_transfer=scale_transfer, names=names)
+    document = step_documents.strip(photos, points, found, unit)
+    delivery.deliver(document, lambda: step_traces.strip(photos, found))
 
 
 @_command("absolute", "point, x, y, z, x_ground, y_ground, z_ground", "control.csv")
 def absolute(*, file: Table, unit: Unit = "m", delivery: Delivery) -> None:
     """Fit a model to points that are known in Cartesian ground coordinates, by seven parameters."""
-    with failures_as(delivery.form):
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        ids, (model, ground) = _read(file, "absolute", delivery)
-        found = steps.absolute(model, ground)
-        document = step_documents.absolute(ids, found, unit)
-        delivery.deliver(document, lambda: step_traces.absolute(ids, model, ground, found, unit))
+    ids, (model, ground) = _read(file, "absolute", delivery)
+    found = steps.absolute(model, ground)
+    document = step_documents.absolute(ids, found, unit)
+    delivery.deliver(document, lambda: step_traces.absolute(ids, model, ground, found, unit))
 
 
 @_command("polynomial", "point, x, y, z, misclosure", "control.csv --terms 1,X,Y,X^2")
@@ -263,26 +254,24 @@ def polynomial(
     delivery: Delivery,
 ) -> None:
     """Fit the deformation of a strip along one axis: misclosures, strip minus given, at control points."""
-    with failures_as(delivery.form):
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        ids, (xyz, misclosures) = _read(file, "polynomial", delivery)
-        wanted, values = [each.strip() for each in terms.split(",")], misclosures[:, 0]
-        found = steps.polynomial(xyz, values, wanted)
-        document = step_documents.polynomial(ids, wanted, *found, unit)
-        delivery.deliver(document, lambda: step_traces.polynomial(ids, xyz, values, wanted, found))
+    ids, (xyz, misclosures) = _read(file, "polynomial", delivery)
+    wanted, values = [each.strip() for each in terms.split(",")], misclosures[:, 0]
+    found = steps.polynomial(xyz, values, wanted)
+    document = step_documents.polynomial(ids, wanted, *found, unit)
+    delivery.deliver(document, lambda: step_traces.polynomial(ids, xyz, values, wanted, found))
 
 
 @_command("resection", "point, x, y, x_ground, y_ground, z_ground", "photo.csv -f 152.12 --sigma-um 8")
 def resection(*, file: Table, focal: Focal, sigma_um: Sigma = 5.0, unit: Unit = "m", delivery: Delivery) -> None:
     """Orient one photo on known points, at any attitude, image coordinates in mm."""
-    with failures_as(delivery.form):
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        ids, (xy, ground) = _read(file, "resection", delivery)
-        found = steps.resection(xy, ground, focal, sigma=sigma_um / 1000.0)
-        document = step_documents.resection(ids, found, unit)
-        delivery.deliver(document, lambda: step_traces.resection(ids, xy, ground, focal, found, unit))
+    ids, (xy, ground) = _read(file, "resection", delivery)
+    found = steps.resection(xy, ground, focal, sigma=sigma_um / 1000.0)
+    document = step_documents.resection(ids, found, unit)
+    delivery.deliver(document, lambda: step_traces.resection(ids, xy, ground, focal, found, unit))
 
 
 @_command("bundle", "photo, point, x, y", "images.csv -f 153 --control control.csv --sigma-um 5")
@@ -305,22 +294,21 @@ def bundle(
 
     Image coordinates in mm. Without control: a free network in model coordinates, as long as its first base says.
     """
-    with failures_as(delivery.form):
-        from photostrip.library import step_documents, step_traces, steps
+    from photostrip.library import step_documents, step_traces, steps
 
-        photos, points, rays = _read_rays(file, delivery)
-        ground = None if control is None else _given(control, points, delivery)
-        found = steps.bundle(
-            rays,
-            model.focal,
-            ground=ground,
-            base=model.base,
-            sigma=sigma_um / 1000.0,
-            ground_sigma=control_sigma,
-            names=(photos, points),
-        )
-        document = step_documents.bundle(photos, points, found, ground, unit)
-        delivery.deliver(document, lambda: step_traces.bundle(photos, points, rays, model.focal, found, unit))
+    photos, points, rays = _read_rays(file, delivery)
+    ground = None if control is None else _given(control, points, delivery)
+    found = steps.bundle(
+        rays,
+        model.focal,
+        ground=ground,
+        base=model.base,
+        sigma=sigma_um / 1000.0,
+        ground_sigma=control_sigma,
+        names=(photos, points),
+    )
+    document = step_documents.bundle(photos, points, found, ground, unit)
+    delivery.deliver(document, lambda: step_traces.bundle(photos, points, rays, model.focal, found, unit))
 
 
 def _read(file: Path, name: str, delivery: Delivery) -> tuple[list[str], Any]:

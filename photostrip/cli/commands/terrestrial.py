@@ -15,7 +15,6 @@ from photostrip.cli.commands.terrestrial_directions import (
     directions,
 )
 from photostrip.cli.documents import Rendering, require_target, say, write_rule
-from photostrip.cli.failures import failures_as
 from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import Silent
 from photostrip.frozen import dataclass
@@ -87,25 +86,24 @@ def displacement(  # noqa: PLR0913 (an argument for each option)
     PROJECT describes stations, cameras, epochs and measurements. A table alone is enough where the cameras stand in
     the normal case: axes parallel and at right angles to the base.
     """
-    with failures_as(form):
-        from photostrip.formats.output.terrestrial_displacements import displacement_document, displacements_csv
-        from photostrip.report.commands.terrestrial_displacements import displacement_report
-        from photostrip.report.pictures.terrestrial import check_plot
-        from photostrip.terrestrial.epochs import monitor
+    from photostrip.formats.output.terrestrial_displacements import displacement_document, displacements_csv
+    from photostrip.report.commands.terrestrial_displacements import displacement_report
+    from photostrip.report.pictures.terrestrial import check_plot
+    from photostrip.terrestrial.epochs import monitor
 
-        if plot is not None:
-            check_plot(str(plot))
-        require_target(depfile, output)
-        if str(source).casefold().endswith(TABLE_ENDS):
-            survey = _from_table(source, base, camera, table, assignments)
-        else:
-            survey = _from_project(source, assignments or [], base, camera, table)
-        result = monitor(survey.series, survey.pair, survey.settings)
-        document = displacement_document(survey.name, result, survey.cameras, survey.frame, survey.notes)
-        _write(document, output, plot)
-        write_rule(depfile, None if output is None else output / "displacements.json", survey.files)
-        say((*survey.notes, *result.notes), quiet=quiet or form != "csv")  # the other forms have them inside
-        Rendering(displacement_report, displacements_csv).show(document, form)
+    if plot is not None:
+        check_plot(str(plot))
+    require_target(depfile, output)
+    if str(source).casefold().endswith(TABLE_ENDS):
+        survey = _from_table(source, base, camera, table, assignments)
+    else:
+        survey = _from_project(source, assignments or [], base, camera, table)
+    result = monitor(survey.series, survey.pair, survey.settings)
+    document = displacement_document(survey.name, result, survey.cameras, survey.frame, survey.notes)
+    _write(document, output, plot)
+    write_rule(depfile, None if output is None else output / "displacements.json", survey.files)
+    say((*survey.notes, *result.notes), quiet=quiet or form != "csv")  # the other forms have them inside
+    Rendering(displacement_report, displacements_csv).show(document, form)
 
 
 @subcommand(terrestrial, "one-station", ONE_STATION)
@@ -139,26 +137,25 @@ def one_station(  # noqa: PLR0913 (an argument for each option)
 
     With the distance of the first epoch alone it is the displacement across the ray; with both it is complete.
     """
-    with failures_as(form):
-        from photostrip.formats.output.terrestrial_directions import points_csv
-        from photostrip.formats.output.terrestrial_displacements import one_station_document
-        from photostrip.project.terrestrial import options
-        from photostrip.project.terrestrial.ranges import DISTANCE, SIGNIFICANCE, within
-        from photostrip.report.commands.terrestrial_displacements import one_station_report
-        from photostrip.terrestrial import one_station as computed
+    from photostrip.formats.output.terrestrial_directions import points_csv
+    from photostrip.formats.output.terrestrial_displacements import one_station_document
+    from photostrip.project.terrestrial import options
+    from photostrip.project.terrestrial.ranges import DISTANCE, SIGNIFICANCE, within
+    from photostrip.report.commands.terrestrial_displacements import one_station_report
+    from photostrip.terrestrial import one_station as computed
 
-        chosen, attitude = camera.chosen(), looking.attitude()
-        level = within("--significance", significance, SIGNIFICANCE)
-        sigma = options.image_sigma(sigma_um)
-        change = sigma if sigma_d_um is None else options.image_sigma(sigma_d_um)
-        if sigma_distance != 0:
-            within("--sigma-distance", sigma_distance, DISTANCE._replace(least=1e-6))
-        names = [part.strip() for part in (stable or "").split(",") if part.strip()]
-        measured, notes = options.read_one_station(table, unit, (sigma, change, sigma_distance), names, chosen)
-        say(notes, quiet=quiet)
-        found = computed.one_station(measured, chosen.principal_distance, attitude.rotation, level)
-        document = one_station_document(measured, found, chosen, attitude, level)
-        Rendering(one_station_report, points_csv).show(document, form)
+    chosen, attitude = camera.chosen(), looking.attitude()
+    level = within("--significance", significance, SIGNIFICANCE)
+    sigma = options.image_sigma(sigma_um)
+    change = sigma if sigma_d_um is None else options.image_sigma(sigma_d_um)
+    if sigma_distance != 0:
+        within("--sigma-distance", sigma_distance, DISTANCE._replace(least=1e-6))
+    names = [part.strip() for part in (stable or "").split(",") if part.strip()]
+    measured, notes = options.read_one_station(table, unit, (sigma, change, sigma_distance), names, chosen)
+    say(notes, quiet=quiet)
+    found = computed.one_station(measured, chosen.principal_distance, attitude.rotation, level)
+    document = one_station_document(measured, found, chosen, attitude, level)
+    Rendering(one_station_report, points_csv).show(document, form)
 
 
 def _from_table(

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from photostrip.cli.documents import Form, Rendering, say
-from photostrip.cli.failures import failures_as
 from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import Silent
 from photostrip.frozen import dataclass
@@ -145,15 +144,14 @@ def from_photo(
 
     x grows to the right, z upwards; lambda is an azimuth clockwise from north, beta an elevation.
     """
-    with failures_as(form):
-        from photostrip.formats.output.terrestrial_directions import directions_document
-        from photostrip.project.terrestrial.options import image_points, image_sigma
+    from photostrip.formats.output.terrestrial_directions import directions_document
+    from photostrip.project.terrestrial.options import image_points, image_sigma
 
-        chosen, attitude = camera.chosen(), looking.attitude()
-        sigma = None if sigma_um is None else image_sigma(sigma_um)
-        points = image_points(table, at or [], unit)
-        say(points.notes, quiet=quiet)
-        _print(directions_document(chosen, attitude, points.ids, points.values, sigma), form)
+    chosen, attitude = camera.chosen(), looking.attitude()
+    sigma = None if sigma_um is None else image_sigma(sigma_um)
+    points = image_points(table, at or [], unit)
+    say(points.notes, quiet=quiet)
+    _print(directions_document(chosen, attitude, points.ids, points.values, sigma), form)
 
 
 @_command("to-photo", '--camera "Photheo 19/1318" --alpha 15 --at 27.5,6.25')
@@ -169,14 +167,13 @@ def to_photo(
     quiet: Silent = False,
 ) -> None:
     """Compute where directions meet the photo, in millimetres."""
-    with failures_as(form):
-        from photostrip.formats.output.terrestrial_directions import photo_document
-        from photostrip.project.terrestrial.options import direction_points
+    from photostrip.formats.output.terrestrial_directions import photo_document
+    from photostrip.project.terrestrial.options import direction_points
 
-        chosen, attitude = camera.chosen(), looking.attitude()
-        points = direction_points(table, at or [], chosen, attitude)
-        say(points.notes, quiet=quiet)
-        _print(photo_document(chosen, attitude, points.ids, points.values), form)
+    chosen, attitude = camera.chosen(), looking.attitude()
+    points = direction_points(table, at or [], chosen, attitude)
+    say(points.notes, quiet=quiet)
+    _print(photo_document(chosen, attitude, points.ids, points.values), form)
 
 
 @_command("accuracy", '--camera "UMK 10/1318" --sigma-um 5')
@@ -195,22 +192,21 @@ def accuracy(
     plot: Plot = None,
 ) -> None:
     """Tell how accurately correction directions must be measured, all over the photo."""
-    with failures_as(form):
-        from photostrip.errors import Fault, InputError
-        from photostrip.formats.output.terrestrial_directions import required_accuracy
-        from photostrip.project.terrestrial.options import image_sigma
-        from photostrip.report.pictures.terrestrial import accuracy_plot
+    from photostrip.errors import Fault, InputError
+    from photostrip.formats.output.terrestrial_directions import required_accuracy
+    from photostrip.project.terrestrial.options import image_sigma
+    from photostrip.report.pictures.terrestrial import accuracy_plot
 
-        attitude = looking.attitude()
-        if as_printed and not looking.level:
-            message = "the printed formulas hold for a level camera"
-            raise InputError(Fault(message, "as-printed", key="--as-printed", fix="leave out --omega and --kappa"))
-        sigma = image_sigma(sigma_um)
+    attitude = looking.attitude()
+    if as_printed and not looking.level:
+        message = "the printed formulas hold for a level camera"
+        raise InputError(Fault(message, "as-printed", key="--as-printed", fix="leave out --omega and --kappa"))
+    sigma = image_sigma(sigma_um)
 
-        def document(chosen: Phototheodolite, grid: Grid) -> dict[str, Any]:
-            return required_accuracy(chosen, attitude, sigma, grid, as_printed=as_printed)
+    def document(chosen: Phototheodolite, grid: Grid) -> dict[str, Any]:
+        return required_accuracy(chosen, attitude, sigma, grid, as_printed=as_printed)
 
-        _over_the_photo(camera, document, step, level=looking.level, plot=plot, draw=accuracy_plot, form=form)
+    _over_the_photo(camera, document, step, level=looking.level, plot=plot, draw=accuracy_plot, form=form)
 
 
 @_command("theodolite", '--camera "UMK 10/1318" --theodolite "Theo 010" --rounds 4')
@@ -228,19 +224,18 @@ def theodolite(
     plot: Plot = None,
 ) -> None:
     """Tell which image accuracy a theodolite can vouch for, all over the photo."""
-    with failures_as(form):
-        from photostrip.formats.output.terrestrial_directions import theodolite_accuracy
-        from photostrip.project.terrestrial.options import image_sigma
-        from photostrip.report.pictures.terrestrial import theodolite_plot
+    from photostrip.formats.output.terrestrial_directions import theodolite_accuracy
+    from photostrip.project.terrestrial.options import image_sigma
+    from photostrip.report.pictures.terrestrial import theodolite_plot
 
-        attitude = looking.attitude()
-        measured = measuring.sigmas()
-        wanted = None if sigma_um is None else image_sigma(sigma_um)
+    attitude = looking.attitude()
+    measured = measuring.sigmas()
+    wanted = None if sigma_um is None else image_sigma(sigma_um)
 
-        def document(chosen: Phototheodolite, grid: Grid) -> dict[str, Any]:
-            return theodolite_accuracy(chosen, attitude, measured, wanted, grid)
+    def document(chosen: Phototheodolite, grid: Grid) -> dict[str, Any]:
+        return theodolite_accuracy(chosen, attitude, measured, wanted, grid)
 
-        _over_the_photo(camera, document, step, level=looking.level, plot=plot, draw=theodolite_plot, form=form)
+    _over_the_photo(camera, document, step, level=looking.level, plot=plot, draw=theodolite_plot, form=form)
 
 
 def _over_the_photo(
@@ -321,47 +316,42 @@ def orient(  # noqa: PLR0913 (an argument for each option)
 
     The directions are measured with a theodolite where the camera stood. alpha comes out in the zero of its circle.
     """
-    with failures_as(form):
-        from photostrip.formats.output.terrestrial_directions import oriented
-        from photostrip.project.terrestrial import options
-        from photostrip.project.terrestrial.ranges import ECCENTRICITY, REFRACTION, SIGNIFICANCE, within
-        from photostrip.terrestrial import orientation
+    from photostrip.formats.output.terrestrial_directions import oriented
+    from photostrip.project.terrestrial import options
+    from photostrip.project.terrestrial.ranges import ECCENTRICITY, REFRACTION, SIGNIFICANCE, within
+    from photostrip.terrestrial import orientation
 
-        chosen = camera.chosen()
-        settings = orientation.OrientationSettings(
-            options.free_elements(free),
-            eccentricity=within("--eccentricity", eccentricity, ECCENTRICITY),
-            refraction=within("--refraction", refraction, REFRACTION),
-            screening=screening,
-            significance=within("--significance", significance, SIGNIFICANCE),
-        )
-        measured = measuring.sigmas(usual=2.0)
-        given = options.SightingOptions(
-            unit=unit, angles=angles, sigma=options.image_sigma(sigma_um), theodolite=measured
-        )
-        sightings, notes = options.read_sightings(table, given)
-        say(notes, quiet=quiet)
-        found = orientation.orient(sightings, chosen.principal_distance, chosen.principal_point, settings)
-        _print(oriented(chosen, sightings, found, settings, angles), form)
+    chosen = camera.chosen()
+    settings = orientation.OrientationSettings(
+        options.free_elements(free),
+        eccentricity=within("--eccentricity", eccentricity, ECCENTRICITY),
+        refraction=within("--refraction", refraction, REFRACTION),
+        screening=screening,
+        significance=within("--significance", significance, SIGNIFICANCE),
+    )
+    measured = measuring.sigmas(usual=2.0)
+    given = options.SightingOptions(unit=unit, angles=angles, sigma=options.image_sigma(sigma_um), theodolite=measured)
+    sightings, notes = options.read_sightings(table, given)
+    say(notes, quiet=quiet)
+    found = orientation.orient(sightings, chosen.principal_distance, chosen.principal_point, settings)
+    _print(oriented(chosen, sightings, found, settings, angles), form)
 
 
 @_command("examples", "")
 def examples(form: Format = "text") -> None:
     """Compute the worked examples of the source again, and explain what is misprinted."""
-    with failures_as(form):
-        from photostrip.formats.output.terrestrial_directions import worked_examples
+    from photostrip.formats.output.terrestrial_directions import worked_examples
 
-        _print(worked_examples(), form)
+    _print(worked_examples(), form)
 
 
 @_command("cameras", "--presets my-cameras.yaml")
 def cameras(presets: Presets = None, form: Format = "text") -> None:
     """List the cameras that can be named."""
-    with failures_as(form):
-        from photostrip.formats.output.terrestrial_directions import camera_list
-        from photostrip.project.terrestrial.cameras import read_presets
+    from photostrip.formats.output.terrestrial_directions import camera_list
+    from photostrip.project.terrestrial.cameras import read_presets
 
-        _print(camera_list(read_presets(presets)), form)
+    _print(camera_list(read_presets(presets)), form)
 
 
 def _print(document: dict[str, Any], form: Form) -> None:

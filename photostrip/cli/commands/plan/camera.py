@@ -8,7 +8,6 @@ import typer
 
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import PlanFile
-from photostrip.cli.failures import failures_as
 
 
 def camera(
@@ -20,15 +19,14 @@ def camera(
     delivery: Delivery,
 ) -> None:
     """Compare cameras by their efficiency coefficient K = f m_p: the smaller, the fewer photos."""
-    with failures_as(delivery.form):
-        from photostrip.errors import Fault, InputError
-        from photostrip.formats.output.plans.cameras import source_document
+    from photostrip.errors import Fault, InputError
+    from photostrip.formats.output.plans.cameras import source_document
 
-        if source_table == (file is not None):
-            message = "a list of cameras and --source-table exclude each other" if file else "no cameras are given"
-            raise InputError(Fault(message, "plan-cameras", fix="name a YAML file, or use --source-table"))
-        if file is None:
-            delivery.require_output()
-            delivery.deliver(source_document(), ())
-        else:
-            delivery.plan("camera", file, {})
+    if source_table == (file is not None):
+        message = "a list of cameras and --source-table exclude each other" if file else "no cameras are given"
+        raise InputError(Fault(message, "plan-cameras", fix="name a YAML file, or use --source-table"))
+    if file is None:
+        delivery.require_output()
+        delivery.deliver(source_document(), ())
+    else:
+        delivery.plan("camera", file, {})

@@ -6,7 +6,6 @@ from typing import Annotated
 
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import SIGMA_UM, PlanFile, PlanOptions, Sets
-from photostrip.cli.failures import failures_as
 from photostrip.frozen import dataclass
 
 
@@ -27,5 +26,4 @@ class SurveyOptions(PlanOptions):
 
 def displacement(*, file: PlanFile = None, survey: SurveyOptions, delivery: Delivery) -> None:
     """Compute how well displacements will be known, and the smallest that will be found."""
-    with failures_as(delivery.form):
-        delivery.plan("displacement", file, survey.keys())
+    delivery.plan("displacement", file, survey.keys())

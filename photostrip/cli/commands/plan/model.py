@@ -8,7 +8,6 @@ import typer
 
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import CONTROL_SIGMA, Flight, Options, PlanCamera, PlanFile, PlanOptions, Sets
-from photostrip.cli.failures import failures_as
 from photostrip.cli.stdout import Document
 from photostrip.frozen import dataclass, replace
 
@@ -60,30 +59,29 @@ def model(
     delivery: Delivery,
 ) -> None:
     """Compute the expected errors all over one model, and what each source of errors does alone."""
-    with failures_as(delivery.form):
-        from photostrip.formats.output.plans.model import model_document, source_example_document
-        from photostrip.planning.model.plan import both_forms, given_errors, plan_model
-        from photostrip.project.plans.model import load_model_plan
+    from photostrip.formats.output.plans.model import model_document, source_example_document
+    from photostrip.planning.model.plan import both_forms, given_errors, plan_model
+    from photostrip.project.plans.model import load_model_plan
 
-        if as_printed and not closed_form:
-            message = "the printed form stands beside the closed form: give --closed-form as well"
-            raise typer.BadParameter(message, param_hint="--as-printed")
-        options = {**camera.keys(), **flight.keys(), **control.keys()}
-        drawn = delivery.require_output()
-        if source_table:
-            if file is not None or any(value is not None for _, value in options.values()):
-                message = "the worked example of the source has its own numbers: nothing else goes with it"
-                raise typer.BadParameter(message, param_hint="--source-table")
-            delivery.deliver(source_example_document(), ())
-            return
-        with delivery.assigned(options) as assignments:
-            given = load_model_plan(file, assignments)
-        forms = both_forms(given.spec) if closed_form else None
+    if as_printed and not closed_form:
+        message = "the printed form stands beside the closed form: give --closed-form as well"
+        raise typer.BadParameter(message, param_hint="--as-printed")
+    options = {**camera.keys(), **flight.keys(), **control.keys()}
+    drawn = delivery.require_output()
+    if source_table:
+        if file is not None or any(value is not None for _, value in options.values()):
+            message = "the worked example of the source has its own numbers: nothing else goes with it"
+            raise typer.BadParameter(message, param_hint="--source-table")
+        delivery.deliver(source_example_document(), ())
+        return
+    with delivery.assigned(options) as assignments:
+        given = load_model_plan(file, assignments)
+    forms = both_forms(given.spec) if closed_form else None
 
-        def planned(spec: ModelSpec) -> Document:
-            forecast = plan_model(spec)
-            return model_document(given.name, given.camera, forecast, given_errors(spec), forms, printed=as_printed)
+    def planned(spec: ModelSpec) -> Document:
+        forecast = plan_model(spec)
+        return model_document(given.name, given.camera, forecast, given_errors(spec), forms, printed=as_printed)
 
-        document = planned(given.spec)
-        fine = planned(replace(given.spec, grid=(FINE, FINE))) if drawn else None
-        delivery.deliver(document, given.files, fine)
+    document = planned(given.spec)
+    fine = planned(replace(given.spec, grid=(FINE, FINE))) if drawn else None
+    delivery.deliver(document, given.files, fine)

@@ -6,7 +6,6 @@ from typing import Annotated
 
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import PlanFile, PlanOptions, Sets
-from photostrip.cli.failures import failures_as
 from photostrip.frozen import dataclass
 
 
@@ -42,5 +41,4 @@ def screening(*, file: PlanFile = None, experiment: Experiment, delivery: Delive
 
     Tells what each method finds, by zone and by size, and what an error that is not found does to the elements.
     """
-    with failures_as(delivery.form):
-        delivery.plan("screening", file, experiment.keys())
+    delivery.plan("screening", file, experiment.keys())

@@ -8,7 +8,6 @@ import typer
 
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import CONTROL_SIGMA, Flight, Options, PlanCamera, PlanFile, PlanOptions, Sets
-from photostrip.cli.failures import failures_as
 from photostrip.frozen import dataclass
 
 
@@ -76,8 +75,7 @@ def strip(
     delivery: Delivery,
 ) -> None:
     """Compute the expected accuracy along a strip, for layouts of control and methods of adjustment."""
-    with failures_as(delivery.form):
-        options = {**camera.keys(), **flight.keys(), **length.keys(), **control.keys()}
-        if control.into is not None and control.place is None and file is None:
-            raise typer.BadParameter("there is nothing to be placed: give --place as well", param_hint="--into")
-        delivery.plan("strip", file, options)
+    options = {**camera.keys(), **flight.keys(), **length.keys(), **control.keys()}
+    if control.into is not None and control.place is None and file is None:
+        raise typer.BadParameter("there is nothing to be placed: give --place as well", param_hint="--into")
+    delivery.plan("strip", file, options)
