@@ -23,13 +23,8 @@ demo: $(VENV)/photostrip.installed ## run the main job on every sample project a
 	    $(BIN)/photostrip run "$$project" -o "build/demo/$$name" || exit $$?; \
 	done
 
-# The types are checked while tests wait for processes; what is wrong with them is told at the end.
-test: lint ## lint, format, types and all tests
-	@mkdir -p build
-	@$(BIN)/mypy $(SOURCES) >build/types.txt 2>&1 & types=$$!; \
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal; tests=$$?; \
-	wait $$types; types=$$?; cat build/types.txt; \
-	exit $$((tests ? tests : types))
+test: lint types ## lint, format, types and all tests
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 check: lint types ## the fast gates: no slow tests, few random examples
 	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -q -m "not slow"
@@ -39,7 +34,7 @@ lint: $(VENV)/dev.installed
 	$(BIN)/ruff format --check $(SOURCES)
 
 types: $(VENV)/dev.installed
-	$(BIN)/mypy --num-workers $(WORKERS) $(SOURCES)
+	$(BIN)/zmypy $(SOURCES)
 
 lowest: ## all tests on exactly the lower bounds of pyproject.toml, in a venv of their own
 	rm -rf .venv-lowest
@@ -78,7 +73,7 @@ man: $(VENV)/photostrip.installed ## write the manual pages into build/man/man1
 	$(BIN)/photostrip man -o build/man/man1
 
 clean: ## remove everything that make has made
-	rm -rf $(VENV) .venv-lowest .venv-site build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) .venv-lowest .venv-site build dist .hypothesis .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # One install per change of pyproject.toml; the package itself is installed editable and follows every change.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import fabs
+
 from photostrip.frozen import dataclass
 
 NAN = float("nan")
@@ -33,4 +35,4 @@ class Rejection:
     def worst(self) -> float:
         """The largest estimated error of the coordinates that are wrong; NaN where nothing can be said."""
         sizes = [self.size[axis] for axis in self.axes or range(len(self.size))] if self.size else []
-        return max(sizes, key=abs, default=NAN)
+        return max(sizes, key=fabs, default=NAN)

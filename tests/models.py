@@ -71,7 +71,8 @@ def truth(models: int = 6, across: int = 3, seed: int = 1, *, spread: float = 2.
     """Make a strip; `spread` is the size of the rotations of the plotter's axes, radians."""
     rng = np.random.default_rng(seed)
     places = np.arange(models + 1)
-    centers = np.column_stack([BASE * places, rng.normal(0, 20, models + 1), HEIGHT + rng.normal(0, 20, models + 1)])
+    aside, above = rng.normal(0, 20, (2, models + 1))
+    centers = np.column_stack([BASE * places.astype(float), aside, HEIGHT + above])
     rows = [
         [BASE * k + rng.normal(0, 60), y + rng.normal(0, 40), rng.normal(0, relief)]
         for k in places

@@ -283,7 +283,7 @@ class Result:
 
         rows = []
         for role in ("control", "check"):
-            found = self._document["summary"].get(role) or {}
+            found: Document = self._document["summary"].get(role) or {}
             for part in ("plan", "height"):
                 each = found.get(part)
                 if each and each.get("count"):

@@ -106,16 +106,16 @@ def absolute(ids: Sequence[str], model: Floats, ground: Floats, found: Absolute,
 
 def resection(ids: Sequence[str], xy: Floats, ground: Floats, focal: float, found: OrientedPhoto, unit: str) -> Trace:
     """Show the start in closed form, the iteration, and each ray."""
-    photo, seen, added, squares = np.zeros(len(xy), np.intp), [], [], []
+    photo = np.zeros(len(xy), np.intp)
+    seen: list[tuple[float, Floats, Floats]] = []
 
     def watch(before: KnownPhotos, step: Floats) -> None:
-        squares.append(float(((xy - project(ground, before, photo)) ** 2).sum()))
-        seen.append(before.centers[0])
-        added.append(step[0])
+        seen.append((float(((xy - project(ground, before, photo)) ** 2).sum()), before.centers[0], step[0]))
 
     center, rotation = approximate(xy, ground, focal)
     resect(xy, ground, photo, KnownPhotos(center[None], rotation[None], np.array([focal])), watch)
-    steps: list[Column] = [("[vv]", "mm^2", -5, squares), *columns("X0 Y0 Z0", unit, 4, np.array(seen))]
+    squares, centers, added = zip(*seen, strict=True)
+    steps: list[Column] = [("[vv]", "mm^2", -5, squares), *columns("X0 Y0 Z0", unit, 4, np.array(centers))]
     changes = columns("dX0 dY0 dZ0", unit, -3, np.array(added)[:, :3])
     changes += columns("turn_X turn_Y turn_Z", "deg", -3, np.degrees(added)[:, 3:])
     rays = _images(xy, ground - found.center, found.rotation, focal, unit)

@@ -11,12 +11,12 @@ from photostrip.camera import Camera
 from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
-from photostrip.triangulation import absolute_orientation as absolute
-from photostrip.triangulation.bundle import settings as bundle
+from photostrip.triangulation.absolute_orientation import AbsoluteSettings
+from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
 from photostrip.triangulation.independent_models.settings import LinkSettings
-from photostrip.triangulation.polynomial import correction as polynomial
+from photostrip.triangulation.polynomial.correction import PolynomialSettings
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
@@ -132,10 +132,10 @@ class Settings:
     relative: RelativeSettings = field(default_factory=RelativeSettings)
     formation: StripFormationSettings = field(default_factory=StripFormationSettings)
     links: LinkSettings = field(default_factory=LinkSettings)
-    absolute: absolute.AbsoluteSettings = field(default_factory=absolute.AbsoluteSettings)
-    polynomial: polynomial.PolynomialSettings = field(default_factory=polynomial.PolynomialSettings)
+    absolute: AbsoluteSettings = field(default_factory=AbsoluteSettings)
+    polynomial: PolynomialSettings = field(default_factory=PolynomialSettings)
     covariance: CovarianceSettings = field(default_factory=CovarianceSettings)
-    bundle: bundle.BundleSettings = field(default_factory=bundle.BundleSettings)
+    bundle: BundleSettings = field(default_factory=BundleSettings)
     interior: InteriorSettings = field(default_factory=InteriorSettings)
     refinement: ImageCorrectionSettings = field(default_factory=ImageCorrectionSettings)
     precision: bool = True  # whether standard deviations and covariances of points and photos are computed

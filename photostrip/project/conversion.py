@@ -6,7 +6,7 @@ Here the user's units, axes and directions end: inside there are millimetres wit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -366,8 +366,8 @@ def settings(project: ProjectFile) -> Settings:
 
 def _laid_over(usual: T, given: Section) -> T:
     """Replace the fields of settings by the keys of a section that has the same names."""
-    changed = given.values()
+    changed, of_its_kind = given.values(), cast("Any", usual)
     for name, value in changed.items():
         if isinstance(value, list):
             changed[name] = type(getattr(usual, name))(map(str, value))
-    return replace(usual, **changed)
+    return replace(of_its_kind, **changed)

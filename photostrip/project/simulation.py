@@ -237,7 +237,7 @@ def _spec(given: SimulationFile) -> simulation.Spec:
         name=str(given.name),
         seed=given.seed,
         camera=camera_of(given.camera),
-        ground=simulation.Ground(**_fields(given.ground) | {"ellipsoid": semi_axes(given.ground.ellipsoid)}),
+        ground=simulation.Ground(**_fields(given.ground, ellipsoid=semi_axes(given.ground.ellipsoid))),
         flight=simulation.Flight(**_fields(given.flight)),
         terrain=simulation.Terrain(**_fields(given.terrain)),
         points=simulation.Points(**_fields(given.points)),
@@ -251,10 +251,10 @@ def _spec(given: SimulationFile) -> simulation.Spec:
     )
 
 
-def _fields(section: Section) -> dict[str, Any]:
-    """Values of a section by key, texts as plain texts."""
+def _fields(section: Section, **others: object) -> dict[str, Any]:
+    """Values of a section by key, texts as plain texts, and others in place of its own."""
     values = {name: getattr(section, name) for name in type(section).keys}
-    return {name: str(value) if isinstance(value, str) else value for name, value in values.items()}
+    return {name: str(value) if isinstance(value, str) else value for name, value in values.items()} | others
 
 
 def camera_of(given: SimulatedCamera) -> camera.Camera:

@@ -97,13 +97,13 @@ def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
 
 def natural_rank(names: Sequence[str]) -> Numbers:
     """Place of each name in natural order, from 0."""
-    keys: Sequence[Any] = _padded(names) or [natural(name) for name in names]
+    keys = _padded(names) or [natural(name) for name in names]
     rank = np.empty(len(names), np.intp)
     rank[sorted(range(len(names)), key=keys.__getitem__)] = np.arange(len(names))
     return rank
 
 
-def _padded(names: Sequence[str]) -> list[tuple[str, str]]:
+def _padded(names: Sequence[str]) -> list[Any]:
     """Return texts in the order of ``natural``, all numbers filled up to one length; none where an id has odd signs."""
     text = "\n".join(names)
     if text.count("\n") != len(names) - 1 or "\0" in text:

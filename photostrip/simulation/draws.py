@@ -42,7 +42,7 @@ class Draws:
     def uniform(self, *shape: int) -> Floats:
         """Draw the next uniform numbers of the stream in [0, 1), in rows."""
         words = np.asarray(self._bits.random_raw(int(np.prod(shape))), dtype=np.uint64)
-        return np.asarray((words >> np.uint64(11)) * 2.0**-53).reshape(shape)
+        return np.asarray((words >> np.uint64(11)) * 2.0**-53, float).reshape(shape)
 
     def between(self, *shape: int) -> Floats:
         """Draw uniform numbers in [-1, 1); see ``uniform``."""

@@ -302,7 +302,7 @@ def _parallax_precision(series: Series, epochs: list[_Epoch]) -> tuple[Floats, F
 
 def _rates(times: Floats, first: list[Step], covariance: Floats) -> Rates:
     """Fit a uniform motion to each point: generalised least squares on its displacements since the first epoch."""
-    there = np.isfinite([step.covariance for step in first]).all(axis=(2, 3)).T  # by point and epoch
+    there = np.isfinite(np.array([step.covariance for step in first])).all(axis=(2, 3)).T  # by point and epoch
     (points, epochs), count = there.shape, there.sum(axis=1)
     used = np.repeat(there, 3, axis=1)
     matrix = covariance[1:, 1:].transpose(2, 0, 3, 1, 4).reshape(points, 3 * epochs, 3 * epochs)

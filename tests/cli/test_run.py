@@ -269,12 +269,12 @@ def test_report_prints_what_run_printed(
 
 def test_report_into_a_file(result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, option, begin in (
-        ("r.md", [], "# Accuracy report"),
-        ("r.txt", [], "Accuracy report"),
-        ("R.TXT", [], "Accuracy report"),
-        ("report", [], "Accuracy report"),
-        ("r.html", ["--format", "text"], "Accuracy report"),
-        ("r.json", [], '{\n"photostrip_result": 1'),
+        ("r.md", (), "# Accuracy report"),
+        ("r.txt", (), "Accuracy report"),
+        ("R.TXT", (), "Accuracy report"),
+        ("report", (), "Accuracy report"),
+        ("r.html", ("--format", "text"), "Accuracy report"),
+        ("r.json", (), '{\n"photostrip_result": 1'),
     ):
         assert run(capsys, "report", result, "-o", tmp_path / name, *option) == (0, "", "")
         assert (tmp_path / name).read_text(encoding="utf-8").startswith(begin)

@@ -44,7 +44,7 @@ def code_of(name: str) -> CodeType:
         with contextlib.suppress(ModuleNotFoundError):
             module = import_module(f"photostrip.{'.'.join(parts[:length])}")
             found = reduce(getattr, parts[length:], module)
-            return inspect.unwrap(found).__code__  # type: ignore[no-any-return, arg-type]
+            return inspect.unwrap(found).__code__  # type: ignore[arg-type]
     raise LookupError(name)
 
 
@@ -82,7 +82,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     found = tmp_path_factory.mktemp("equations")
     shutil.copytree(ROOT / "configs", found / "configs")
     shutil.copytree(ROOT / "sample_data/apollo15-metric-strip", found / "sample_data/apollo15-metric-strip")
-    for name, more in (("lesson", []), ("plane", ["--set", "ground.crs=local"])):
+    for name, more in (("lesson", ()), ("plane", ("--set", "ground.crs=local"))):
         made = ["simulate", str(found / "configs/simulate/film-strip.yaml"), "-o", str(found / name), "--quiet", *more]
         assert main(made) == 0
     with (found / "lesson/project.yaml").open("a", encoding="utf-8") as file:

@@ -77,7 +77,7 @@ def test_it_verifies_what_has_no_check_points() -> None:
 
 @pytest.mark.slow
 def test_the_strips_are_formed_once_and_the_adjustments_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    formed = []
+    formed: list[object] = []
 
     def counted(*given: object) -> object:
         formed.append(given)

@@ -90,7 +90,7 @@ tolerances:
   check_rms_xy: 0.4
 """
 
-VARIANTS = {
+VARIANTS: dict[str, list[tuple[str, str]]] = {
     "plain": [],
     "radial table": [
         ("model: brown, k: [1e-8, 0, 0]", "model: radial-table, radius: [0, 50, 100], distortion: [0, 1e-3, -2e-3]")

@@ -94,7 +94,7 @@ def drawn(count: int, *, complete: bool) -> tuple[Floats, Floats, Floats]:
         found = one_station(measured if complete else across_only(measured), F, ROTATION)
         values.append(found.values)
         tests.append(found.statistic > found.limit)
-    return np.array(values), np.array(tests), found.sigma
+    return np.array(values), np.array(tests, bool), found.sigma
 
 
 @pytest.mark.slow

@@ -76,7 +76,7 @@ def _key(read: Measurements) -> Numbers:
 
 
 def _sums(group: Numbers, values: Floats) -> Floats:
-    return np.column_stack([np.bincount(group, column) for column in values.T])
+    return np.stack([np.bincount(group, column) for column in values.T], axis=1, dtype=float)
 
 
 def _refuse_all(

@@ -55,4 +55,4 @@ def parsed_record(data: bytes) -> Document | None:
     if not isinstance(record, dict) or record.get("photostrip_batch_record") != SCHEMA:
         return None
     shapes = {"program": dict, "project": str, "set": list, "inputs": dict, "outputs": dict, "outcome": dict}
-    return record if all(isinstance(record.get(key), shape) for key, shape in shapes.items()) else None
+    return record if all(type(record.get(key)) is shape for key, shape in shapes.items()) else None

@@ -45,7 +45,7 @@ def _cells(column: Sequence[Plain], encode: Encoder) -> Cells:
         return number_columns.as_repr(np.where(np.isfinite(column.values), column.values, np.nan), "null")
     if isinstance(column, Records):
         return np.concatenate(_objects(column.columns, encode))
-    kinds = set(map(type, column))
+    kinds = {type(each) for each in column}
     if _of_numbers(kinds):
         return _numbers(column, kinds, encode)
     if kinds == {dict} and (parts := columns_of(column)) is not None:
@@ -61,7 +61,7 @@ def _texts(column: Sequence[Plain], kinds: set[type], encode: Encoder) -> list[s
         return [written[value] for value in column]
     if kinds == {list} and (flat := list(chain.from_iterable(column))):
         ends = [0, *accumulate(map(len, column))]
-        kinds = set(map(type, flat))
+        kinds = {type(each) for each in flat}
         if _of_numbers(kinds):
             groups = number_columns.joined_in_groups(_numbers(flat, kinds, encode), ", ", ends)
             return [f"[{group}]" for group in groups]

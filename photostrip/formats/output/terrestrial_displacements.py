@@ -239,7 +239,7 @@ def displacements_csv(document: Document) -> str:
     rows = []
     for point in document["points"]:
         for entry in point["epochs"][1:]:
-            step = entry.get("since_first") or {}
+            step: Document = entry.get("since_first") or {}
             place = [entry.get(axis) if step else None for axis in "xyz"]
             values = [step.get(name) for name in names]
             rows.append([point["id"], entry["epoch"], int(point["stable"]), *place, *values, entry.get("reason", "")])

@@ -232,7 +232,8 @@ def _with_cameras(
     if turned:
         given = [known.orientations[names[row]] for row in turned]
         ups = known.output.level_axes_at(np.array([center for center, _ in given]))[:, 2]
-        up = sum(rotations[row] @ turn.T @ above for row, (_, turn), above in zip(turned, given, ups, strict=True))
+        of_block = [rotations[row] @ turn.T @ above for row, (_, turn), above in zip(turned, given, ups, strict=True)]
+        up = np.sum(of_block, axis=0)
     else:
         up = rotations[:, :, 2].sum(axis=0)
     up = np.asarray(up / np.linalg.norm(up), float)

@@ -198,7 +198,7 @@ def _strangers(strips: Sequence[StripResult], point_ids: Sequence[str]) -> dict[
     found: dict[str, set[int]] = {}
     for ties in compared_strips(strips, point_ids):
         odd, (one, other) = odd_ties(ties), ties.strips
-        points = [] if odd is None else ties.points[odd.rows].tolist()
+        points: list[int] = [] if odd is None else ties.points[odd.rows].tolist()
         found.setdefault(other, set()).update(set(points) - found.get(one, set()))
     return found
 

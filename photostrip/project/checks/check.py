@@ -56,7 +56,7 @@ class Checked:
     @property
     def everything(self) -> tuple[Fault | Finding | Note, ...]:
         """Faults, then findings, then notes."""
-        return (*self.faults, *self.findings, *self.notes)
+        return self.faults + self.findings + self.notes
 
     @property
     def wrong(self) -> int:

@@ -56,7 +56,7 @@ def _traced(table: Document) -> Section:
         decimals = each["decimals"]
         form = decimals if decimals >= 0 else partial(power, digits=-1 - decimals)
         columns.append(number(each["name"], partial(_cell, place), form, each["unit"]))
-    equations = [Words(each) for each in table["equations"]]
+    equations: list[Part] = [Words(each) for each in table["equations"]]
     return Section(table["title"], (*equations, tabulated(table["rows"], columns)))
 
 

@@ -22,7 +22,7 @@ def covariance_section(document: Document, *, everything: bool) -> Section:
     )
     parts: list[Part] = [Words(text)]
     for block in blocks:
-        parts += [Facts(tuple(_facts(block, several=len(blocks) > 1))), _control(block, everything=everything)]
+        parts += (Facts(tuple(_facts(block, several=len(blocks) > 1))), _control(block, everything=everything))
     return Section("Adjustment with the covariance of the strip", tuple(parts))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import groupby
+from math import fabs
 from operator import itemgetter
 
 from photostrip.notes import Document, before, counted, listed
@@ -101,7 +102,7 @@ def largest(rows: Sequence[Document], key: str, axis: str) -> str:
     """Return the largest difference along an axis of those that were not rejected."""
     letter = LETTERS.get(axis, axis)
     rows = [row for row in rows if letter not in row.get("rejected", "")]
-    return signed(max((row[key] for row in rows if row[key] is not None), key=abs, default=None))
+    return signed(max((row[key] for row in rows if row[key] is not None), key=fabs, default=None))
 
 
 def _most(rows: Sequence[Document]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from photostrip.notes import Document, counted
 from photostrip.report.page.angles import angle_unit
 from photostrip.report.page.numbers import fixed, metres, micrometres, ratio
-from photostrip.report.page.parts import Facts, Section, Table, Words
+from photostrip.report.page.parts import Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import angle, number, tabulated, words
 from photostrip.report.sections.strip import ALL_SHOWN, elsewhere
 
@@ -36,9 +36,10 @@ def precision_section(document: Document, *, everything: bool) -> Section:
             )
         )
     facts += _check(block.get("check"))
-    along = [_along(document, block["along"], everything=everything)] if block["along"] else []
-    tables = (_worst(document), *along)
-    return Section("Precision", (Words(text), Facts(tuple(facts)), *tables))
+    parts: list[Part] = [Words(text), Facts(tuple(facts)), _worst(document)]
+    if block["along"]:
+        parts.append(_along(document, block["along"], everything=everything))
+    return Section("Precision", tuple(parts))
 
 
 def _basis(rows: Sequence[Document]) -> str:

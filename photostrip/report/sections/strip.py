@@ -190,7 +190,7 @@ def polynomial_section(document: Document, *, everything: bool) -> Section:
         return Section("Polynomial adjustment", (_by_strip(blocks),))
     parts: list[Part] = []
     for block in blocks:
-        parts += [Words(_choice(document, block) + _leverage(document, block)), _evidence(block)]
+        parts += (Words(_choice(document, block) + _leverage(document, block)), _evidence(block))
         if block["degree"]:
             parts.append(_coefficients(block))
     return Section("Polynomial adjustment", tuple(parts))

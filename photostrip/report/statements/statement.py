@@ -58,7 +58,7 @@ def statement_report(document: Document, *, quiet: bool = False) -> tuple[str, t
     ]
     if document["profile"]:
         found.append(_classes(document["profile"], document["required"]))
-    remarks = tuple(Words(text, mark="-") for text in document["remarks"])
+    remarks: list[Part] = [Words(text, mark="-") for text in document["remarks"]]
     sign = Facts(tuple((label, LINE) for label in ("Place, date", "Name, office", "Signature")))
     end = Section("To be signed", (*remarks, Words(CONFIRMED), sign))
     return f"Accuracy statement: {document['name']}", (*found, end)
@@ -150,10 +150,11 @@ def _classes(profile: Document, required: str) -> Section:
         words("", lambda row: "kept" if row["kept"] else "NOT KEPT"),
     )
     rows = [{**limit, "name": each["name"]} for each in profile["classes"] for limit in each["limits"]]
-    return Section(profile["name"], (Words(text), tabulated(rows, columns), *_sources(profile)))
+    return Section(profile["name"], (Words(text), *_with_sources(profile, tabulated(rows, columns))))
 
 
-def _sources(profile: Document) -> Iterator[Words]:
+def _with_sources(profile: Document, table: Table) -> Iterator[Part]:
+    yield table
     yield Words(f"By {profile['source']}")
     yield from (Words(f"{each['name']}: {each['source']}", mark="-") for each in profile["classes"] if each["source"])
 

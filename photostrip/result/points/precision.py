@@ -16,7 +16,7 @@ from photostrip.result.quantities import record, records
 from photostrip.result.records import Records
 from photostrip.statistics import binomial_p_value, chi2_quantile, normal_quantile
 
-UPPER = np.triu_indices(6)
+ROWS, COLUMNS = np.triu_indices(6)
 OUTSIDE = 0.05  # share of sound differences that lie outside their ellipse or interval
 INSIDE = {"plan": float(np.sqrt(chi2_quantile(1 - OUTSIDE, 2))), "height": normal_quantile(1 - OUTSIDE / 2)}
 
@@ -84,7 +84,7 @@ def photo_columns(result: Result, place: Floats, rotations: Floats, given: Float
     with np.errstate(invalid="ignore"):
         sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     of_centre = dict(zip("xyz", sigma.T[:3], strict=True))
-    return {"sigma": {**of_centre, "angles": sigma[:, 3:]}, "covariance": covariances[:, *UPPER]}
+    return {"sigma": {**of_centre, "angles": sigma[:, 3:]}, "covariance": covariances[:, ROWS, COLUMNS]}
 
 
 def centre_columns(result: Result, place: Floats, given: Floats | None) -> Document:
@@ -94,7 +94,8 @@ def centre_columns(result: Result, place: Floats, given: Floats | None) -> Docum
     covariances = np.full((len(place), 6, 6), np.nan)
     covariances[:, :3, :3] = turned(given[:, :3, :3], result.output.axes_at(place)[:, list(result.output.order)])
     sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)[:, :3])
-    return {"sigma": {**dict(zip("xyz", sigma.T, strict=True)), "angles": None}, "covariance": covariances[:, *UPPER]}
+    sigmas = {**dict(zip("xyz", sigma.T, strict=True)), "angles": None}
+    return {"sigma": sigmas, "covariance": covariances[:, ROWS, COLUMNS]}
 
 
 def _rates(rotations: Floats, system: str) -> Floats:

@@ -98,7 +98,8 @@ def find_common_error(
     def by_chance(unknowns: int) -> float:
         return chi2_quantile(1 - limit.alpha, max(unknowns, 1)) * unit**2
 
-    found, most, unknowns = None, 0.0, 0
+    found: CommonError | None = None
+    most, unknowns = 0.0, 0
     for each in trials:
         fall, error = solution.chi_square - each.chi_square, each.error
         if (

@@ -209,7 +209,7 @@ class _Columns:
         """Add the products of image points that rows of a block have in common with conditions."""
         layout, size = self.found.layout, self.rows.by_similarity.shape[1]
         inside = slice(*np.searchsorted(self.shared.first, [made.rows.start, made.rows.stop]).tolist())
-        row, condition, value = (column[inside] for column in self.shared)
+        row, condition, value = self.shared.first[inside], self.shared.second[inside], self.shared.value[inside]
         place = (layout.block[condition] - made.number + 1) * layout.height + layout.position[condition]
         across = (row - made.rows.start)[:, None] * size + np.arange(size)
         # flat places: three indices take ten times as long

@@ -41,7 +41,7 @@ def with_some(simulation: Simulation, control: str, cameras: str, correction: st
     points = replace(points, enu=np.where(use, points.enu, np.nan), use=use).take(use.any(axis=1))
     if not cameras:
         return replace(inputs, control=points)
-    flown = np.repeat(np.arange(len(inputs.strips)), [len(strip.photos) for strip in inputs.strips])[:, None]
+    flown = np.repeat(np.arange(float(len(inputs.strips))), [len(strip.photos) for strip in inputs.strips])[:, None]
     wrong = 0.0 if correction == "none" else np.array([2.0, -1.0, 3.0]) + (0 if group else flown)
     noise = np.random.default_rng(1).normal(0.0, SIGMA, (len(photos_of(simulation)), 3))
     found = positions(simulation, SIGMA, shift=wrong, noise=noise, correction=correction)

@@ -91,7 +91,7 @@ def test_a_tie_of_two_rays_may_be_a_wrong_measurement(rays: int, off: float, cod
     ties = TiesOfStrips(
         points=np.arange(20),
         names=tuple(f"P{number}" for number in range(20)),
-        plan=np.column_stack([np.arange(20) * 100.0, np.arange(20) % 3 * 50.0]),
+        plan=np.column_stack([np.arange(20.0) * 100.0, np.arange(20.0) % 3 * 50.0]),
         difference=difference,
         rays=np.full(20, rays),
         sigma=0.1,

@@ -28,7 +28,8 @@ def keys(schema: dict[str, Any], definitions: dict[str, Any]) -> Iterator[tuple[
     """Give every key that the JSON Schema describes, with its description."""
     for name, each in schema.get("properties", {}).items():
         yield name, each
-        for inner in (each, each.get("items", {}), each.get("additionalProperties") or {}):
+        inside: tuple[Any, ...] = (each, each.get("items"), each.get("additionalProperties"))
+        for inner in inside:
             if isinstance(inner, dict) and "$ref" in inner:
                 yield from keys(definitions[inner["$ref"].rpartition("/")[2]], definitions)
 

@@ -149,7 +149,7 @@ def test_a_free_network_keeps_the_place_of_its_points() -> None:
 def test_positions_with_lever_arm_offset_and_drift_replace_control() -> None:
     problem, truth = simulated(10, 2, 0.0, 0.0)
     m = problem.photos
-    time = np.tile(np.arange(10) - 4.5, 2)
+    time = np.tile(np.arange(-4.5, 5.0), 2)
     lever = np.tile([0.3, -0.2, 1.5], (m, 1))
     axes = np.tile(problem.control.axes[0], (m, 1, 1))
     group = np.repeat([0, 1], 10)

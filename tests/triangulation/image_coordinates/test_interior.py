@@ -61,7 +61,7 @@ def table(photos: Mapping[str, Marks], sigma: float | Mapping[str, float] = 0.00
     rows = [(i, names.index(name), *xy) for i, marks in enumerate(photos.values()) for name, xy in marks.items()]
     columns = np.array(rows).reshape(-1, 4)
     point = columns[:, 1].astype(int)
-    deviations = np.array([sigma if isinstance(sigma, float) else sigma[name] for name in names])[point]
+    deviations = np.array([sigma if isinstance(sigma, float | int) else sigma[name] for name in names])[point]
     return PhotoPoints(
         tuple(photos),
         tuple(names),
@@ -284,7 +284,7 @@ def test_marks_in_the_middle_of_the_sides_do_not_give_a_bilinear_term() -> None:
 
 def test_every_fault_of_every_photo_is_told_at_once() -> None:
     marks = calibrated(CORNERS)
-    photos = {
+    photos: dict[str, Marks] = {
         "1": marks,
         "2": {"F1": marks["F1"], "F2": marks["F1"]},
         "3": {},

@@ -88,7 +88,7 @@ def _at(point: Document) -> str:
     return f"{point['photo']}/{point['row']}{use}"
 
 
-def _accuracy(document: Document) -> Table:
+def _accuracy(document: Document) -> Part:
     required = any(document["required_m"].values())
     nothing = dict.fromkeys(("rms_plan_m", "worst_plan_m", "rms_z_m", "worst_z_m", "meets"))
     columns = (

@@ -94,7 +94,7 @@ def _crossings(outline: Sequence[svg.Point], y: float) -> list[float]:
 def _area(runs: Runs, kind: str, cell: float) -> str:
     """Draw cells as one path; runs that are alike in rows that follow each other are one rectangle."""
     tall: dict[tuple[int, int], tuple[int, int]] = {}
-    parts = []
+    parts: list[str] = []
 
     def close(span: tuple[int, int], rows: tuple[int, int]) -> None:
         x, y = (svg.number(value * cell) for value in (span[0], rows[0]))

@@ -185,7 +185,7 @@ CURVES = (
 
 def precision_pictures(document: Document) -> list[Picture]:
     """Draw the standard deviations of points and perspective centres along every strip."""
-    rows = document.get("precision", {}).get("along") or []
+    rows: list[Document] = document.get("precision", {}).get("along") or []
     if not rows:
         return []
     sizes: dict[str, float] = {}

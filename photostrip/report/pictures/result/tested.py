@@ -33,7 +33,7 @@ SIGMAS = 2.0  # bars of given positions
 
 def check_pictures(document: Document) -> list[Picture]:
     """Draw check points over their standard deviations; nothing where these are not known."""
-    rows = document.get("precision", {}).get("check", {}).get("points") or []
+    rows: list[Document] = document.get("precision", {}).get("check", {}).get("points") or []
     if not any(row[part] is not None for row in rows for part in LIMITS):
         return []
     layout = Layout(columns=1, height=150.0, number=2)
@@ -70,7 +70,7 @@ def check_pictures(document: Document) -> list[Picture]:
 
 def position_pictures(document: Document) -> list[Picture]:
     """Draw the differences at measured camera positions, photo by photo."""
-    rows = document.get("bundle", {}).get("positions") or []
+    rows: list[Document] = document.get("bundle", {}).get("positions") or []
     if not rows:
         return []
     sizes = [abs(row[key]) for row in rows for key, _ in POSITIONS if row[key] is not None]
@@ -103,7 +103,7 @@ def position_pictures(document: Document) -> list[Picture]:
 
 def correlation_pictures(document: Document) -> list[Picture]:
     """Draw how far the parameters of a self-calibration are told apart, camera by camera."""
-    rows = document.get("bundle", {}).get("calibration") or []
+    rows: list[Document] = document.get("bundle", {}).get("calibration") or []
     known = [row for row in rows if row.get("correlations")]
     if len(known) <= 1:
         return []

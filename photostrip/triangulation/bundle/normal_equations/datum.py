@@ -71,7 +71,7 @@ def centred(prepared: PreparedProblem, state: Parameters, move: ParameterStep) -
 def inner(prepared: PreparedProblem, state: Parameters) -> tuple[Floats, Floats]:
     """Mean of the points, metres, and (G'G)^-1, (7, 7), of the similarity of all points about it."""
     pairs = list(zip(prepared.structure.batches, state.xyz, strict=True))
-    total = sum(xyz[:, batch.real].sum(axis=1) for batch, xyz in pairs)
+    total = sum((xyz[:, batch.real].sum(axis=1) for batch, xyz in pairs), np.zeros(3))
     origin = total / sum(len(batch.real) for batch, _ in pairs)
     normal = np.zeros((DEFECT, DEFECT))
     for batch, xyz in pairs:

@@ -317,7 +317,7 @@ class _Search:
         place = np.repeat(xyz, r, axis=0)
         by_photo, by_point = (each.reshape(m, r, 2, -1) for each in derivatives(place, photos, own))
         off = xy - project(place, photos, own).reshape(m, r, 2)
-        sound = np.isfinite(np.concatenate([off[..., None], by_photo], axis=3)).all(axis=(1, 2, 3))
+        sound = np.asarray(np.isfinite(np.concatenate([off[..., None], by_photo], axis=3)).all(axis=(1, 2, 3)))
         for each in (off, by_photo, by_point):
             each[~sound] = 0.0
         of_photos = np.zeros((m, r, 2, r, PHOTO))

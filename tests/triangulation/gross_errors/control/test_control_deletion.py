@@ -329,7 +329,7 @@ def test_a_control_point_whose_middle_ray_is_wrong_counts_and_is_tested(wrong: s
     spoiled = replace(strip, observations=replace(o, xy=xy))
     result = adjusted(spoiled, strip.bands(0, 3, 6, 9, 12), {"p6_1": (4.0, 0.0, 0.0)} if wrong == "given" else {})
     told = [(note.code, note.points) for note in result.notes if note.code in {"control-rejected", "control-image"}]
-    codes = {"nothing": [], "given": ["control-rejected"], "image": ["control-image"]}[wrong]
+    codes: list[str] = {"nothing": [], "given": ["control-rejected"], "image": ["control-image"]}[wrong]
     assert told == [(code, ("p6_1",)) for code in codes]
     control, rows = result.strips[0].control, result.strips[0].of_photos.rows
     rays = {o.photo_ids[photo] for photo in o.photo[rows[o.point[rows] == strip.at["p6_1"]]]}

@@ -216,7 +216,12 @@ def test_a_ray_is_blamed_when_it_is_so_much_likelier_than_any_other(times: float
 
 def test_points_are_decided_on_together_as_one_by_one() -> None:
     """Good points and points with one, two and too many wrong rays, that took part and that did not, in one batch."""
-    errors = [{}, {(0, 1): 60.0}, {(1, 1): 60.0, (3, 1): -90.0}, {(ray, 1): 50.0 * 2**ray for ray in range(4)}]
+    errors: list[dict[tuple[int, int], float]] = [
+        {},
+        {(0, 1): 60.0},
+        {(1, 1): 60.0, (3, 1): -90.0},
+        {(ray, 1): 50.0 * 2**ray for ray in range(4)},
+    ]
     points = [spoiled(a_point(seed, 5), each, 1.0) for seed, each in enumerate(errors * 2)]
     root = np.random.default_rng(1).normal(0, 1e-6, (30, 30))
     points = [
