@@ -199,7 +199,7 @@ def stretches(
     up = on_strip.axes.mean(axis=0)
     points, centers = (each - np.outer(each @ up, up) for each in (on_strip.xyz, on_strip.centers))
     near = _nearest(points, centers)
-    count = min(most, length // photos)
+    count = min(most, -(-length // photos))
     for start in distinct(np.linspace(0, length - photos, count).astype(np.intp)).tolist():
         part = slice(start, start + photos)
         inside = (near >= part.start) & (near < part.stop)

@@ -35,6 +35,7 @@ from photostrip.simulation import (
 )
 from photostrip.triangulation.image_coordinates.corrections import undistort
 from photostrip.triangulation.plausibility import KINDS
+from photostrip.triangulation.plausibility.control.straightening import StripPoints
 from photostrip.triangulation.plausibility.photos import flight_order
 from tests.pipeline.blocks import positions
 
@@ -684,6 +685,33 @@ def test_a_strip_that_a_wrong_distance_tears_apart_is_not_taken_for_control_of_o
     named = set(plausibility.told(planted[0], case.settings).after)
     assert code in named
     assert other not in named
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [8810017, 8810070])
+def test_slips_that_no_model_strip_can_be_laid_on_are_named(seed: int) -> None:
+    """In the last third of 15 models; in a local system, where another order of columns fits by chance."""
+    (mistake,) = (each for each in plausibility.MISTAKES if each.name == "slip of a digit, models")
+    case = mistake.make(seed)
+    planted = mistake.plant(case)
+    assert planted is not None
+    inputs, ids = planted
+    with pytest.raises(PhotostripError) as failure:
+        triangulate(inputs, mistake.settings(case))
+    (finding,) = failure.value.findings
+    assert (finding.code, frozenset(finding.points)) == ("P406", ids)
+    assert "typing error" in finding.message
+
+
+@pytest.mark.parametrize("length", [41, 45, 61, 89, 119])
+def test_stretches_cover_a_strip(length: int) -> None:
+    axes = np.tile([0.0, 0.0, 1.0], (length, 1))
+    places = np.column_stack([np.arange(length), np.zeros(length), np.zeros(length)]).astype(float)
+    strip = StripPoints("A", places, axes=axes, centers=places + np.array([0.0, 0.0, 1.5]), floor=(0.0, 0.0), depth=1.5)
+    rows = np.arange(length)
+    seen = [each for each, _ in evidence.stretches(rows, strip)]
+    assert np.unique(np.concatenate(seen)).tolist() == rows.tolist()
+    assert {len(each) for each in seen} == {evidence.STRETCH_PHOTOS}
 
 
 @pytest.mark.parametrize(("wrong", "least"), [(1, 3), (2, 4)])

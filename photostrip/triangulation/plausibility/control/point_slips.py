@@ -84,7 +84,7 @@ def _order_of_columns(given: GivenPoints, row: int) -> tuple[int, ...] | None:
     if not others.any():
         return None
     low, high = given.written[others].min(axis=0), given.written[others].max(axis=0)
-    reach = np.append(np.full(2, float((high - low)[:2].max())), np.inf)
+    reach = np.append(np.full(2, float((high - low)[:2].max())), float(np.ptp(given.xyz[others, :2], axis=0).max()))
     for order in list(permutations(range(3)))[1:]:
         read = given.written[row, list(order)]
         if ((read > low - reach) & (read < high + reach)).all():
