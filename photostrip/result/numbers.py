@@ -52,7 +52,12 @@ class RoundedColumn(Sequence[Plain]):
         return len(self.values)
 
     def __getitem__(self, place: int | slice) -> Plain:
-        return RoundedColumn(self.values[place]) if isinstance(place, slice) else plain(self.values[place])
+        if isinstance(place, slice):
+            return RoundedColumn(self.values[place])
+        found = self.values[place].tolist()
+        if isinstance(found, float):
+            return found if isfinite(found) else None
+        return plain(self.values[place])
 
     def __iter__(self) -> Iterator[Plain]:
         parts = (plain(self.values[start : start + AT_ONCE]) for start in range(0, len(self), AT_ONCE))

@@ -12,6 +12,24 @@ if TYPE_CHECKING:
     from photostrip.result.numbers import Plain
 
 
+class Row(Mapping[str, Any]):
+    """A record that is not made: 50 bytes in place of 1400 for a given point."""
+
+    __slots__ = ("columns", "place")
+
+    def __init__(self, columns: Mapping[str, Sequence[Plain]], place: int) -> None:
+        self.columns, self.place = columns, place
+
+    def __getitem__(self, key: str) -> Plain:
+        return self.columns[key][self.place]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
 class Records(Sequence[dict[str, Any]]):
     """Records as they are written, kept as columns of equal length: a record is made when it is asked for."""
 
@@ -36,6 +54,10 @@ class Records(Sequence[dict[str, Any]]):
         return isinstance(other, Sequence) and list(self) == list(other)
 
     __hash__ = None  # type: ignore[assignment]
+
+    def rows(self) -> list[Row]:
+        """Return records that read their values when they are asked for."""
+        return [Row(self.columns, place) for place in range(len(self))]
 
     def taken(self, order: Numbers) -> Records:
         places, columns = order.tolist(), cast("dict[str, Any]", self.columns)

@@ -11,6 +11,7 @@ from operator import itemgetter
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
 from photostrip.notes import Document, before, counted, listed
+from photostrip.result.records import Records
 from photostrip.statistics import SECOND_LOOK, TEST_LEVEL, chi2_quantile, f_p_value
 
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
@@ -33,7 +34,8 @@ NAMED = 3  # pairs, photos, findings or notes of one kind that are named
 
 def verdict_of(document: Document) -> Document:
     """Return status, accuracy in a sentence and what to look at, from a document that has no verdict yet."""
-    document = {**document, "control": list(document["control"])}  # gone through many times
+    control = document["control"]
+    document = {**document, "control": control.rows() if isinstance(control, Records) else control}
     errors = list(_findings(document, "error"))
     failed = [*_tolerances(document), *errors]
     look_at = [
@@ -192,7 +194,7 @@ def _without_rejected(row: Document) -> Document:
     """Return a control point without what was rejected, which has a note of its own."""
     out = row.get("rejected", "")
     plan = None if "x" in out or "y" in out else row["plan"]
-    return row | {"plan": plan, "height": None if "z" in out else row["height"]}
+    return {**row, "plan": plan, "height": None if "z" in out else row["height"]}
 
 
 def _odd(document: Document, role: str, named: set[str]) -> Iterator[str]:

@@ -10,7 +10,7 @@ from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
 from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
 from photostrip.report.sections.points import AXES, DIFFERENCES, IDS_NAMED, given_table, largest
-from photostrip.report.sections.strip import ALL_SHOWN, column_of, worst_first
+from photostrip.report.sections.strip import ALL_SHOWN, column_of, rows_of, worst_first
 
 PARTS = "plan", "height"
 UNKNOWN = dict.fromkeys(("plan", "height", "p_plan", "p_height", "sigma_x", "sigma_y", "sigma_z"))
@@ -42,7 +42,7 @@ def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
 
 def _tested(document: Document, given: Sequence[Document], *, everything: bool, most: int) -> Table:
     check = document["precision"]["check"]
-    tested = {row["id"]: row for row in check["points"]}
+    tested = {row["id"]: row for row in rows_of(check["points"])}
     where = ("points", "check", "control")
     worst, note = worst_first(
         given, lambda row: _unlikely(tested.get(row["id"], UNKNOWN)), where, everything=everything, most=most
@@ -123,7 +123,7 @@ def _table(
         ),
         *more,
     )
-    found = [[row[key] for row in rows if row[key] is not None] for key in DIFFERENCES]
+    found = [[value for row in rows if (value := row[key]) is not None] for key in DIFFERENCES]
     blank, nothing = ("",) * 3, ("",) * len(more)
     z = [cell for part in seen.over for cell in (ratio(part), "")]
     inside = [cell for part in seen.inside for cell in (part, "")]
@@ -152,7 +152,7 @@ def _mean(values: Sequence[float]) -> float | None:
 
 def _unlikely(row: Document) -> float:
     """How unlikely the difference of a point is, in plan or in height."""
-    known = [row[f"p_{part}"] for part in PARTS if row[f"p_{part}"] is not None]
+    known = [chance for part in PARTS if (chance := row[f"p_{part}"]) is not None]
     return -min(known, default=1.0)
 
 

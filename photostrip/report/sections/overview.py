@@ -31,6 +31,7 @@ from photostrip.report.sections.strip import (
     elsewhere,
     not_taken,
     photos_of,
+    rows_of,
 )
 from photostrip.report.sections.verdict import verdict_section
 
@@ -46,7 +47,7 @@ AROUND = 4  # lines of the title and of the end
 
 def overview(document: Document, width: int) -> tuple[Section, ...]:
     """Return the sections of the short report for a page of a width."""
-    document = {**document, "control": list(document["control"])}  # gone through many times
+    document = {**document, "control": rows_of(document["control"])}  # gone through many times
     for most in MOST_OF_A_KIND:
         sections = _overview(document, most)
         if len(lay_out("", sections, width)) <= MOST_LINES - AROUND:

@@ -102,11 +102,11 @@ def largest(rows: Sequence[Document], key: str, axis: str) -> str:
     """Return the largest difference along an axis of those that were not rejected."""
     letter = LETTERS.get(axis, axis)
     rows = [row for row in rows if letter not in row.get("rejected", "")]
-    return signed(max((row[key] for row in rows if row[key] is not None), key=fabs, default=None))
+    return signed(max((value for row in rows if (value := row[key]) is not None), key=fabs, default=None))
 
 
 def _most(rows: Sequence[Document]) -> str:
-    known = (row["normalised"] for row in rows if row["normalised"] is not None and not row.get("rejected", ""))
+    known = (value for row in rows if (value := row["normalised"]) is not None and not row.get("rejected", ""))
     return ratio(max(known, default=None))
 
 

@@ -48,6 +48,11 @@ def column_of(rows: Sequence[Document], key: str) -> list[Any]:
     return [row.get(key) for row in rows] if columns is None else list(columns[key])
 
 
+def rows_of(rows: Sequence[Document]) -> Sequence[Document]:
+    """Return rows that can be gone through many times; those that are kept as columns without making them."""
+    return rows.rows() if hasattr(rows, "rows") else rows
+
+
 def elsewhere(rest: int, what: str, section: str, block: str) -> str:
     """Say how many things are not shown, and where they are."""
     return f"{rest} more {what}: --section {section}, or `{block}` in result.json"
