@@ -29,7 +29,6 @@ class PairErrors:
     Image coordinates are x and y of the left, then of the right image point.
     """
 
-    elements_by_image: Floats  # (m, 5, 4): elements of the row's pair, radians per mm; 0 for rows that took no part
     base_by_elements: Floats  # (p, 3, 5): metres per radian
     rotation_by_elements: Floats  # (p, 3, 5): small rotation of the right photo
     point_by_elements: Floats  # (m, 3, 5): metres per radian
@@ -48,16 +47,7 @@ def differentiate_pairs(
     Rows whose rays do not meet hold numbers without meaning; they take part in nothing.
     """
     pairs = orientation.pairs
-    al1, ka1, al2, om2, ka2 = orientation.elements.T
-    zero = np.zeros_like(al1)
-    left = _Turns(
-        from_alpha_omega_kappa(al1, 0.0, ka1),
-        angle_rates(np.column_stack([al1, zero, ka1]), SYSTEM)[:, :, [0, 2]],  # omega1 is 0 by definition
-    )
-    right = _Turns(
-        from_alpha_omega_kappa(al2, om2, ka2),
-        angle_rates(np.column_stack([al2, om2, ka2]), SYSTEM),
-    )
+    left, right = _turns(orientation.elements)
     to_ground = rotations @ left.rotation.transpose(0, 2, 1) * scale[:, None, None]
     turn = np.concatenate([-left.rates, right.rates], axis=2)
     with np.errstate(all="ignore"):
@@ -66,7 +56,6 @@ def differentiate_pairs(
     base[:, :, LEFT] = -_crossed(left.rates, np.array([1.0, 0.0, 0.0]))  # the left photo is held, the base turns
     of_row = to_ground[pairs.pair]
     return PairErrors(
-        elements_by_image=_elements(orientation, left, right),
         base_by_elements=to_ground @ base,
         rotation_by_elements=to_ground @ turn / scale[:, None, None],
         point_by_elements=of_row @ points.by_elements,
@@ -83,6 +72,20 @@ class _Turns(NamedTuple):
     rates: Floats  # (p, 3, k): small rotation by the photo's angles among the elements
 
 
+def _turns(elements: Floats) -> tuple[_Turns, _Turns]:
+    al1, ka1, al2, om2, ka2 = elements.T
+    zero = np.zeros_like(al1)
+    left = _Turns(
+        from_alpha_omega_kappa(al1, 0.0, ka1),
+        angle_rates(np.column_stack([al1, zero, ka1]), SYSTEM)[:, :, [0, 2]],  # omega1 is 0 by definition
+    )
+    right = _Turns(
+        from_alpha_omega_kappa(al2, om2, ka2),
+        angle_rates(np.column_stack([al2, om2, ka2]), SYSTEM),
+    )
+    return left, right
+
+
 class _Points(NamedTuple):
     """Model points in the base frame with base 1, the left photo held."""
 
@@ -96,13 +99,13 @@ def _crossed(axes: Floats, vectors: Floats) -> Floats:
     return np.asarray(np.cross(axes, vectors[..., :, None], axisa=-2, axisb=-2, axisc=-2), float)
 
 
-def _elements(orientation: Orientation, left: _Turns, right: _Turns) -> Floats:
-    """Elements by image coordinates, shape (m, 5, 4): de = -(J^T W J)^-1 J^T W B v (eq. 1)."""
+def elements_by_image(orientation: Orientation) -> Floats:
+    """Elements of each row's pair, (m, 5, 4), radians per mm, 0 if not used: de = -(J^T W J)^-1 J^T W B v (eq. 1)."""
     pairs = orientation.pairs
     with np.errstate(all="ignore"):
         _, jacobian = linearised_parallaxes(orientation.elements, pairs)
         cofactors = np.linalg.inv(normal_matrices(jacobian, pairs))
-        by_image = _parallax_by_image(orientation.elements, pairs, left, right)
+        by_image = _parallax_by_image(orientation.elements, pairs, *_turns(orientation.elements))
         share = np.einsum("mij,jm->mi", cofactors[pairs.pair], jacobian * pairs.weight)
         found = -share[:, :, None] * by_image[:, None, :]
     return np.where(orientation.used[:, None, None], found, 0.0)

@@ -133,7 +133,7 @@ def _image_points(
     components = np.zeros((len(row), 2, SPAN, COMPONENTS))
     images = ImagePoints(row=row, photo=position[row], sigma=sigma[row], components=components)
     place = images.rows_of(orientation.rows)
-    by_left, by_right = np.split(pairs.elements_by_image.transpose(0, 2, 1), 2, axis=1)
+    by_left, by_right = np.split(pair_errors.elements_by_image(orientation).transpose(0, 2, 1), 2, axis=1)
     components[place[:, 0], :, 2, ELEMENTS] = by_left
     components[place[:, 1], :, 1, ELEMENTS] = by_right
     joined, models = formed.junctions, orientation.pairs.size
