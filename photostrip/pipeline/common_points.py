@@ -27,17 +27,20 @@ def join_strips(
     given: ControlPoints,
     output: GroundFrame,
     settings: Settings,
+    *,
+    of_checks: bool,
 ) -> AdjustedStrips:
     """Join strips that were adjusted each by itself.
 
     screened: the same strips before their deformation was corrected.
     given: all given points, check points too.
+    of_checks: whether the precision of check points alone is wanted.
     """
     points = _joined(strips, observations.point_ids, output)
     precision = None
     if settings.precision:
         each = [
-            _precision_of(strip, before.oriented, observations, given)
+            _precision_of(strip, before.oriented, observations, given, of_checks=of_checks)
             for strip, before in zip(strips, screened, strict=True)
         ]
         precision = strip_precision.joined(each, strips, points)
@@ -52,10 +55,15 @@ def join_strips(
 
 
 def _precision_of(
-    strip: StripResult, oriented: OrientedStrip[Any], observations: PhotoPoints, given: ControlPoints
+    strip: StripResult,
+    oriented: OrientedStrip[Any],
+    observations: PhotoPoints,
+    given: ControlPoints,
+    *,
+    of_checks: bool,
 ) -> strip_precision.StripPrecision:
     if strip.photo_stages is not None:
-        return photo_precision.of_photos(strip, oriented, observations, given)
+        return photo_precision.of_photos(strip, oriented, observations, given, of_checks=of_checks)
     from photostrip.pipeline.precision import model_precision  # strips of photos need none of it
 
     return model_precision.of_models(strip, oriented, observations, given)

@@ -20,7 +20,7 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
-from photostrip.pipeline.results import AdjustedStrips, Bundle, Result
+from photostrip.pipeline.results import AdjustedStrips, Result
 from photostrip.pipeline.strips.absolute import StripStage, on_control
 from photostrip.pipeline.strips.adjusting import adjust
 from photostrip.pipeline.strips.forming import form_strips
@@ -54,7 +54,8 @@ def triangulate(
     def of_failure() -> tuple[Finding, ...]:
         find = partial(gate.of_failure, inputs, settings, directory, photo, ground, stages)
         # of several methods that fail the first is told of: another need not look again
-        return stages.once("failure", find, inputs, replace(settings, adjustment=""), photo is None, ground is None)
+        asked = replace(settings, adjustment="", precision=False, cross_validation=False)
+        return stages.once("failure", find, inputs, asked, photo is None, ground is None)
 
     try:
         require_runnable(inputs, settings)
@@ -82,8 +83,11 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     formed = form_strips(inputs, refined.observations, settings, stages)
 
     def on_the_ground(inputs: Inputs, whole: Result | None = None) -> Result:
-        strips, before = (formed, None) if whole is None else (_as_left_by(whole, formed), whole.bundle)
-        adjusted = _adjusted(inputs, settings, ground, refined.observations, strips, stages, before)
+        strips = formed if whole is None else _as_left_by(whole, formed)
+        adjusted = _adjusted(inputs, settings, ground, refined.observations, strips, stages, whole)
+        missing = {}
+        if whole is None:
+            missing = not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips)
         # 9 residuals, check points
         rows, differences = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
         return Result(
@@ -99,7 +103,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
             control_rows=rows,
             control_differences=differences,
             ties=adjusted.ties,
-            not_determined=not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips),
+            not_determined=missing,
             notes=(
                 *(photo.interior.notes if photo.interior is not None else ()),
                 *adjusted.notes,
@@ -138,7 +142,7 @@ def _adjusted(
     observations: PhotoPoints,
     formed: Sequence[StripStage[Any]],
     stages: Stages,
-    before: Bundle | None,
+    whole: Result | None,
 ) -> AdjustedStrips:
     """Bring formed strips to the ground and adjust them, each by itself or all in a bundle."""
     control = measured_control(inputs.control, observations)
@@ -146,7 +150,9 @@ def _adjusted(
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
         of_photos = cast("Sequence[FormedPhotos]", formed)
-        return adjust_block(inputs, settings, observations, control, ground, of_photos, before)
+        return adjust_block(
+            inputs, settings, observations, control, ground, of_photos, None if whole is None else whole.bundle
+        )
     # 6-7 intermediate frame, absolute orientation, wrong control
     frames = tuple((frame.spec, frame.origin) for frame in (*ground.control, ground.output))
     wanted = replace(settings, adjustment="")
@@ -160,4 +166,6 @@ def _adjusted(
     level = settings.covariance.level / max(len(screened), 1)  # all strips together keep it
     settings = replace(settings, covariance=replace(settings.covariance, level=level))
     strips = tuple(adjust(strip, settings) for strip in screened)
-    return join_strips(strips, screened, observations, inputs.control, ground.output, settings)
+    return join_strips(
+        strips, screened, observations, inputs.control, ground.output, settings, of_checks=whole is not None
+    )

@@ -64,10 +64,12 @@ def _record(table: Table, values: Mapping[str, Any]) -> Document:
 
 
 def _written(entry: Quantity | Table, value: Any, beside: Mapping[str, Any]) -> Plain:  # noqa: ANN401 (any value)
-    if value is None or isinstance(value, Records):
+    if value is None or isinstance(value, str):
         return value
     if isinstance(entry, Quantity):
         return rounded_as(entry, value, beside.get(entry.unit_key, ""))
+    if isinstance(value, Records):
+        return value
     return [_record(entry, each) for each in value] if isinstance(value, list) else _record(entry, value)
 
 

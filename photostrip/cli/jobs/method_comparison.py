@@ -54,7 +54,7 @@ def compare_methods(
                 found[adjustment] = error
                 continue
             name = result.name
-            found[adjustment] = result.document
+            found[adjustment] = result.in_columns
             if output is not None and adjustment != AUTO:  # one of the others
                 result.write(output / adjustment, html=html)
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")

@@ -26,9 +26,14 @@ AT_ONCE = 4096  # points, for the sake of memory
 
 
 def of_photos(
-    strip: StripResult, oriented: OrientedStrip[StripErrors], observations: PhotoPoints, given: ControlPoints
+    strip: StripResult,
+    oriented: OrientedStrip[StripErrors],
+    observations: PhotoPoints,
+    given: ControlPoints,
+    *,
+    of_checks: bool,
 ) -> StripPrecision:
-    """Covariances of one strip of photos.
+    """Covariances of one strip of photos, or ``of_checks`` alone.
 
     oriented: the same strip before its deformation was corrected.
     observations: ideal image coordinates of the project.
@@ -42,12 +47,15 @@ def of_photos(
     stated = strip.of_photos.sigma
     factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
-    points = np.empty((len(xyz), 3, 3))
-    for start in range(0, len(xyz), AT_ONCE):
-        part, influence = errors.points.part(start, start + AT_ONCE), fit.influence(xyz[start : start + AT_ONCE])
-        points[start : start + AT_ONCE] = covariances.covariances(errors, part, parameters, influence) * factor
+    points, wanted = np.full((len(xyz), 3, 3), np.nan), np.arange(len(xyz))
+    table, place = errors.points, xyz
+    if of_checks:
+        wanted, table, place = checks.rows, errors.points.take(checks.rows), xyz[checks.rows]
+    for start in range(0, len(wanted), AT_ONCE):
+        part, influence = table.part(start, start + AT_ONCE), fit.influence(place[start : start + AT_ONCE])
+        points[wanted[start : start + AT_ONCE]] = covariances.covariances(errors, part, parameters, influence) * factor
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
-    for some in found.photos():
+    for some in () if of_checks else found.photos():
         photos[some.photos] = covariances.covariances(errors, some.rows, parameters, some.influence) * factor
     compared = check_points.compare_with_checks(strip, errors, checks, oriented.frames)
     axes = strip.intermediate.axes

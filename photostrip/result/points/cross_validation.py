@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from photostrip.arrays import Floats
+from photostrip.frozen import replace
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result
+from photostrip.points import take_rows
 from photostrip.result.numbers import natural, rms
 from photostrip.result.points.given import PARTS, differences, size_columns
 from photostrip.result.points.own_precision import chances
@@ -61,11 +63,16 @@ def _left_out(result: Result, fold: int) -> dict[str, Sequence[object]]:
     found = differences(result)
     rows, over = found.checks
     at = result.control_rows[rows]
-    sigma = {key: column for key, column in point_columns(result).items() if key.startswith("sigma")}
+    there = replace(
+        result,
+        points=take_rows(result.points, at, ("number", "cartesian", "ground", "rays")),
+        precision=None if result.precision is None else take_rows(result.precision, at, ("points",)),
+    )
+    sigma = {key: column for key, column in point_columns(there).items() if key.startswith("sigma")}
     differ = size_columns(found.axes[rows], found.plan[rows], found.height[rows], found.scale[rows])
     columns = {
         **differ,
-        **{key: np.full(len(rows), np.nan) if column is None else column[at] for key, column in sigma.items()},
+        **{key: np.full(len(rows), np.nan) if column is None else column for key, column in sigma.items()},
         "chance_plan": found.chance[rows, 0],
         "chance_height": found.chance[rows, 1],
         "z_plan": over[:, 0],

@@ -21,6 +21,7 @@ from photostrip.triangulation.relative_orientation.pairs import Pairs
 ELEMENTS = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
 CONVERGED = 1e-10  # rad
 ITERATIONS = 30
+HOPELESS = (12, 0.01)  # steps after which a step in rad is too long: those that converge are below 0.002 by then
 LARGEST_STEP = 0.5  # rad; a longer step is shortened, far starts swing otherwise
 RIDGE = 1e-13  # relative; keeps a singular pair from stopping the batch, changes no digit of a regular one
 RETRY_AZIMUTHS = np.radians([15, -15, 30, -30, 60, -60, 90, -90, 180])
@@ -136,7 +137,7 @@ def iterate_elements(
     converged = np.zeros(pairs.size, bool)
     steps = np.zeros(pairs.size, np.intp)
     todo, part = np.arange(pairs.size), pairs
-    for _ in range(ITERATIONS):
+    for number in range(ITERATIONS):
         if not len(todo):
             break
         with np.errstate(all="ignore"):
@@ -147,7 +148,7 @@ def iterate_elements(
         result[todo] += step
         steps[todo] += 1
         converged[todo[size < CONVERGED]] = True
-        going = size >= CONVERGED
+        going = (size >= CONVERGED) & ((number < HOPELESS[0]) | (size < HOPELESS[1]))
         if not going.all():
             part = part.take(np.flatnonzero(going))
             todo = todo[going]

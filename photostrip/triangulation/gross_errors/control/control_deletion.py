@@ -112,10 +112,11 @@ class JointAdjustment:
         if not len(out):
             return self
         rows = list(out)
-        back = self.cofactor(rows) @ self.matrix[rows]
+        cofactor = self.cofactor(rows)
+        back = cofactor @ self.matrix[rows]
         matrix, pull = self.matrix - self.matrix[:, rows] @ back, self.pull - self.pull[rows] @ back
         matrix[rows] = matrix[:, rows] = pull[rows] = 0.0
-        gain = self.pull[rows] @ self.cofactor(rows) @ self.pull[rows]
+        gain = self.pull[rows] @ cofactor @ self.pull[rows]
         return replace(
             self,
             matrix=matrix,

@@ -146,14 +146,13 @@ def _exchanges(strip: StripAtControl, found: Found) -> dict[int, int]:
     """Find pairs of rejected points that the others predict when each has the coordinates of the other."""
     control, whole, place = strip.control, found.whole, strip.coordinates
     kept = kept_of(strip, found)
-    wrong = np.flatnonzero((control.use & ~kept)[:, 0]).tolist()
+    wrong, laid = np.flatnonzero((control.use & ~kept)[:, 0]).tolist(), strip.laid_on(kept)
     partner: dict[int, int] = {}
     for one, other in combinations(wrong, 2):
         if control.frame[one] != control.frame[other] or not (control.use[one] == control.use[other]).all():
             continue
         order = np.arange(len(control))
         order[[one, other]] = other, one
-        laid = strip.laid_on(kept)
         exchanged = laid.misclosures(replace(control, enu=control.enu[order]))
         tried = adjust(laid, exchanged, whole.covariance, bends=whole.first_ray > whole.coordinates)
         both = tuple(np.flatnonzero(np.isin(place.point, (one, other))).tolist())

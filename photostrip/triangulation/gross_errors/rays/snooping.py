@@ -273,8 +273,10 @@ class _Search:
         return found
 
     def _rejected(self, rows: Numbers, decision: Decision, limit: Limit) -> list[Rejection]:
+        if not decision.out.any():
+            return []
         size = decision.size * self.problem.images.sigma[rows]
-        axis = np.nan_to_num(np.abs(size)).argmax(axis=1)
+        axis = np.fmax(np.abs(size), 0.0).argmax(axis=1)
         return [
             Rejection(
                 kind=IMAGE,
