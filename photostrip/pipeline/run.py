@@ -11,7 +11,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import replace
-from photostrip.notes import Finding
+from photostrip.notes import Finding, Note
 from photostrip.pipeline.common_points import join_strips
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
@@ -23,7 +23,7 @@ from photostrip.pipeline.refusals import require_runnable, require_whole
 from photostrip.pipeline.results import AdjustedStrips, Result
 from photostrip.pipeline.strips.absolute import StripStage, on_control
 from photostrip.pipeline.strips.adjusting import adjust
-from photostrip.pipeline.strips.forming import form_strips
+from photostrip.pipeline.strips.forming import as_single_photos, form_strips
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.pipeline.strips.stages import Stages
 from photostrip.pipeline.unchecked_control import unchecked_control_notes
@@ -63,7 +63,7 @@ def triangulate(
         require_whole(inputs, ground.control)
         # 1 interior orientation
         photo = orient_interior(inputs, settings)
-        result = _walk(inputs, settings, ground, photo, stages)
+        result = _walk_from_orientations(inputs, settings, ground, photo, stages)
     except (InputError, GeometryError) as error:
         error.findings = of_failure()
         raise
@@ -73,6 +73,25 @@ def triangulate(
         unsolvable.findings = of_failure()
         raise unsolvable from error
     return replace(result, findings=gate.of_result(result, directory))
+
+
+def _walk_from_orientations(
+    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages
+) -> Result:
+    """Walk, and again with single photos at their given orientations in the place of a strip that cannot be formed."""
+    try:
+        return _walk(inputs, settings, ground, photo, stages)
+    except GeometryError as error:
+        cut = as_single_photos(inputs, settings, error)
+        if cut is None:
+            raise
+        try:
+            result = _walk_from_orientations(cut, settings, ground, photo, stages)
+        except GeometryError:
+            raise error from None
+        text = f"{error}; all photos of the strip start from their given orientations in its place"
+        note = Note("not-formed", text, photos=error.photos)
+        return replace(result, notes=(note, *result.notes))
 
 
 def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages) -> Result:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import chain
 from typing import Any
 
+from photostrip.errors import GeometryError
 from photostrip.frozen import replace
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import Inputs, Settings
@@ -41,3 +43,21 @@ def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings, s
         stages.once("strip", partial(form_strip, strip, observations, settings, stages), strip, *given)
         for strip in whole
     ]
+
+
+def as_single_photos(inputs: Inputs, settings: Settings, refused: GeometryError) -> Inputs | None:
+    """Cut the strip that a refusal is about into single photos, which a bundle starts from their given orientations.
+
+    None where these are not given for all of them, the bundle rejects nothing, or the strip's positions share an error.
+    """
+    given, positions = inputs.orientations, inputs.positions
+    named = set(refused.photos)
+    strip = next((strip for strip in inputs.strips if named and named <= set(strip.photos)), None)
+    if strip is None or given is None or len(strip.photos) < 2 or not set(strip.photos) <= set(given.photos):
+        return None
+    if settings.adjustment != "bundle" or "none" in {settings.bundle.screening, settings.relative.screening}:
+        return None
+    if positions is not None and positions.correction != "none" and positions.group == "strip":
+        return None
+    singles = (replace(strip, id=f"{strip.id}/{photo}", photos=(photo,)) for photo in strip.photos)
+    return replace(inputs, strips=tuple(chain(*([each] if each is not strip else singles for each in inputs.strips))))

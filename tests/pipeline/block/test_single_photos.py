@@ -13,10 +13,12 @@ from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.pipeline.run import triangulate
+from photostrip.points import PhotoPoints
 from photostrip.report.html import to_html
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
 from photostrip.result.trace.trace import trace_of
+from photostrip.result.verdict import verdict_of
 from photostrip.simulation import Control, Flight, Ground, Simulation, Spec
 from tests.pipeline.blocks import adjusted, errors, exact, orientations, simulate, with_control
 
@@ -123,3 +125,48 @@ def test_single_photos_that_nothing_holds_are_refused_by_name() -> None:
     )
     with pytest.raises(GeometryError, match="does not determine"):
         adjusted(simulation, inputs)
+
+
+@pytest.mark.parametrize("given", ["observed", "approximate", "one short"])
+def test_a_strip_with_a_pair_that_cannot_be_oriented_starts_from_given_orientations(given: str) -> None:
+    """Half of a pair's points were taken for others; what the bundle rejects is just these."""
+    simulation = simulate(Spec(flight=Flight(photos=6)))
+    seen, noise = simulation.observations, np.random.default_rng(1)
+    before = np.isin(seen.point, seen.point[seen.photo == 2])
+    wrong = np.flatnonzero((seen.photo == 3) & before)[::2]
+    xy = seen.xy.copy()
+    xy[wrong] += noise.uniform(-50.0, 50.0, (len(wrong), 2))
+    known = orientations(simulation, observed=given == "observed")
+    if given == "one short":
+        left = slice(0, 5)
+        parts = {name: getattr(known, name)[left] for name in ("photos", "enu", "angles", "sigma", "sigma_angles")}
+        known = replace(known, **parts)
+    inputs = replace(inputs_of(simulation), observations=replace(seen, xy=xy), orientations=known)
+    if given == "one short":
+        with pytest.raises(GeometryError, match="relative orientation of photos 1003 and 1004"):
+            adjusted(simulation, inputs)
+        return
+    result = adjusted(simulation, inputs)
+    assert result.bundle is not None
+    used = np.zeros(len(seen), bool)
+    used[result.bundle.block.rows[result.bundle.screened.selection.images]] = True
+    assert not used[wrong].any()
+    assert np.count_nonzero(~used) <= len(wrong) + 3
+    kept = np.ones(len(seen), bool)
+    kept[wrong] = False
+    cut = PhotoPoints(
+        photo_ids=seen.photo_ids,
+        point_ids=seen.point_ids,
+        photo=seen.photo[kept],
+        point=seen.point[kept],
+        xy=seen.xy[kept],
+        sigma=seen.sigma[kept],
+    )
+    without = adjusted(simulation, replace(inputs, observations=cut))
+    error, least = (np.sqrt((errors(simulation, each) ** 2).sum(axis=1).mean()) for each in (result, without))
+    assert error < 1.2 * least
+    document = document_of(result)
+    verdict = verdict_of(document)
+    assert verdict["status"] == "look"
+    assert any("start from their given orientations" in text for text in verdict["look_at"])
+    assert [section.title for section in sections_of(document, everything=True)]
