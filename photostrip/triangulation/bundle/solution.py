@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
+from photostrip.triangulation.bundle.normal_equations.factored import Factored
 from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
 
 
@@ -42,6 +45,11 @@ class BundleSolution:
     def state(self) -> Parameters:
         """The values of all parameters, laid out for the prepared problem."""
         return parameters_from(self.prepared, self.centers, self.rotations, self.points, self.common)
+
+    @cached_property
+    def factored(self) -> Factored:
+        """The normal equations at the solution."""
+        return Factored.at(self.prepared, self.state, free=self.free)
 
     @property
     def sigma0(self) -> float:

@@ -6,6 +6,7 @@ Source: derived; see docs/precision.md, eq. 1-4.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -34,9 +35,13 @@ class ImagePoints:
 
     def rows_of(self, rows: Numbers) -> Numbers:
         """Places here of rows in the table of image points."""
-        lookup = np.full(int(self.row.max()) + 1, -1)
-        lookup[self.row] = np.arange(len(self.row))
-        return np.asarray(lookup[rows], np.intp)
+        return np.asarray(self._places[rows], np.intp)
+
+    @cached_property
+    def _places(self) -> Numbers:
+        found = np.full(int(self.row.max()) + 1, -1)
+        found[self.row] = np.arange(len(self.row))
+        return found
 
 
 @dataclass(frozen=True, eq=False)

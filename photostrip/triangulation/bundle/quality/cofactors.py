@@ -12,12 +12,12 @@ from typing import Self
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass
+from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.bundle.normal_equations import datum
+from photostrip.triangulation.bundle.normal_equations.factored import Inverse, solved_for
 from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
-from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced, factored, given_at, reduce
+from photostrip.triangulation.bundle.normal_equations.reduced import given_at
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS, by_photo, by_point
 from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
 from photostrip.triangulation.bundle.observations.ray_batches import Batch
@@ -25,49 +25,10 @@ from photostrip.triangulation.bundle.parameters import Parameters, PreparedProbl
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 
-@dataclass(frozen=True, eq=False)
-class Inverse:
-    """Inverse normal matrix of photos and common parameters, as far as it is known."""
-
-    band: Factor  # elements within the band, or at pairs, of the inverse of the photos' part alone
-    cross: Floats  # (m, 6, p): that inverse times the border
-    common: Floats  # (p, p): cofactors of the common parameters
-    factor: Factor  # factor of the photos' part: for photos farther apart than the band is wide
-
-    def cofactors(self, sets: Numbers, more: int) -> Floats:
-        """Joint cofactors (g, 6 k + more, 6 k + more) of sets of photos and the first common parameters.
-
-        ``sets`` (g, k) holds places in the band; photos count in their own axes and signs. With Z of the photos alone,
-        W = Z times the border and C of the common parameters: [Z + W C W', -W C; -C W', C].
-        """
-        groups, n = len(sets), PHOTO * sets.shape[1]
-        number = (PHOTO * sets[:, :, None] + np.arange(PHOTO)).reshape(groups, n)
-        row, column = number[:, :, None], number[:, None, :]
-        whole = np.empty((groups, n + more, n + more))
-        late, early = np.maximum(row, column), np.minimum(row, column)
-        near = self.band.holds(late, early)
-        if near.all():
-            whole[:, :n, :n] = self.band.at(late, early)
-        else:
-            whole[:, :n, :n][near] = self.band.at(late[near], early[near])
-            far = np.unique(number[~near.all(axis=(1, 2))])
-            columns = self.factor.solve(np.eye(self.factor.size)[:, far])
-            row, column = np.broadcast_arrays(row, column)
-            whole[:, :n, :n][~near] = columns[row[~near], np.searchsorted(far, column[~near])]
-        if len(self.common):
-            cross = self.cross[sets].reshape(groups, n, -1)
-            whole[:, :n, :n] += cross @ self.common @ cross.swapaxes(1, 2)
-            whole[:, :n, n:] = -cross @ self.common[:, :more]
-            whole[:, n:, :n] = whole[:, :n, n:].swapaxes(1, 2)
-            whole[:, n:, n:] = self.common[:more, :more]
-        return whole
-
-
 def cofactors_of(solution: BundleSolution) -> Cofactors:
     """Cofactors of all parameters and residuals; ``bundle-rank`` when the normal matrix is singular at the solution."""
     prepared = solution.prepared
-    state, reduced, band = at_solution(solution)
-    inverse = _inverse(reduced, band)
+    state, reduced, inverse = solution.state, solution.factored.reduced, solution.factored.inverse
     points = np.full((prepared.problem.points, 3, 3), np.nan)
     residuals = np.zeros((len(prepared.problem.images), 2, 2))
     table = prepared.table(state)
@@ -78,7 +39,7 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
     of_photos = inverse.cofactors(np.arange(len(table[0]))[:, None], len(state.common))
     positions, attitudes = (_given(prepared, linear, of_photos) for linear in given_at(prepared, state))
     if solution.free:
-        points, of_photos = _inner(prepared, state, band, reduced, points, of_photos)
+        points, of_photos = _inner(solution, state, points, of_photos)
     photos, cross = _turned(prepared, state, of_photos)
     weights = prepared.prior**-2.0
     residuals *= prepared.problem.images.sigma[:, :, None] * prepared.problem.images.sigma[:, None, :]
@@ -95,24 +56,6 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
     )
 
 
-class Factored(NamedTuple):
-    state: Parameters
-    reduced: Reduced
-    band: Factor
-
-
-def at_solution(solution: BundleSolution) -> Factored:
-    """Factor the reduced normal equations at the solution."""
-    prepared = solution.prepared
-    state = solution.state
-    reduced = reduce(prepared, state)
-    blocks = reduced.blocks[prepared.structure.diagonal]
-    band = factored(prepared, reduced, datum.anchor(prepared, state, blocks) if solution.free else None)
-    if band is None:
-        raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
-    return Factored(state, reduced, band)
-
-
 @dataclass(frozen=True, eq=False)
 class JointCofactors:
     """Joint cofactors of several photos; of a free network in some datum, which nothing feels that can be observed."""
@@ -123,9 +66,7 @@ class JointCofactors:
 
     @classmethod
     def of_solution(cls, solution: BundleSolution) -> Self:
-        """Invert the normal matrix at a solution."""
-        _, reduced, band = at_solution(solution)
-        return cls(_inverse(reduced, band), solution.prepared.structure.rank, solution.rotations)
+        return cls(solution.factored.inverse, solution.prepared.structure.rank, solution.rotations)
 
     def of(self, photos: Numbers) -> Floats:
         """Shifts (m) and rotation vectors (rad) of g sets of k photos in the Cartesian frame, shape (g, 6k, 6k)."""
@@ -138,15 +79,6 @@ class JointCofactors:
         turn *= SIGNS
         flat = turn.reshape(whole.shape)
         return np.asarray(flat @ whole @ flat.swapaxes(1, 2), float)
-
-
-def _inverse(reduced: Reduced, band: Factor) -> Inverse:
-    p = len(reduced.corner) - 1
-    border = reduced.border.reshape(-1, p + 1)[:, :p]
-    cross = band.solve(border) if p else np.zeros_like(border)
-    common = np.linalg.inv(reduced.corner[:p, :p] - border.T @ cross)
-    cross = cross.reshape(len(reduced.border), PHOTO, p)
-    return Inverse(band=band.inverse(), cross=cross, common=0.5 * (common + common.T), factor=band)
 
 
 def _batch(
@@ -240,14 +172,13 @@ def _turned(prepared: PreparedProblem, state: Parameters, of_photos: Floats) -> 
     return alone, turn @ of_photos[rank, :PHOTO, PHOTO:]
 
 
-def _inner(
-    prepared: PreparedProblem, state: Parameters, band: Factor, reduced: Reduced, points: Floats, of_photos: Floats
-) -> tuple[Floats, Floats]:
+def _inner(solution: BundleSolution, state: Parameters, points: Floats, of_photos: Floats) -> tuple[Floats, Floats]:
     """Carry cofactors of points and photos over to inner constraints on the points.
 
     With G the generators of the similarity, E the choice of the points, H = (G'EG)^-1 and P = Q E G H: the cofactors
     are Q - G P' - P G' + G (H G'E P) G'.
     """
+    prepared, reduced = solution.prepared, solution.factored.reduced
     origin, inverse = datum.inner(prepared, state)
     p = len(state.common)
     moves = [similarity_derivatives(xyz.T, origin).transpose(1, 2, 0) for xyz in state.xyz]  # (3, 7, S)
@@ -260,7 +191,7 @@ def _inner(
         eliminated.root.forward(pushed)
         white.append(pushed)
         _push(batch, eliminated, pushed, right, corner)
-    photos, common = solved_for(reduced, band, right, corner)
+    photos, common = solved_for(solution.factored, right, corner)
     total = np.zeros((datum.DEFECT, datum.DEFECT))
     shifts = []
     for batch, eliminated, pushed, move in zip(prepared.structure.batches, reduced.points, white, moves, strict=True):
@@ -298,16 +229,3 @@ def _push(batch: Batch, eliminated: Eliminated, pushed: Floats, right: Floats, c
     np.subtract.at(right, batch.photo, left)
     calibrated = len(eliminated.rows) - 1 - n
     corner[:calibrated] -= np.einsum("pcs,cds->pd", eliminated.rows[n:-1], pushed)
-
-
-def solved_for(reduced: Reduced, band: Factor, right: Floats, corner: Floats) -> tuple[Floats, Floats]:
-    """Solve for right-hand sides of photos (m, 6, c) and common parameters (p, c)."""
-    p = len(corner)
-    border = reduced.border.reshape(-1, p + 1)[:, :p]
-    alone = band.solve(right.reshape(-1, right.shape[-1]))
-    if not p:
-        return alone.reshape(right.shape), corner
-    cross = band.solve(border)
-    common = np.linalg.solve(reduced.corner[:p, :p] - border.T @ cross, corner - border.T @ alone)
-    photos: Floats = (alone - cross @ common).reshape(right.shape)
-    return photos, np.asarray(common, float)
