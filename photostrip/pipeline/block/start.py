@@ -46,6 +46,7 @@ def start(
 ) -> BlockStart:
     """Bring all strips and photos of a block into the Cartesian frame.
 
+    settings: their ``adjustment`` is how a strip with control of its own meets it.
     stages: strips of two photos or more.
     Raises GeometryError when a strip or photo hangs together with nothing, or the block cannot be brought to the
         ground.
@@ -66,7 +67,7 @@ class _Block:
     """The strips that are on the ground so far."""
 
     def __init__(self, settings: Settings, observations: PhotoPoints, known: Known) -> None:
-        self.settings = replace(settings, adjustment="polynomial")
+        self.settings = settings
         self.tied = replace(settings, adjustment="similarity", relative=replace(settings.relative, screening="none"))
         self.observations, self.known = observations, known
         self.done: dict[int, StripResult] = {}

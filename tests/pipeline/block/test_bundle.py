@@ -13,7 +13,7 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Strip
 from photostrip.points import PhotoPoints
 from photostrip.result.document import document_of
-from photostrip.simulation import Control, Flight, Ground, Image, Spec, Terrain
+from photostrip.simulation import Control, Flight, Ground, Image, Points, Spec, Terrain
 from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
 
 if TYPE_CHECKING:
@@ -229,6 +229,19 @@ def test_check_points_do_not_influence_a_bundle() -> None:
         adjusted(simulation, each) for each in (inputs, replace(inputs, control=replace(inputs.control, enu=moved)))
     ]
     assert np.array_equal(results[0].points.cartesian, results[1].points.cartesian)
+
+
+@pytest.mark.slow
+def test_a_strip_that_polynomials_leave_kilometres_off_starts_from_its_own_covariance() -> None:
+    spec = Spec(
+        flight=Flight(photos=600, end_lap_percent=62.0, heading_deg=0.0, scale=1500.0),
+        points=Points(rows=5, extra_per_model=6, reach_percent=75.0),
+        control=Control(every=300, check=0),
+        image=Image(sigma_um=150.0),
+    )
+    bundle = adjusted(simulate(spec)).bundle
+    assert bundle is not None
+    assert bundle.screened.solution.sigma0 == pytest.approx(1.0, abs=0.03)
 
 
 @pytest.mark.slow
