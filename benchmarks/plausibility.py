@@ -733,6 +733,13 @@ def exchanged(case: Case) -> Planted | None:
     return with_control(case, enu=enu), frozenset({control.ids[one], control.ids[other]})
 
 
+def slip_beside_exchanged(case: Case) -> Planted | None:
+    """Exchange two control points, and change a digit of a third."""
+    two = exchanged(case)
+    slip = None if two is None else slip_of_a_digit(replace(case, inputs=two[0]), check=False)
+    return None if slip is None or two is None or two[1] & slip[1] else slip
+
+
 def in_the_next_row(case: Case) -> Planted | None:
     """Write the ids of all given points one row too low."""
     ids = case.inputs.control.ids
@@ -1115,6 +1122,7 @@ MISTAKES = (
     Mistake("all check points shifted, bundle", checks_shifted, ("P411",), block, "bundle"),
     Mistake("all check points shifted, models", checks_shifted, ("P411",), of_models),
     Mistake("two control points exchanged", exchanged, ("P408",)),
+    Mistake("slip of a digit, two others exchanged", slip_beside_exchanged, ("P406",)),
     Mistake("ids of given points in the next row", in_the_next_row, ("P409",)),
     Mistake("given points with coordinates of others", of_other_points, ("P409",)),
     Mistake("one given point in other columns", other_columns_of_one, ("P406",)),

@@ -105,7 +105,9 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
             findings = [each for each in findings if each.code not in OF_LISTS]
         findings += of_groups
     findings += shared_control.find_shared_errors(stages, findings, joined=result.bundle is not None)
-    if not any(each.is_error for each in findings):
+    if not any(each.is_error for each in findings) and not slips.keep_exchanged(
+        findings, predicted, inputs.control.ids
+    ):
         findings += shared_control.find_shifted_checks(result)
     return accepted(findings, settings.accept)
 

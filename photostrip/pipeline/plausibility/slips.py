@@ -7,7 +7,7 @@ nothing wrong with the given points of a strip has compared them better than the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -71,12 +71,19 @@ def is_doubtful(formed: EvidenceStrip, result: Result, predicted: Predicted) -> 
     return bool((shown & ~predicted.agree(control.use)).any())
 
 
-def confirmed(findings: Iterable[Finding], predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
+def keep_exchanged(findings: Iterable[Finding], predicted: Predicted, ids: Sequence[str]) -> set[tuple[str, ...]]:
+    """Give the strips of which the run kept exchanged points: what it says of their other points proves nothing."""
+    exchanged = [each for each in findings if each.code == point_slips.EXCHANGED]
+    return {each.strips for each in exchanged if np.isnan(predicted.off[locate(each.points, ids), :2]).any()}
+
+
+def confirmed(findings: Sequence[Finding], predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
     """Give findings again; slips only as far as the adjustment shows them too, as it predicts the coordinates."""
+    ids = control.points.ids
+    untested = keep_exchanged(findings, predicted, ids)
     for each in findings:
-        if each.code == CODE and "axis" in each.evidence:  # a slip in one coordinate
-            row = control.points.ids.index(each.points[0])
-            yield from _confirmed(each, row, predicted, control)
+        if each.code == CODE and "axis" in each.evidence and each.strips not in untested:  # a slip in one coordinate
+            yield from _confirmed(each, ids.index(each.points[0]), predicted, control)
         else:
             yield each
 

@@ -391,6 +391,31 @@ def test_two_control_points_exchanged() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [8820007, 8820108, 8822007])
+def test_a_slip_beside_exchanged_points(seed: int) -> None:
+    """The first was confirmed by a run that kept all of them, the second's bending was fitted to what is wrong.
+
+    The third let all check points look shifted.
+    """
+    case = plausibility.sound(seed)
+    planted = plausibility.slip_beside_exchanged(case)
+    assert planted is not None
+    found = plausibility.told(planted[0], case.settings)
+    assert set(found.after) == {"P406", "P408"}
+    assert found.after["P406"] - {"A"} == planted[1]
+    assert not planted[1] & found.after["P408"]
+
+
+def test_exchanged_points_beyond_the_others_are_no_slip_in_check() -> None:
+    """Side by side, photos predict no point beyond the control: what lay there was left out of the search."""
+    case = plausibility.sound(8821210)
+    planted = plausibility.exchanged(case)
+    assert planted is not None
+    (finding,) = gate.of_inputs(planted[0], case.settings)
+    assert (finding.code, set(finding.points)) == ("P408", planted[1])
+
+
+@pytest.mark.slow
 def test_start_angles_in_gons_and_in_another_system() -> None:
     made = simulation("utm")
     truth, inputs = made.truth, inputs_of(made)

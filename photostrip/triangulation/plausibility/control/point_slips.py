@@ -16,6 +16,7 @@ from photostrip.triangulation.plausibility.control.plan_fit import RobustFit
 from photostrip.triangulation.plausibility.control.straightening import GivenPoints, StraightenedStrip, StripPoints
 from photostrip.triangulation.plausibility.finding import Evidence, found
 
+EXCHANGED = "P408"
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
 NOWHERE = 1e7  # metres, a quarter of the Earth's circumference: no map reaches so far
 LEAST_RAYS = 2
@@ -51,9 +52,9 @@ def find_plan_slips(
 ) -> Iterator[Finding]:
     """Name points that do not go with the others in plan, and the slip that explains it."""
     fit = left.plan
-    odd = left.consistent & given.use[:, 0] & np.isfinite(fit.residual) & fit.odd & _between_control(fitted)
-    rows = np.flatnonzero(odd).tolist()
-    exchanged = _exchanged(given, fit, rows)
+    odd = left.consistent & given.use[:, 0] & np.isfinite(fit.residual) & fit.odd
+    rows = np.flatnonzero(odd & _between_control(fitted)).tolist()
+    exchanged = _exchanged(given, fit, rows, np.flatnonzero(odd).tolist())
     for one, other in exchanged:
         names = (given.ids[one], given.ids[other])
         message = f"given points {names[0]} and {names[1]} fit when their coordinates are exchanged"
@@ -62,7 +63,7 @@ def find_plan_slips(
             "misclosure_exchanged_m": _after_exchange(given, fit, one, other),
         }
         fix = "were their ids exchanged, in the table or on the photos?"
-        yield found("P408", message, fix, evidence, points=names, strips=(on_strip.strip,))
+        yield found(EXCHANGED, message, fix, evidence, points=names, strips=(on_strip.strip,))
     done = {row for pair in exchanged for row in pair}
     for row in np.flatnonzero((given.moved[:, :2] != 0).any(axis=1)).tolist():
         if (order := _order_of_columns(given, row)) is not None:
@@ -169,10 +170,12 @@ def _curved(fitted: StraightenedStrip, off: float) -> float:
     return off * (off + float(np.ptp(fitted.along[np.isfinite(fitted.along)]))) / EARTH_RADIUS
 
 
-def _exchanged(given: GivenPoints, fit: RobustFit, rows: list[int]) -> list[tuple[int, int]]:
+def _exchanged(given: GivenPoints, fit: RobustFit, rows: list[int], others: list[int]) -> list[tuple[int, int]]:
     pairs = []
-    for place, one in enumerate(rows):
-        for other in rows[place + 1 :]:
+    for one in rows:
+        for other in others:
+            if one == other or (other in rows and other < one):
+                continue
             limit = max(fit.limit[one], fit.limit[other])
             if given.group[one] == given.group[other] and _after_exchange(given, fit, one, other) < limit:
                 pairs.append((one, other))

@@ -224,18 +224,20 @@ def fit_simplest(
     in_fit: Flags,
     floor: float,
 ) -> tuple[NDArray[Any], RobustFit]:
-    """Fit as few columns, the simplest first, as leave no more than makes sense; `least` of them are always taken.
+    """Fit as few columns, the simplest first, as leave no more than makes sense, or least; `least` are always taken.
+
+    More columns leave more where too many of the points are wrong for them.
 
     Returns columns: (n, c), those that were fitted.
     """
-    number = least
-    while True:
+    fits: list[tuple[NDArray[Any], RobustFit]] = []
+    for number in range(least, len(columns) + 1):
         chosen = np.column_stack(columns[:number])
-        fit = fit_robustly(chosen, values, in_fit, floor)
+        fits.append((chosen, fit_robustly(chosen, values, in_fit, floor)))
         spare = int(in_fit.sum()) - number - 1
-        if number == len(columns) or spare < LEAST_REDUNDANCY or fit.sigma0 <= SIMPLE_SIGMAS * floor:
-            return chosen, fit
-        number += 1
+        if spare < LEAST_REDUNDANCY or fits[-1][1].sigma0 <= SIMPLE_SIGMAS * floor:
+            break
+    return min(fits, key=lambda each: each[1].sigma0)
 
 
 def _direction(place: Complex) -> complex:
