@@ -1,6 +1,7 @@
 """From a problem to its least-squares solution: Gauss-Newton with step control.
 
-Source: [Granshaw 1980] for the reduced normal equations; step control after [Marquardt 1963].
+Source: [Granshaw 1980] for the reduced normal equations; step control after [Marquardt 1963]; the step that may lead
+up: derived.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from photostrip.arrays import Floats
+from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation.bundle.normal_equations import datum, defects
 from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
@@ -84,11 +86,32 @@ def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> tuple[Par
             state, best = moved, found
             damping = 0.0 if damping <= FIRST_DAMPING else damping * LESS
             continue
+        further = None if damping else _stepped(prepared, moved, found, steps, free=free)
+        if further is not None and further[1].chi_square < best.chi_square:
+            state, best = further
+            continue
         damping = max(damping * MORE, FIRST_DAMPING)
         if damping > LARGEST_DAMPING:
             break
         best = reduce(prepared, state, damping)
     raise defects.diverged(prepared, state, len(steps))
+
+
+def _stepped(
+    prepared: PreparedProblem, state: Parameters, reduced: Reduced, steps: list[IterationStep], *, free: bool
+) -> tuple[Parameters, Reduced] | None:
+    """Go one step on from where the sum of squares has grown; None where that cannot be.
+
+    A principal distance and the heights of its photos move together along a curve: a step leaves it, the next one finds
+    it again, and steps that never leave it do not come to an end.
+    """
+    try:
+        move = _move(prepared, state, reduced, 0.0, free=free)
+    except (GeometryError, np.linalg.LinAlgError):
+        return None
+    steps.append(_recorded(reduced, move, 0.0))
+    moved = _moved(prepared, state, move)
+    return moved, reduce(prepared, moved)
 
 
 def _still_to_come(steps: list[IterationStep]) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from benchmarks import plausibility
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.inputs import CameraPositions
 from photostrip.pipeline.run import triangulate
@@ -126,6 +127,21 @@ def test_a_principal_distance_off_by_a_percent_is_named() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("seed", "rejected"), [(8810027, 0), (8930004, 20)])
+def test_a_camera_of_one_strip_off_by_ten_percent_is_named(seed: int, rejected: int) -> None:
+    """Its unknown did not converge, and up to 173 image points were rejected in its place."""
+    case = plausibility.block(seed)
+    planted = plausibility.distance_of_one_strip(case)
+    assert planted is not None
+    result = triangulate(planted[0], replace(case.settings, adjustment="bundle"))
+    (finding,) = result.findings
+    assert (finding.code, set(finding.strips)) == ("P105", planted[1])
+    assert result.bundle is not None
+    assert len(result.bundle.screened.rejections) <= rejected
+    given = case.inputs.strips[0].camera.principal_distance
+    assert float(finding.evidence["would_fit_mm"]) == pytest.approx(given, rel=0.02)
+
+
 def test_single_wrong_positions_stay_single() -> None:
     """Two positions that are off take no offset of all with them."""
     shift = np.zeros((20, 3))
