@@ -127,7 +127,7 @@ def test_a_principal_distance_off_by_a_percent_is_named() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "rejected"), [(8810027, 0), (8930004, 20)])
+@pytest.mark.parametrize(("seed", "rejected"), [(8810027, 15), (8930004, 20)])
 def test_a_camera_of_one_strip_off_by_ten_percent_is_named(seed: int, rejected: int) -> None:
     """Its unknown did not converge, and up to 173 image points were rejected in its place."""
     case = plausibility.block(seed)
