@@ -63,19 +63,20 @@ def find_wrong_distance(
     *,
     stretched: bool,
 ) -> list[Finding]:
-    """Try other principal distances on a strip that does not fit the heights of its control (P105, at most one).
+    """Try other principal distances on a strip that does not fit the heights of its control (P105, P107, at most one).
 
     It is tried where something asks for it: all control together, a misfit larger than a strip bends, or the pairs.
 
     as_given: how the strip fits those heights as it was formed, where that is known.
     `compare` compares a formed strip with them.
-    stretched: whether all control of the strip together shows that its heights are stretched.
+    stretched: whether all control of the strip together shows that its heights are stretched, or the run doubts some.
     """
     if len(formed.strip.photos) > MOST_PHOTOS:
         return []
     # of a badly wrong distance, most control may have been dropped
     first = as_given or compare(formed) or compare(formed.whole)
-    if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < wrong_heights.LEAST_SCALE_ERROR:
+    least = 0.0 if stretched else wrong_heights.LEAST_SCALE_ERROR
+    if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < least:
         return []
     sigma0 = _middle_sigma0(formed)
     no_bend = first.misfit > len(formed.strip.photos) ** BEND_POWER
@@ -89,6 +90,8 @@ def find_wrong_distance(
         if in_relief or trial.sigma0 < BETTER_SIGMA0_RATIO * sigma0:
             break  # else a bend of the strip explains it
     else:
+        return []
+    if abs(trial.factor - 1.0) < least:
         return []
     numbers: Evidence = {
         "heights_given_over_strip": first.ratio, "misfit_as_given": first.misfit, "misfit_then": trial.misfit,
@@ -164,8 +167,6 @@ def other_distance(
 
 
 def _finding(strip: Strip, ratio: float, how: str, numbers: Evidence) -> list[Finding]:
-    if abs(ratio - 1.0) < wrong_heights.LEAST_SCALE_ERROR:
-        return []
     given = strip.camera.principal_distance
     message = f"strip {strip.id} {how} with a principal distance of {given * ratio:.1f} mm; {given:g} mm is given"
     fix = FIX if 1.0 / UNIT_FACTOR < ratio < UNIT_FACTOR else f"{FIX}, or correct `observations.unit`"

@@ -79,7 +79,10 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     predicted = slips.predict(result)
     doubtful = [each for each in formed if slips.is_doubtful(each, result, predicted)]
     strips = tuple(each.strip for each in doubtful)  # a photo that is a strip of its own forms nothing
-    stretched = {stage.strip.id: isinstance(stage.shared, StretchedHeights) for stage in stages}
+    doubted = {note.strip for note in result.notes if note.code in slips.OF_DOUBTED_CONTROL}
+    stretched = {
+        each.strip.id: isinstance(each.shared, StretchedHeights) or each.strip.id in doubted for each in stages
+    }
     tried = {} if slips.fits_measurements(result) else stretched
     of_control = _of_control(control, images, strips, doubtful, tried)
     findings = [*images.findings, *(of_control if control is None else slips.confirmed(of_control, predicted, control))]

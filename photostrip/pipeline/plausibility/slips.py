@@ -26,6 +26,7 @@ from photostrip.triangulation.plausibility.control import given_points, point_sl
 from photostrip.triangulation.plausibility.control.plan_fit import ODD_PROBABILITY
 
 CODE = "P406"
+OF_DOUBTED_CONTROL = {"control-doubtful", "control-rejected"}  # notes
 LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)
 MOST_SIGMA0 = 2.0  # of a bundle, over what is stated: a principal distance of another lens leaves 4 and more
 

@@ -142,6 +142,18 @@ def test_a_camera_of_one_strip_off_by_ten_percent_is_named(seed: int, rejected: 
     assert float(finding.evidence["would_fit_mm"]) == pytest.approx(given, rel=0.02)
 
 
+@pytest.mark.parametrize("seed", [8810170, 8810441])
+def test_doubted_control_may_be_a_principal_distance_off_by_percents(seed: int) -> None:
+    """Photos that are tilted bend the strip by more than its stretch: one control point was doubted, and used."""
+    case = plausibility.sound(seed)
+    planted = plausibility.distance_by_percents(case)
+    assert planted is not None
+    (finding,) = triangulate(planted[0], case.settings).findings
+    given = case.inputs.strips[0].camera.principal_distance
+    assert finding.code == "P107"
+    assert float(finding.evidence["would_fit_mm"]) == pytest.approx(given, rel=0.006)
+
+
 def test_single_wrong_positions_stay_single() -> None:
     """Two positions that are off take no offset of all with them."""
     shift = np.zeros((20, 3))
