@@ -5,6 +5,7 @@ It is made from the finished document, so that a saved result has the same verdi
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from operator import itemgetter
@@ -20,9 +21,8 @@ LEAST_STATED = 0.005  # micrometres, which the document rounds to nothing
 SIGMA0_RATIO = 1.5  # of sigma0 to the stated standard deviation
 PAIR_RATIO = 1.5  # of a pair's sigma0 to that of the others, or to the stated one, when chance does not explain it
 PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
-# Rms of the control's residuals in units of their standard deviation; a long strip bends by that much.
-POOR_CONTROL = 5.0
-MANY_REJECTED = 0.05  # share of the points in pairs
+POOR_CONTROL = 5.0  # rms of the control's residuals in standard deviations; a long strip bends by that much
+MANY_REJECTED, MANY_OF_PHOTO = 0.05, 0.2  # share of the points in pairs, of those of a photo
 SMALLEST = 0.001  # probability that is written as a number
 PARTS = "plan", "height"
 TERMS = "twist", "bending"
@@ -106,11 +106,7 @@ def accuracy(document: Document) -> str:
     Check points that stand out are told apart: one wrong given point says nothing about the others.
     """
     scale = "model" if document["summary"].get("model_scale") else "photo"
-    at = {
-        "check": "check points, which took no part",
-        "cross_validation": "control points left out in turn",
-        "control": "control points",
-    }
+    at = {"check": "check points, which took no part", "cross_validation": "control points left out in turn"}
     role = seen_at(document)
     sound = {name: headline_rms(document, role, name) for name in PARTS}
     parts = [
@@ -128,7 +124,7 @@ def accuracy(document: Document) -> str:
     out = [
         f"{' and '.join(text for _, text in group)} with {names}" for names, group in groupby(odd, key=itemgetter(0))
     ]
-    return f"rms {' and '.join(parts)} at {at[role]}" + (f"; {' and '.join(out)}" if out else "")
+    return f"rms {' and '.join(parts)} at {at.get(role, 'control points')}" + (f"; {' and '.join(out)}" if out else "")
 
 
 def seen_at(document: Document) -> str:
@@ -344,14 +340,19 @@ def _more(number: int, what: str) -> Iterator[str]:
 
 
 def _photos(document: Document) -> Iterator[str]:
+    """Name photos of large residuals, and those of which much was rejected, as by a shift of all their points."""
     whole = document["summary"]["image_rms_um"]
-    odd = [photo for photo in document["photos"] if whole and (photo["image_rms_um"] or 0) > PHOTO_RATIO * whole]
-    odd.sort(key=itemgetter("image_rms_um"), reverse=True)
-    for photo in odd[:NAMED]:
-        yield (
-            f"photo {photo['id']}: image residuals of {photo['image_rms_um']:.1f} µm under the final orientation, "
-            f"{whole:.1f} µm in the whole project"
-        )
+    rejected = {(row["photo"], row["point"]) for row in document["rejected"] if not row.get("readmitted")}
+    lost, odd = Counter(photo for photo, _ in rejected), []
+    for photo in document["photos"]:
+        name, rms, count = photo["id"], photo["image_rms_um"] or 0, lost[photo["id"]]
+        measured = count + photo["points"]
+        if whole and rms > PHOTO_RATIO * whole:
+            text = f"image residuals of {rms:.1f} µm under the final orientation, {whole:.1f} µm in the whole project"
+            odd.append((rms / whole, f"photo {name}: {text}"))
+        elif count > MANY_OF_PHOTO * measured:
+            odd.append((count / measured, f"photo {name}: {count} of its {measured} points were rejected"))
+    yield from (text for _, text in sorted(odd, reverse=True)[:NAMED])
     yield from _more(len(odd), "photos")
 
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
+from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.run import triangulate
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import chosen_sections
+from photostrip.result.document import document_of
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, verdict_of
 from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import Control, Flight, Terrain
+from photostrip.simulation.spec import Control, Flight, Spec, Terrain
 from photostrip.statistics import binomial_p_value
 from tests.results import Document, case, solved, spec
 
@@ -277,3 +280,18 @@ def test_a_pair_is_compared_with_the_other_pairs_and_with_what_is_stated() -> No
 def test_exit_codes(status: str, code: int, strict: int) -> None:
     assert exit_code(status, strict=False) == code
     assert exit_code(status, strict=True) == strict
+
+
+@pytest.mark.parametrize(("shift", "adjustment"), [((0.0, 5.0), "auto"), ((5.0, 0.0), "bundle")])
+def test_a_photo_that_is_shifted_as_a_whole_is_named_first(shift: tuple[float, float], adjustment: str) -> None:
+    """It loses a fifth of its points and more, its neighbours less."""
+    simulation = simulate(Spec(flight=Flight(photos=10), control=Control(bands=4)))
+    inputs, settings = inputs_of(simulation), replace(settings_of(simulation), adjustment=adjustment)
+    seen = inputs.observations
+    xy = seen.xy + np.where(seen.photo[:, None] == seen.photo_ids.index("1005"), shift, 0.0)
+    document = document_of(triangulate(replace(inputs, observations=replace(seen, xy=xy)), settings))
+    verdict = verdict_of(document)
+    named = [text for text in verdict["look_at"] if "points were rejected" in text and text.startswith("photo")]
+    assert verdict["status"] == LOOK
+    assert re.match(r"photo 1005: \d+ of its \d+ points were rejected", named[0])
+    assert len(named) <= 3
