@@ -72,7 +72,7 @@ def triangulate(
         unsolvable = GeometryError(msg, code="singular")
         unsolvable.findings = of_failure()
         raise unsolvable from error
-    return replace(result, findings=gate.of_result(result, directory))
+    return replace(result, findings=gate.of_result(result, directory, stages))
 
 
 def _walk_from_orientations(

@@ -18,6 +18,7 @@ from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control import wrong_heights
@@ -60,6 +61,7 @@ def find_wrong_distance(
     observations: PhotoPoints,
     settings: Settings,
     compare: Compare,
+    stages: Stages | None,
     *,
     stretched: bool,
 ) -> list[Finding]:
@@ -83,7 +85,7 @@ def find_wrong_distance(
     if not (stretched or no_bend or pairs_ask(formed, observations)):
         return []
     for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(observations)]:
-        trial = _followed(formed.strip, observations, settings, compare, start)
+        trial = _followed(formed.strip, observations, settings, compare, stages, start)
         if trial is None or trial.misfit > LEFT_SHARE * first.misfit or trial.sigma0 > MOST_SIGMA0_RATIO * sigma0:
             continue
         in_relief = no_bend or trial.in_relief < LEFT_SHARE * first.in_relief
@@ -102,12 +104,12 @@ def find_wrong_distance(
 
 
 def find_distance_without_pairs(
-    strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare
+    strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare, stages: Stages | None
 ) -> list[Finding]:
     """Try other principal distances on a strip whose pairs cannot be oriented (P105, at most one)."""
     most = _most_starts(observations) if len(strip.photos) <= MOST_PHOTOS else 0
     for start in FIRST_FACTORS[:most]:
-        trial = _followed(strip, observations, settings, compare, start)
+        trial = _followed(strip, observations, settings, compare, stages, start)
         if trial is not None and trial.misfit < LEAST_MISFIT:
             numbers: Evidence = {"misfit_then": trial.misfit, "pairs_sigma0_then_mm": trial.sigma0}
             return _finding(strip, trial.factor, "can be formed and fits the heights of its control only", numbers)
@@ -132,7 +134,7 @@ def _middle_sigma0(formed: EvidenceStrip) -> float:
 
 
 def _followed(
-    strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare, ratio: float
+    strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare, stages: Stages | None, ratio: float
 ) -> DistanceTrial | None:
     """Follow the stretch of the heights until it is gone; None where no strip can be formed and compared."""
     last, pairs = None, 0.0
@@ -142,7 +144,7 @@ def _followed(
         if not FACTOR_RANGE[0] < ratio < FACTOR_RANGE[1]:
             return None
         camera = replace(strip.camera, principal_distance=strip.camera.principal_distance * ratio)
-        again = evidence.form(replace(strip, camera=camera), observations, settings)
+        again = evidence.form(replace(strip, camera=camera), observations, settings, stages)
         last = compare(again) if again is not None else None
         if again is None or last is None:
             return None

@@ -61,8 +61,8 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     return accepted(findings, settings.accept)
 
 
-def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
-    """Find what the data say against themselves, the adjustment being done."""
+def of_result(result: Result, directory: Path | None = None, made: Stages | None = None) -> tuple[Finding, ...]:
+    """Find what the data say against themselves, the adjustment being done; made: what strips formed anew may share."""
     from photostrip.pipeline.common_points import compared_strips  # a check has no adjusted strips
 
     inputs, settings = result.inputs, result.settings
@@ -70,7 +70,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         return _of_adjusted_models(result, inputs.models, directory)
     points = result.refined.observations
     photo = PhotoCoordinates(result.measured, result.interior)
-    images = replace(of_images(inputs, settings, photo), observations=points)
+    images = replace(of_images(inputs, settings, photo), observations=points, stages=made)
     control = _given_control(inputs, directory, _plain_frames(settings, result.frames))
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
     formed = [
@@ -131,7 +131,7 @@ def of_failure(
     try:
         if inputs.models is not None:
             return _of_unadjusted_models(inputs, inputs.models, settings, directory)
-        images = of_images(inputs, settings, photo)
+        images = replace(of_images(inputs, settings, photo), stages=stages)
         points = evidence.ideal(images.observations, images.cameras, settings)
         formed = [evidence.form(strip, points, settings, stages) for strip in images.strips]
         frames = () if ground is None else _plain_frames(settings, ground.control)

@@ -11,6 +11,7 @@ from photostrip.notes import Finding
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.plausibility.base_directions import closer_look
+from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.plausibility import accepted
 from photostrip.triangulation.plausibility.photos import flight_order, units
@@ -26,6 +27,7 @@ class ImageEvidence:
     strips: tuple[Strip, ...]  # the strips with their photos as they lie, each place once
     steps: dict[str, complex]  # centre of the next photo, as the photos lie, on each photo; mm, y up
     settings: Settings
+    stages: Stages | None = None  # of the run, for strips that are formed anew
 
 
 def of_units(inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
