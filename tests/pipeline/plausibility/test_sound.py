@@ -67,6 +67,19 @@ def test_photos_laid_side_by_side_prove_little(layout: str, seed: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("layout", "seed"),
+    [
+        ("60-300 photos, bands every 3-20, bundle", 9810048),  # 292 photos bend beyond what their covariance says
+        ("two lists in two zones", 9710028),  # level ground: errors of the heights are all its relief, and turn over
+    ],
+)
+def test_what_stretches_no_heights_is_no_principal_distance(layout: str, seed: int) -> None:
+    made = false_alarms.LAYOUTS[layout](seed)
+    assert told(made.inputs, made.settings) == []
+
+
+@pytest.mark.slow
 def test_the_bend_of_a_long_strip_of_models_is_no_slip() -> None:
     spec = Spec(seed=1, flight=Flight(photos=50), control=Control(every=8, per_band=3), models=Models())
     inputs = inputs_of(simulate(spec))

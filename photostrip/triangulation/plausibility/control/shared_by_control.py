@@ -73,7 +73,7 @@ def _stretch(strip: StripAtControl, whole: JointAdjustment, alone: float) -> Str
         _tested(whole, (place.direction[:, HEIGHT] * height[place.point])[:, None], alone)
         for height in (_relief(strip, whole.w), of_strip)
     )
-    if tested is None or also is None:
+    if tested is None or also is None or tested.value[0] <= -1.0:  # level ground: heights turned over are its errors
         return None
     return StretchedHeights(float(tested.value[0]), float(tested.sigma[0]), tested.gain)
 
