@@ -15,6 +15,7 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.result.columns import photos_csv, points_csv, rejected_csv, reliability_csv
 from photostrip.result.description import Quantity, described, quantity_at
+from photostrip.result.numbers import RoundedColumn
 from photostrip.result.quantities import rounded_as
 from photostrip.result.reading import faults_of
 from photostrip.result.records import Records
@@ -163,6 +164,8 @@ def test_records_are_a_list_of_what_stands_beside_each_other() -> None:
     assert len(records) == 3
     assert records == list(records)
     assert records[1:] == list(records)[1:]
+    assert records.rows() == list(records)
+    assert Records({"x": RoundedColumn(np.array([1.5, np.nan]))}).rows() == [{"x": 1.5}, {"x": None}]
     assert records.taken(np.array([2, 0])) == [records[2], records[0]]
     assert Records.joined([records, records[:1]]) == [*records, records[0]]
     assert not Records.joined([])
