@@ -10,9 +10,9 @@ from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geometry.plane import conformal_from_points
 from photostrip.geometry.rotation import cross_matrix, from_angles, from_vector
 from photostrip.geometry.similarity import Similarity, collinearity
-from photostrip.notes import listed
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.strips.absolute import middle_frame
@@ -171,17 +171,14 @@ def _levelled(strip: Floats, targets: absolute_orientation.Targets, level: Level
     """
     plan, height = targets.control.use[:, 0], targets.control.use[:, 2]
     upright = from_vector(np.cross(level.up, [0.0, 0.0, 1.0]))  # nearly: the sine in the place of the angle
-    z, t = ((xyz[plan, 0] + 1j * xyz[plan, 1]) for xyz in (strip @ upright.T, targets.of(np.zeros_like(strip))))
-    dz = z - z.mean()
-    if np.abs(dz).max() <= ON_A_LINE * np.abs(strip).max():
-        names = listed([name for name, used in zip(targets.control.ids, plan, strict=True) if used])
-        message = f"plan coordinates are given in one place only, {names}: scale and azimuth stay free"
+    if np.count_nonzero(plan) < 2:
+        message = "plan coordinates are given in one place only: scale and azimuth stay free"
         raise GeometryError(message, code="control-deficient")
-    turn = (dz.conj() @ (t - t.mean())) / (dz.conj() @ dz).real
-    scale = float(abs(turn))
+    at_sea = targets.of(np.zeros_like(strip))
+    plane = conformal_from_points((strip @ upright.T)[plan, :2], at_sea[plan, :2]).coefficients
+    turn = complex(plane[0, 0], plane[1, 0])
     rotation = from_vector([0.0, 0.0, float(np.angle(turn))]) @ upright
-    shift = t.mean() - turn * z.mean()
-    found = Similarity(scale, rotation, np.array([shift.real, shift.imag, 0.0]))
+    found = Similarity(abs(turn), rotation, np.array([*plane[:2, 3], 0.0]))
     rise = (targets.of(found(strip)) - found(strip))[height, 2]
     found = replace(found, shift=found.shift + np.array([0.0, 0.0, rise.mean() if len(rise) else 0.0]))
     half = float(np.ptp(found(strip), axis=0).max()) / 2
@@ -198,20 +195,15 @@ def _levelled(strip: Floats, targets: absolute_orientation.Targets, level: Level
     return found
 
 
-class _OrientedPhotos(NamedTuple):
-    names: tuple[str, ...]
-    centers: Floats
-    rotations: Floats
-
-
-def _oriented(stages: Sequence[FormedPhotos], group: JoinedStrips) -> _OrientedPhotos:
+def _oriented(stages: Sequence[FormedPhotos], group: JoinedStrips) -> tuple[tuple[str, ...], Floats, Floats]:
+    """Names, centres and rotations of all photos, in the frame of the block."""
     names: list[str] = []
     centers, rotations = [], []
     for number in group.members:
         names += stages[number].strip.photos
         centers.append(group.joined[number](stages[number].formed.centers))
         rotations.append(group.joined[number].rotation @ stages[number].formed.rotations)
-    return _OrientedPhotos(tuple(names), np.concatenate(centers), np.concatenate(rotations))
+    return tuple(names), np.concatenate(centers), np.concatenate(rotations)
 
 
 def _with_cameras(
