@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import field, fields
 from functools import cached_property
 from itertools import chain
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,13 +36,12 @@ def take_rows(table: T, rows: Sequence[int] | Numbers | Flags, columns: Iterable
 
     columns: fields that hold a column, an array or a tuple; the others stay.
     """
-    of_its_kind: Any = table
     chosen: dict[str, Any] = {}
     for name in columns:
         column = getattr(table, name)
         numbers = np.arange(len(column))[np.asarray(rows)] if len(column) else np.zeros(0, np.intp)
         chosen[name] = tuple(column[i] for i in numbers) if isinstance(column, tuple) else column[numbers]
-    return replace(of_its_kind, **chosen)
+    return replace(cast("Any", table), **chosen)
 
 
 def locate(wanted: Iterable[str], ids: Iterable[str]) -> Numbers:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from math import fabs
+from math import fabs, nan
 
 from photostrip.frozen import dataclass
 
-NAN = float("nan")
 UNCONTROLLED = 0.01  # redundancy number below which an observation cannot be tested
 WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
 """What was found at a point: its wrong rays; two rays that contradict each other; several of which any may be wrong."""
@@ -35,4 +34,4 @@ class Rejection:
     def worst(self) -> float:
         """The largest estimated error of the coordinates that are wrong; NaN where nothing can be said."""
         sizes = [self.size[axis] for axis in self.axes or range(len(self.size))] if self.size else []
-        return max(sizes, key=fabs, default=NAN)
+        return max(sizes, key=fabs, default=nan)

@@ -366,8 +366,8 @@ def settings(project: ProjectFile) -> Settings:
 
 def _laid_over(usual: T, given: Section) -> T:
     """Replace the fields of settings by the keys of a section that has the same names."""
-    changed, of_its_kind = given.values(), cast("Any", usual)
+    changed = given.values()
     for name, value in changed.items():
         if isinstance(value, list):
             changed[name] = type(getattr(usual, name))(map(str, value))
-    return replace(of_its_kind, **changed)
+    return replace(cast("Any", usual), **changed)

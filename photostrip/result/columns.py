@@ -70,8 +70,7 @@ def photos_csv(angles: Document) -> list[Column]:
 
 def flat_photo(photo: Document) -> Document:
     """Return a photo with a key for each angle, each number of the matrix and each standard deviation."""
-    angles: Document = photo["angles"]
-    sigma: Document = photo["sigma"] or {}
+    angles, sigma = photo["angles"], photo["sigma"] or Document()
     names = [f"{name}_{angles['unit']}" for name in angles["system"].split("-")]
     return {
         **photo,

@@ -146,8 +146,7 @@ def _ground_below(photos: Numbers, plan: LevelPlan, shown: Shown) -> tuple[Float
     """Height of the ground under each photo, and metres on the ground in a millimetre of the photo."""
     height, scale = np.full(len(photos), np.nan), np.full(len(photos), np.nan)
     order = np.argsort(shown.photo, kind="stable")
-    ordered = shown.photo[order]
-    first, last = np.searchsorted(ordered, photos), np.searchsorted(ordered, photos, "right")
+    first, last = np.searchsorted(shown.photo[order], photos), np.searchsorted(shown.photo[order], photos, "right")
     for place in np.flatnonzero(first < last).tolist():
         rows = order[first[place] : last[place]]
         ground = plan.control[shown.number[rows]]

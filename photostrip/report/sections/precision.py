@@ -37,8 +37,7 @@ def precision_section(document: Document, *, everything: bool) -> Section:
         )
     facts += _check(block.get("check"))
     parts: list[Part] = [Words(text), Facts(tuple(facts)), _worst(document)]
-    if block["along"]:
-        parts.append(_along(document, block["along"], everything=everything))
+    parts += [_along(document, block["along"], everything=everything)] if block["along"] else []
     return Section("Precision", tuple(parts))
 
 

@@ -93,9 +93,8 @@ def centre_columns(result: Result, place: Floats, given: Floats | None) -> Docum
         return {"sigma": None}
     covariances = np.full((len(place), 6, 6), np.nan)
     covariances[:, :3, :3] = turned(given[:, :3, :3], result.output.axes_at(place)[:, list(result.output.order)])
-    sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)[:, :3])
-    sigmas = {**dict(zip("xyz", sigma.T, strict=True)), "angles": None}
-    return {"sigma": sigmas, "covariance": covariances[:, ROWS, COLUMNS]}
+    sigma = dict(zip("xyz", np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)[:, :3]).T, strict=True))
+    return {"sigma": {**sigma, "angles": None}, "covariance": covariances[:, ROWS, COLUMNS]}
 
 
 def _rates(rotations: Floats, system: str) -> Floats:
