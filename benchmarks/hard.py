@@ -1,4 +1,4 @@
-"""20 photos with much that is wrong: processor time of whole runs, and how they end.
+"""20 photos with much that is wrong: processor time and memory of whole runs, and how they end.
 
 Run it as ``python benchmarks/hard.py [case ...]``; all take a few minutes. A search is bounded in work: no input of 20
 photos takes more than 10 s of an idle core, on which L, the bare import of numpy, yaml and pyproj, takes 0.2 s.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import csv
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -23,6 +22,7 @@ sys.path.insert(0, str(ROOT))  # run from anywhere, installed or not
 
 from benchmarks.strip import UNIT  # noqa: E402
 from photostrip.formats.output.simulation import project_files  # noqa: E402
+from photostrip.frozen import NamedTuple, replace  # noqa: E402
 from photostrip.simulation import Control, Flight, Gnss, Ground, Points, Spec, Terrain, simulate  # noqa: E402
 
 if TYPE_CHECKING:
@@ -66,14 +66,22 @@ def control(share: float) -> Callable[[Path], None]:
     return lambda folder: moved(folder, "control.csv", slice(1, 4), share, 30.0)
 
 
-def cameras(folder: Path) -> None:
-    moved(folder, "gnss.csv", slice(1, 4), 1.0, 20.0)
+def cameras(folder: Path, share: float = 1.0) -> None:
+    moved(folder, "gnss.csv", slice(1, 4), share, 20.0)
+
+
+def a_third(folder: Path) -> None:
+    cameras(folder, 1 / 3)
+    images(1 / 3, 5.0)(folder)
 
 
 def sound(folder: Path) -> None:
     """Leave it as it is."""
 
 
+DENSE = replace(
+    spec(STRIP, 10, 1), points=Points(rows=25, extra_per_model=10), control=Control(every=1, per_band=25, check=0)
+)
 CASES: dict[str, tuple[Spec, Callable[[Path], None], tuple[str, ...]]] = {
     "strip of 200 points a photo": (spec(STRIP, 150, 5), sound, (ALL, FOLDS)),
     "strip of 200 points, 30 % 0.1 mm wrong": (spec(STRIP, 150, 5), images(0.3, 0.1), (ALL, FOLDS)),
@@ -88,19 +96,29 @@ CASES: dict[str, tuple[Spec, Callable[[Path], None], tuple[str, ...]]] = {
         (*BUNDLE, "--set", "processing.bundle.self_calibration=[principal_distance, principal_point, k1]"),
     ),
     "block, camera positions 20 m off": (spec(BLOCK, 100, 2, gnss=True), cameras, BUNDLE),
+    "block, a third of images and cameras off": (spec(BLOCK, 150, 2, gnss=True), a_third, (ALL,)),
+    "strip with 500 control points, half 30 m off": (DENSE, control(0.5), ()),
     "94 % end lap, 813 points": (spec(LAP, 60, 3), sound, ()),
     "94 % end lap, 813 points, 30 % 5 mm wrong": (spec(LAP, 60, 3), images(0.3, 5.0), (ALL,)),
 }  # fmt: skip
 
 
-def timed(*arguments: str) -> tuple[float, int]:
-    """Run an interpreter in a process of its own: its processor time in seconds, and its exit code."""
-    command = [sys.executable, *arguments]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+class Used(NamedTuple):
+    """What a process used, and how it ended."""
+
+    seconds: float  # of the processor
+    megabytes: int  # of memory at its peak
+    code: int
+
+
+def timed(*arguments: str) -> Used:
+    """Run an interpreter in a process of its own."""
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(command, check=False, cwd=ROOT, env=environment, capture_output=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.returncode
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen([sys.executable, *arguments], cwd=ROOT, env=environment, stdout=quiet, stderr=quiet)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return Used(used.ru_utime + used.ru_stime, used.ru_maxrss // 1024, process.returncode)
 
 
 def main() -> int:
@@ -116,10 +134,12 @@ def main() -> int:
             for file, text in project_files(simulate(planned)).items():
                 (Path(place) / file).write_text(text, encoding="utf-8")
             spoil(Path(place))
-            unit = min(timed("-c", UNIT)[0] for _ in range(3))
-            seconds, code = timed("-m", "photostrip", "run", f"{place}/project.yaml", *options)
+            unit = min(timed("-c", UNIT).seconds for _ in range(3))
+            seconds, megabytes, code = timed("-m", "photostrip", "run", f"{place}/project.yaml", *options)
         shown = " ".join(each.removeprefix("processing.") for each in options if each != "--set")
-        print(f"{seconds:6.1f} s {seconds / unit:4.0f} L  exit {code}  {name:46s} {shown}", flush=True)
+        print(
+            f"{seconds:6.1f} s {seconds / unit:4.0f} L {megabytes:4d} MB  exit {code}  {name:46s} {shown}", flush=True
+        )
         slow += seconds > LIMIT * unit
     return 1 if slow else 0
 
