@@ -67,8 +67,8 @@ def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | No
     )
     fits = [UnitReading(factor, name) for factor, name in pixels if likely[0] < ratio * factor < LIKELY_PIXELS]
     middle = sum(likely) / 2.0
-    nearest = sorted(READINGS, key=lambda each: abs(math.log(ratio * each[0] / middle)))
-    fits += [UnitReading(factor, name) for factor, name in nearest if likely[0] < ratio * factor < likely[1]]
+    likely_ones = [UnitReading(factor, name) for factor, name in READINGS if likely[0] < ratio * factor < likely[1]]
+    fits += sorted(likely_ones, key=lambda each: abs(math.log(ratio * each.factor / middle)))
     return fits[0] if fits else UnitReading(1.0, "")
 
 

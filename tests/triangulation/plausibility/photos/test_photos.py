@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from photostrip.points import PhotoPoints
 from photostrip.simulation import Flight, Spec, simulate
 from photostrip.triangulation.plausibility.photos import flight_order, mosaic, units
+from photostrip.triangulation.plausibility.photos.units import reading_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -318,3 +319,8 @@ def test_the_way_to_the_next_photo_is_known_on_the_first_and_last_too() -> None:
         count=np.array([6, 6, 6, 6]),
     )
     assert flight_order._steps(cast("mosaic.PhotoLinks", links), [2, 0, 3, 1]) == pytest.approx([1.0] * 4)
+
+
+def test_images_of_no_extent_have_no_likely_unit() -> None:
+    """All points of a table in one place: no unit makes that likely, and none is nearest."""
+    assert reading_of(0.0, (0.5, 1.0), pixel_size=0.01).factor == 1.0
