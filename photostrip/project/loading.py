@@ -149,7 +149,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
         path=path,
         files=(*map(Path, reading.files), *(path.parent / grid for grid in grids if (grid_folder / grid).is_file())),
         resolved=text_of(project),
-        hints=(*findings.notes, *notes),
+        hints=(*findings.notes, *hints(project, tables, root), *notes),
         tree=root,
         tables=tables,
         grids=grids,
@@ -270,7 +270,7 @@ def _inputs(
         orientations=conversion.given_orientations(tables.orientations, project.orientations, photos),
         models=models,
     )
-    return inputs, [*hints(project, tables, root), *derived, *joined]
+    return inputs, [*derived, *joined]
 
 
 def _observations(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints:

@@ -141,3 +141,10 @@ def test_marks_that_orient_no_photo_say_nothing_of_the_unit(tmp_path: Path) -> N
     checked = check_project(project.folder / "project.yaml")
     assert "too-few-marks" in {each.code for each in checked.faults}
     assert checked.findings == ()
+
+
+def test_a_header_that_is_there_twice_is_a_fault_of_its_row(tmp_path: Path) -> None:
+    """Its photo is in no strip, and has no row that is left."""
+    project = sample(tmp_path)
+    project.change("observations.csv", "photo,point,x,y\n", "photo,point,x,y\nphoto,point,x,y\n")
+    assert told(project) == (["number", "number"], [])
