@@ -47,6 +47,22 @@ def test_a_damaged_block_ends_well(right_blocks: list[dict[str, bytes]], seed: i
         assert tried(case, Path(folder), command).faults == (), case.done
 
 
+@pytest.mark.parametrize(
+    ("seed", "command"),
+    [
+        ("9911 913", "run"),  # a header that stands twice: a photo in no strip without a row
+        ("9921 1312", "run"),  # suspected control was exchanged without end
+        ("9921 2150", "run"),  # variances below zero
+    ],
+)
+def test_projects_that_ended_badly_end_well(
+    right: list[dict[str, bytes]], tmp_path: Path, seed: str, command: str
+) -> None:
+    """Cases of the benchmark."""
+    case = damaged(right, Random(seed))
+    assert tried(case, tmp_path, command).faults == (), case.done
+
+
 @pytest.mark.parametrize("number", range(4))
 def test_right_blocks_are_right(right_blocks: list[dict[str, bytes]], tmp_path: Path, number: int) -> None:
     outcome = tried(Case(right_blocks[number]), tmp_path, "run")

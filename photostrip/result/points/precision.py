@@ -40,7 +40,8 @@ def ellipses(level: Floats) -> tuple[Floats, Floats]:
     """
     east, north, mixed = level[:, 0, 0], level[:, 1, 1], level[:, 0, 1]
     middle, reach = (east + north) / 2, np.hypot((north - east) / 2, mixed)
-    axes = np.sqrt(np.column_stack([middle + reach, np.maximum(middle - reach, 0.0)]))
+    with np.errstate(invalid="ignore"):
+        axes = np.sqrt(np.column_stack([middle + reach, np.maximum(middle - reach, 0.0)]))
     return axes, np.arctan2(mixed, (north - east) / 2) / 2 % np.pi
 
 

@@ -194,8 +194,13 @@ class JointAdjustment:
             others = [each for each in self.parts if len(each) == len(part) and not set(each) & set(out)]
             left = self.without(rest).deletions(others)
             found = max(left, key=lambda each: each.gain, default=None)
-            if found is not None and found.squares - found.gain < (1 - ROUNDING) * best:
-                return self.exchanged((*rest, *found.columns))
+            if found is None or found.squares - found.gain >= (1 - ROUNDING) * best:
+                continue
+            other = (*rest, *found.columns)
+            if (
+                self.without(other).squares < (1 - ROUNDING) * best
+            ):  # the gain of columns that nearly depend is rounding
+                return self.exchanged(other)
         return out
 
     def tests(self, out: Columns) -> list[Deletion]:
