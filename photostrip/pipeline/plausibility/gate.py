@@ -107,9 +107,9 @@ def of_result(result: Result, directory: Path | None = None, made: Stages | None
         if any(each.code in OF_LISTS for each in of_groups):  # all of the block says it best
             findings = [each for each in findings if each.code not in OF_LISTS]
         findings += of_groups
-    open_to_doubt = [each for each in stages if each.strip in strips]
-    findings += shared_control.find_shared_errors(open_to_doubt, findings, joined=result.bundle is not None)
-    if not any(each.is_error for each in findings) and not slips.keep_exchanged(
+    examined = [each for each in stages if each.strip in strips]
+    findings += shared_control.find_shared_errors(examined, findings, joined=result.bundle is not None)
+    if not any(each.is_error for each in findings) and not slips.strips_with_kept_exchanges(
         findings, predicted, inputs.control.ids
     ):
         findings += shared_control.find_shifted_checks(result)

@@ -72,7 +72,9 @@ def is_doubtful(formed: EvidenceStrip, result: Result, predicted: Predicted) -> 
     return bool((shown & ~predicted.agree(control.use)).any())
 
 
-def keep_exchanged(findings: Iterable[Finding], predicted: Predicted, ids: Sequence[str]) -> set[tuple[str, ...]]:
+def strips_with_kept_exchanges(
+    findings: Iterable[Finding], predicted: Predicted, ids: Sequence[str]
+) -> set[tuple[str, ...]]:
     """Give the strips of which the run kept exchanged points: what it says of their other points proves nothing."""
     exchanged = [each for each in findings if each.code == point_slips.EXCHANGED]
     return {each.strips for each in exchanged if np.isnan(predicted.off[locate(each.points, ids), :2]).any()}
@@ -81,7 +83,7 @@ def keep_exchanged(findings: Iterable[Finding], predicted: Predicted, ids: Seque
 def confirmed(findings: Sequence[Finding], predicted: Predicted, control: GivenControl) -> Iterator[Finding]:
     """Give findings again; slips only as far as the adjustment shows them too, as it predicts the coordinates."""
     ids = control.points.ids
-    untested = keep_exchanged(findings, predicted, ids)
+    untested = strips_with_kept_exchanges(findings, predicted, ids)
     for each in findings:
         if each.code == CODE and "axis" in each.evidence and each.strips not in untested:  # a slip in one coordinate
             yield from _confirmed(each, ids.index(each.points[0]), predicted, control)
