@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 LIMIT = 50.0  # of L: 10 s where L takes 0.2 s
 BUNDLE = ("--set", "processing.adjustment=bundle")
 ALL, FOLDS = "--compare-methods", "--cross-validate"
-STRIP, BLOCK, LAP = Flight(photos=20), Flight(photos=5, strips=4), Flight(photos=20, end_lap_percent=94.0)
+STRIP, BLOCK = Flight(photos=20), Flight(photos=5, strips=4)
+MIDDLE, LAP = (Flight(photos=20, end_lap_percent=lap) for lap in (80.0, 94.0))
 
 
 def spec(flight: Flight, extra: int, bands: int, *, gnss: bool = False) -> Spec:
@@ -97,7 +98,9 @@ CASES: dict[str, tuple[Spec, Callable[[Path], None], tuple[str, ...]]] = {
     ),
     "block, camera positions 20 m off": (spec(BLOCK, 100, 2, gnss=True), cameras, BUNDLE),
     "block, a third of images and cameras off": (spec(BLOCK, 150, 2, gnss=True), a_third, (ALL,)),
-    "strip with 500 control points, half 30 m off": (DENSE, control(0.5), ()),
+    "strip with 500 control points, half 30 m off": (DENSE, control(0.5), (FOLDS,)),
+    "80 % end lap, 800 points, 30 % 0.1 mm wrong": (spec(MIDDLE, 150, 5), images(0.3, 0.1), (ALL, FOLDS)),
+    "80 % end lap, 800 points, 30 % 5 mm wrong": (spec(MIDDLE, 150, 5), images(0.3, 5.0), (ALL, FOLDS)),
     "94 % end lap, 813 points": (spec(LAP, 60, 3), sound, ()),
     "94 % end lap, 813 points, 30 % 5 mm wrong": (spec(LAP, 60, 3), images(0.3, 5.0), (ALL,)),
 }  # fmt: skip

@@ -16,6 +16,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
 from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
+from photostrip.pipeline.strips.notes import precision_beyond_control
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips
 
@@ -38,6 +39,12 @@ def join_strips(
     """
     points = _joined(strips, observations.point_ids, output)
     precision = None
+    notes = []
+    for strip in strips:
+        notes += strip.notes
+        covariance = None if strip.photo_stages is None else strip.photo_stages.covariance
+        if covariance is not None and not of_checks:
+            notes += precision_beyond_control(strip.of_photos.strip, strip.control_rows, covariance)
     if settings.precision:
         each = [
             _precision_of(strip, before.oriented, observations, given, of_checks=of_checks)
@@ -50,7 +57,7 @@ def join_strips(
         ties=_ties(strips, output),
         observations=observations,
         precision=precision,
-        notes=tuple(note for strip in strips for note in strip.notes),
+        notes=tuple(notes),
     )
 
 

@@ -41,7 +41,7 @@ def of_photos(
     """
     checks = check_points.check_points(strip, given, observations)
     if strip.of_photos.covariance is not None:
-        return _of_covariance(strip, strip.of_photos.covariance, checks, oriented.frames)
+        return _of_covariance(strip, strip.of_photos.covariance, checks, oriented.frames, of_checks=of_checks)
     found = propagation(strip, oriented, observations)
     errors, fit, xyz, operator = found.errors, found.fit, oriented.xyz, found.fit.operator
     stated = strip.of_photos.sigma
@@ -72,14 +72,25 @@ def of_photos(
 
 
 def _of_covariance(
-    strip: StripResult, adjusted: CovarianceAdjustment, checks: CheckPoints, frames: Sequence[GroundFrame]
+    strip: StripResult,
+    adjusted: CovarianceAdjustment,
+    checks: CheckPoints,
+    frames: Sequence[GroundFrame],
+    *,
+    of_checks: bool,
 ) -> StripPrecision:
-    """Covariances that the adjustment with the strip's own covariance has found already."""
+    """Covariances from the system that the adjustment with the strip's own covariance has solved."""
     compared = check_points.compare_with_checks(strip, adjusted.system.errors, checks, frames)
     control, axes = adjusted.control, strip.intermediate.axes
+    if of_checks:
+        points, photos = np.full((len(strip.xyz), 3, 3), np.nan), np.full((len(strip.strip.photos), 6, 6), np.nan)
+        if compared is not None:
+            points[checks.rows] = adjusted.of_points(checks.rows)
+    else:
+        points, photos = adjusted.points, adjusted.photos
     return StripPrecision(
-        points=axes @ adjusted.points @ axes.T,
-        photos=_turned(strip, adjusted.photos),
+        points=axes @ points @ axes.T,
+        photos=_turned(strip, photos),
         by_control=lambda rows, columns: np.asarray(axes @ adjusted.by_control(rows, columns), float),
         control=np.column_stack([strip.formed.point[strip.control_rows][control.point], control.axis]),
         variance=control.variance,

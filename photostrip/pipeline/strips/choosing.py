@@ -63,7 +63,7 @@ def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: Covarianc
     after = covariances.covariances(errors, errors.points.take(points), parameters, fit.influence(oriented.xyz[points]))
     both = [
         np.diagonal(each, axis1=1, axis2=2).mean(axis=0)
-        for each in (after * covariance.factor, covariance.points[points])
+        for each in (after * covariance.factor, covariance.of_points(points))
     ]
     first, second = ((_root(v[:2].mean()), _root(v[2])) for v in both)
     return Witness(first, second, len(points))

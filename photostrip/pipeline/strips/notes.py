@@ -171,13 +171,11 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
             yield Note("little-redundancy", text, strip=strip.id)
 
 
-def precision_beyond_control(strip: Strip, rows: Numbers, adjusted: CovarianceAdjustment | None) -> Iterator[Note]:
+def precision_beyond_control(strip: Strip, rows: Numbers, adjusted: CovarianceAdjustment) -> Iterator[Note]:
     """Say what standard deviations grow to where points lie far beyond the control.
 
     rows: the control in the points of the strip.
     """
-    if adjusted is None:
-        return
     along, at = adjusted.xyz[:, 0], adjusted.xyz[rows, 0]
     beyond = np.maximum(at.min() - along, along - at.max())
     base = np.linalg.norm(np.diff(adjusted.centers, axis=0), axis=1).mean()

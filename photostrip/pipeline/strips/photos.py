@@ -180,7 +180,6 @@ class FormedPhotos:
                 *notes.junction_notes(strip, formed),
                 *notes.control_notes(strip, oriented.absolute),
                 *notes.polynomial_notes(strip, correction, xyz),
-                *notes.precision_beyond_control(strip, oriented.control_rows, covariance),
                 *([] if correction is None or found.choice else notes.covariance_proposal(strip, correction)),
                 *notes.photo_notes(strip, resection),
                 *notes.distance_notes(strip, formed, found),

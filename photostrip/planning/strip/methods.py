@@ -174,7 +174,7 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     found = control_errors.misclosures(errors.points, ground.control, numbers, axes)
     wanted = conditions.conditions(errors, strip.orientation, strip.formed, found, np.zeros(len(found.point)))
     solved = system.system(errors, wanted, 1.0)
-    (points,), cofactors = prediction.predict(solved, [errors.points])
+    cofactors = solved.cofactors
     rows = np.flatnonzero(wanted.kind == conditions.CONTROL)
     redundant = cofactors[rows] * wanted.noise[rows]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -183,7 +183,11 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     source = wanted.source[rows]
     detectable[found.point[source], found.axis[source]] = size
     return Accuracy(
-        method=COVARIANCE, used=COVARIANCE, covariance=points.covariance, control=numbers, detectable=detectable
+        method=COVARIANCE,
+        used=COVARIANCE,
+        covariance=prediction.covariances(solved, errors.points),
+        control=numbers,
+        detectable=detectable,
     )
 
 

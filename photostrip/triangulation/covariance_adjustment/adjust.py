@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -33,8 +34,6 @@ class CovarianceAdjustment:
     xyz: Floats  # (q, 3): adjusted points of the strip, metres
     centers: Floats  # (m, 3): perspective centres, metres
     rotations: Floats  # (m, 3, 3): photo to intermediate frame
-    points: Floats  # (q, 3, 3): covariances of the points, metres^2
-    photos: Floats  # (m, 6, 6): covariances of centre and small rotation of the photos
     control: control_errors.Misclosures  # control coordinates that counted
     tested: prediction.AdjustmentTest  # test of the whole, and of each of these coordinates
     factor: float  # variance factor of the image coordinates
@@ -42,6 +41,20 @@ class CovarianceAdjustment:
     sigma: float  # standard deviation of an image coordinate of weight one, mm
     system: strip_system.System  # the solved system, with the rows of the strip and the conditions
     formations: int  # how often the strip was formed
+
+    @cached_property
+    def points(self) -> Floats:
+        """Covariances (q, 3, 3) of the points, metres^2."""
+        return self.of_points(np.arange(len(self.xyz)))
+
+    def of_points(self, points: Numbers) -> Floats:
+        """Covariances (n, 3, 3) of some of the points, metres^2."""
+        return prediction.covariances(self.system, self.system.errors.points.take(points)) * self.factor
+
+    @cached_property
+    def photos(self) -> Floats:
+        """Covariances (m, 6, 6) of centre and small rotation of the photos, metres^2 and radians^2."""
+        return prediction.covariances(self.system, prediction.photo_rows(self.system.errors)) * self.factor
 
     def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
         """Return what errors of control coordinates subtract from points.
@@ -85,19 +98,16 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
         turn = relinearisation.largest_turn(one.system)
         formations, rate = formations + 1, turn if fresh else rate
     errors, formed = one.strip.errors, one.strip.formed
-    tables = [errors.points, prediction.photo_rows(errors)]
-    (points, photos), cofactors = prediction.predict(one.system, tables)
-    known = [relinearisation.displacements(errors, rows, one.images) for rows in tables]
-    left = photos.error - known[1]
+    points, photos = (
+        prediction.errors(one.system, rows, one.images) for rows in (errors.points, prediction.photo_rows(errors))
+    )
     similarity = one.strip.absolute.similarity
     return CovarianceAdjustment(
-        xyz=similarity(formed.xyz) - (points.error - known[0]),
-        centers=similarity(formed.centers) - left[:, :3],
-        rotations=from_vector(-left[:, 3:]) @ similarity.rotation @ formed.rotations,
-        points=points.covariance * factor,
-        photos=photos.covariance * factor,
+        xyz=similarity(formed.xyz) - points,
+        centers=similarity(formed.centers) - photos[:, :3],
+        rotations=from_vector(-photos[:, 3:]) @ similarity.rotation @ formed.rotations,
         control=one.strip.misclosures,
-        tested=prediction.tested(one.system, cofactors, len(one.strip.misclosures.point), settings.level),
+        tested=prediction.tested(one.system, len(one.strip.misclosures.point), settings.level),
         factor=factor,
         basis=basis,
         sigma=start.sigma * float(np.sqrt(factor)),

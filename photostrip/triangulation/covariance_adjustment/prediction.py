@@ -5,7 +5,7 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Self
 
@@ -15,7 +15,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import gamma_cdf, normal_quantile
-from photostrip.triangulation.covariance_adjustment import system
+from photostrip.triangulation.covariance_adjustment import relinearisation, system
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of
 from photostrip.triangulation.error_propagation import joint_covariances
 from photostrip.triangulation.error_propagation.covariances import NearImages, along_strip, local_covariances
@@ -24,19 +24,6 @@ from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 AT_A_TIME = 32  # blocks whose columns are made together: 5 MB of points
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
-
-
-@dataclass(frozen=True, eq=False)
-class Predicted:
-    """Errors of points or photos, as the adjustment finds them."""
-
-    error: Floats  # (n, d): to be subtracted
-    covariance: Floats  # (n, d, d): of what is left, for a variance factor of 1
-
-    @classmethod
-    def empty(cls, rows: ErrorRows) -> Self:
-        n, size = rows.by_similarity.shape[:2]
-        return cls(np.zeros((n, size)), np.zeros((n, size, size)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,30 +55,34 @@ class AdjustmentTest:
         return beyond[np.argsort(-np.abs(self.normalised[beyond]), kind="stable")]
 
 
-def predict(found: system.System, tables: Sequence[ErrorRows]) -> tuple[list[Predicted], Floats]:
-    """Predict the errors of points and photos, and say how well they are known.
+def errors(found: system.System, rows: ErrorRows, known: Floats) -> Floats:
+    """Predict the errors (n, d) of points and photos, to be subtracted.
 
-    With b the column of a row: its covariances with the conditions and its coefficients of the unknowns, e = b^T
-    [lambda; y] and Cov = C - b^T K^-1 b. A row has to do with its own block and the two beside it. With K eliminated
-    from the first block on, b becomes r in these, and b^T K^-1 b = r1^T P1^-1 r1 + r2^T P2^-1 r2 + r3^T Z3 r3: the
-    block of the inverse on the diagonal says what all later ones add.
+    e = b^T [lambda; y], with b as in ``covariances``: what the errors of the image coordinates displace, and the
+    similarity of the first model.
 
-    Returns cofactors: (n,), of the correlates of the conditions.
+    known: (k, 2), errors of the image coordinates of which the rows are free already, in their standard deviations.
     """
-    orders = [np.argsort(rows.first, kind="stable") for rows in tables]
-    columns = [_Columns.of(found, rows.take(order)) for rows, order in zip(tables, orders, strict=True)]
-    predicted = [Predicted.empty(rows) for rows in tables]
-    layout = found.layout
-    for each, result in zip(columns, predicted, strict=True):
-        for block in each.blocks(range(layout.blocks)):
-            each.predict(block, result)
-    cofactors = found.factors.diagonal_of_inverse[layout.block, layout.position, layout.position]
-    for each, result, order in zip(columns, predicted, orders, strict=True):
-        formed = local_covariances(found.errors, each.rows, each.near)
-        back = np.argsort(order, kind="stable")
-        result.covariance[:] = (formed - result.covariance)[back]
-        result.error[:] = result.error[back]
-    return predicted, cofactors
+    by_images = relinearisation.displacements(found.errors, rows, relinearisation.image_errors(found) - known)
+    by_unknowns = rows.by_similarity @ found.conditions.local.to_common[rows.first]
+    return np.asarray(by_images + (by_unknowns @ found.unknowns[rows.first, :, None])[:, :, 0], float)
+
+
+def covariances(found: system.System, rows: ErrorRows) -> Floats:
+    """Covariances (n, d, d) of what is left of the errors of points and photos, for a variance factor of 1.
+
+    With b the column of a row: its covariances with the conditions and its coefficients of the unknowns,
+    Cov = C - b^T K^-1 b. A row has to do with its own block and the two beside it. With K eliminated from the first
+    block on, b becomes r in these, and b^T K^-1 b = r1^T P1^-1 r1 + r2^T P2^-1 r2 + r3^T Z3 r3: the block of the
+    inverse on the diagonal says what all later ones add.
+    """
+    order = np.argsort(rows.first, kind="stable")
+    columns = _Columns.of(found, rows.take(order))
+    known = np.zeros((*rows.by_similarity.shape[:2], rows.by_similarity.shape[1]))
+    for block in columns.blocks(range(found.layout.blocks)):
+        columns.explain(block, known)
+    left = local_covariances(found.errors, columns.rows, columns.near) - known
+    return np.asarray(left[np.argsort(order, kind="stable")], float)
 
 
 def photo_rows(errors: StripErrors) -> ErrorRows:
@@ -144,16 +135,13 @@ class _Columns:
         for low in numbers[::AT_A_TIME]:
             yield from self._made(low, min(low + AT_A_TIME, numbers.stop))
 
-    def predict(self, block: BlockColumns, result: Predicted) -> None:
-        """Fill in error b^T [lambda; y] and b^T K^-1 b of one block."""
+    def explain(self, block: BlockColumns, known: Floats) -> None:
+        """Fill in b^T K^-1 b of one block."""
         number, rows, columns = block
         size, found, count = self.rows.by_similarity.shape[1], self.found, rows.stop - rows.start
         if not count:
             return
         before, after = max(number - 1, 0), min(number + 1, found.layout.blocks - 1)
-        solution = np.zeros_like(columns[:, :, 0])
-        solution[before - number + 1 : after - number + 2] = found.solution[before : after + 1]
-        result.error[rows] = (solution.ravel() @ columns.reshape(solution.size, -1)).reshape(count, size)
         first, own, last = columns  # beyond the ends they are 0
         own = own - found.factors.shares[before].T @ first
         last = last - found.factors.shares[number].T @ own
@@ -162,7 +150,7 @@ class _Columns:
         weights = inverses[before], inverses[number], later[after]
         weighted = np.concatenate([weight @ each for weight, each in zip(weights, (first, own, last), strict=True)])
         left, right = (each.reshape(-1, count, size) for each in (reduced, weighted))
-        result.covariance[rows] = left.transpose(1, 2, 0) @ right.transpose(1, 0, 2)
+        known[rows] = left.transpose(1, 2, 0) @ right.transpose(1, 0, 2)
 
     def _made(self, low: int, high: int) -> list[BlockColumns]:
         """Make the columns of blocks: covariances with conditions around, coefficients of unknowns, common images."""
@@ -244,10 +232,10 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
 
 
 def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
-    """Covariances (n, n) of what is left of the errors of rows with d = 1: C - b^T K^-1 b, as ``predict`` has them.
+    """Covariances (n, n) of what is left of the errors of rows with d = 1: C - b^T K^-1 b, as ``covariances`` has them.
 
-    With K eliminated as in ``predict``: what later blocks add to two rows is said by the inverse on the diagonal where
-    both have all of their columns behind them.
+    With K eliminated as in ``covariances``: what later blocks add to two rows is said by the inverse on the diagonal
+    where both have all of their columns behind them.
     """
     order = np.argsort(rows.first, kind="stable")
     rows = rows.take(order)
@@ -273,14 +261,13 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     return result
 
 
-def tested(found: system.System, cofactors: Floats, count: int, level: float) -> AdjustmentTest:
+def tested(found: system.System, count: int, level: float) -> AdjustmentTest:
     """Test the adjustment as a whole, w^T lambda, and each control coordinate, lambda / sqrt(q).
 
-    cofactors: (n,), of the correlates.
     count: number of control coordinates.
     level: probability of calling any of them doubtful in a sound strip.
     """
-    wanted, correlates = found.conditions, found.correlates
+    wanted, correlates, cofactors = found.conditions, found.correlates, found.cofactors
     rows = np.flatnonzero(wanted.kind == CONTROL)
     normalised, size = np.full(count, np.nan), np.full(count, np.nan)
     checked = rows[cofactors[rows] * (wanted.noise[rows] + 1e-12) > CHECKED]

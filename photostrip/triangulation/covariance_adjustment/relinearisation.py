@@ -18,7 +18,6 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.frozen import replace
-from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.covariance_adjustment.system import System
 from photostrip.triangulation.error_propagation.covariances import by_images
@@ -60,11 +59,8 @@ def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Float
 
 def largest_turn(found: System) -> float:
     """Largest turn and change of scale of a model: root of the sum of their squares, radians."""
-    layout = found.layout
-    models = np.arange(len(layout.start))
-    columns = layout.unknown[:, None] + np.arange(3, SIMILARITY_PARAMETERS)
-    unknowns = found.solution[(models // layout.width)[:, None], columns] / found.conditions.local.length
-    return float(np.sqrt(np.square(unknowns).sum(axis=1).max()))
+    turns = found.unknowns[:, 3:] / found.conditions.local.length
+    return float(np.sqrt(np.square(turns).sum(axis=1).max()))
 
 
 def oriented_again(orientation: Orientation, xy: Floats) -> Orientation:

@@ -191,6 +191,19 @@ class System:
         """Correlates lambda of the conditions, shape (n,)."""
         return np.asarray(self.solution[self.layout.block, self.layout.position], float)
 
+    @property
+    def cofactors(self) -> Floats:
+        """Cofactors of the correlates, shape (n,)."""
+        place = self.layout.position
+        return np.asarray(self.factors.diagonal_of_inverse[self.layout.block, place, place], float)
+
+    @property
+    def unknowns(self) -> Floats:
+        """Small similarities y of the models, shape (p, 7)."""
+        models = np.arange(len(self.layout.start))
+        columns = self.layout.unknown[:, None] + np.arange(SIMILARITY_PARAMETERS)
+        return np.asarray(self.solution[(models // self.layout.width)[:, None], columns], float)
+
 
 def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     """Build, eliminate and solve K = [Q A; A^T 0], Q = H H^T + noise / factor (eq. 7).

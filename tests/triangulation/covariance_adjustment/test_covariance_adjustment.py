@@ -77,7 +77,6 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     assert again == pytest.approx(wanted.value, abs=1e-9)
     solved = system.system(errors, wanted, factor)
     tables = [errors.points, prediction.photo_rows(errors)]
-    predicted, cofactors = prediction.predict(solved, tables)
 
     by_images = written_out(wanted.rows.without_similarity(), errors)[:, 0]
     design = np.zeros((len(wanted.value), 7 * (n + 1)))
@@ -89,11 +88,14 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     whole = np.block([[by_images @ by_images.T + np.diag(wanted.noise / factor), design], [design.T, corner]])
     solution = np.linalg.solve(whole, np.concatenate([wanted.value, np.zeros(7 * n)]))
     inverse = np.linalg.inv(whole)
+    cofactors = solved.cofactors
     assert cofactors == pytest.approx(np.diag(inverse)[: len(cofactors)], abs=1e-8 * np.abs(inverse).max())
     images = relinearisation.image_errors(solved)
     expected = by_images.T @ solution[: len(by_images)]
     assert images.ravel() == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
-    for rows, seen in nonempty(zip(tables, predicted, strict=True)):
+    for rows in nonempty(tables):
+        predicted = prediction.errors(solved, rows, np.zeros_like(images))
+        covariances = prediction.covariances(solved, rows)
         own = written_out(rows.without_similarity(), errors)
         size = rows.by_similarity.shape[1]
         for thing in range(len(rows.first)):
@@ -101,11 +103,11 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
             column[: len(by_images)] = by_images @ own[thing].T
             start = len(by_images) + 7 * rows.first[thing]
             column[start : start + 7] = (rows.by_similarity[thing] @ wanted.local.to_common[rows.first[thing]]).T
-            assert seen.error[thing] == pytest.approx(column.T @ solution, abs=1e-9)
+            assert predicted[thing] == pytest.approx(column.T @ solution, abs=1e-9)
             moved = relinearisation.displacements(errors, rows, images)[thing]
             assert moved == pytest.approx(own[thing] @ images.ravel(), abs=1e-9)
             covariance = own[thing] @ own[thing].T - column.T @ inverse @ column
-            assert seen.covariance[thing] == pytest.approx(covariance, abs=1e-8 * np.abs(covariance).max())
+            assert covariances[thing] == pytest.approx(covariance, abs=1e-8 * np.abs(covariance).max())
     some = np.random.default_rng(1).permutation(len(errors.points.first))
     rows = errors.points.take(some).along(np.full((len(some), 3), 3**-0.5))
     own = written_out(rows.without_similarity(), errors)[:, 0]

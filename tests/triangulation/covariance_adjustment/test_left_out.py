@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photostrip.triangulation.covariance_adjustment import conditions, prediction, system
+from photostrip.triangulation.covariance_adjustment import conditions, prediction, relinearisation, system
 from photostrip.triangulation.covariance_adjustment.left_out import _predicted, left_out_errors
 from tests.derivatives import errors_of
 from tests.loops import nonempty
@@ -27,10 +27,11 @@ def test_groups_are_predicted_as_without_them(photos: int, lap: float) -> None:
     for rows, left_out in nonempty(zip(groups, left_out_errors(solved, groups), strict=True)):
         rest = np.setdiff1d(np.arange(len(given)), rows)
         without = conditions.conditions(*parts, control.take(rest), given[rest])
-        (there,), _ = prediction.predict(system.system(found.errors, without, FACTOR), [control.take(rows).rows])
-        error = given[rows] - there.error[:, 0]
+        rest_alone, there = system.system(found.errors, without, FACTOR), control.take(rows).rows
+        none = np.zeros_like(relinearisation.image_errors(rest_alone))
+        error = given[rows] - prediction.errors(rest_alone, there, none)[:, 0]
         assert left_out.errors == pytest.approx(error, abs=1e-7)
-        variance = there.covariance[:, 0, 0] + control.variance[rows] / FACTOR
+        variance = prediction.covariances(rest_alone, there)[:, 0, 0] + control.variance[rows] / FACTOR
         if len(rows) == 1:
             assert left_out.squares == pytest.approx(error[0] ** 2 / variance[0])
         assert left_out.squares > 0
