@@ -20,8 +20,8 @@ HALVINGS = 60  # of an interval around a root
 SIGMA_FROM_MEDIAN = 1.4826  # standard deviation over the median of |x|, of a normal distribution
 TINY = 1e-300
 PRECISION = 1e-16
-TERMS = 100_000
-STEPS = 200
+MOST_TERMS = 100_000
+MOST_STEPS = 200
 
 
 def _continued_fraction(terms: Iterator[tuple[float, float]]) -> float:
@@ -54,7 +54,7 @@ def beta_cdf(x: float, a: float, b: float, rest: float | None = None) -> float:
     def terms() -> Iterator[tuple[float, float]]:
         yield 0.0, 1.0
         yield -(a + b) * x / (a + 1), 1.0
-        for m in range(1, TERMS):
+        for m in range(1, MOST_TERMS):
             yield m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m)), 1.0
             yield -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1)), 1.0
 
@@ -81,7 +81,7 @@ def gamma_cdf(x: float, a: float) -> float:
 
     def terms() -> Iterator[tuple[float, float]]:
         yield 0.0, x + 1 - a
-        for n in range(1, TERMS):
+        for n in range(1, MOST_TERMS):
             yield -n * (n - a), x + 2 * n + 1 - a
 
     return 1 - front / _continued_fraction(terms())
@@ -91,7 +91,7 @@ def _solve(excess: Callable[[float], float], start: float, low: float, high: flo
     """Root of an increasing function, by secants kept within a bracket."""
     x, value = start, excess(start)
     previous, before = x, value
-    for _ in range(STEPS):
+    for _ in range(MOST_STEPS):
         low, high = (low, min(high, x)) if value > 0 else (max(low, x), high)
         slope = (value - before) / (x - previous) if x != previous else 0.0
         guess = x - value / slope if slope else inf
@@ -116,7 +116,7 @@ def normal_quantile(probability: float) -> float:
     x = sqrt(
         -2 * log(2 * tail)
     )  # from above, where the logarithm of the tail, which is concave, leads down to the root
-    for _ in range(STEPS):
+    for _ in range(MOST_STEPS):
         upper = erfc(x / sqrt(2)) / 2
         step = log(tail / upper) * upper * sqrt(2 * pi) * exp(x * x / 2)
         x -= step
@@ -180,7 +180,7 @@ def noncentral_chi2_sf(x: float, dof: float, noncentrality: float) -> float:
     """Upper tail of the noncentral chi-square distribution: a Poisson mixture of central ones."""
     half = noncentrality / 2
     below, weight = 0.0, exp(-half)
-    for n in range(TERMS):
+    for n in range(MOST_TERMS):
         below += weight * gamma_cdf(x / 2, dof / 2 + n)
         weight *= half / (n + 1)
         if n > half and weight < PRECISION:

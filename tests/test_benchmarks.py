@@ -199,13 +199,13 @@ from photostrip.triangulation.gross_errors.pairs import deletion, global_test, p
 from photostrip.triangulation.gross_errors.rays import point_decisions
 from photostrip.triangulation.bundle.settings import BundleSettings
 names = [f"{module.rpartition('.')[2]}.{name}" for module, name, _ in ablation.constants()]
-assert {"settings:BundleSettings.level", "strip_network.LEVEL", "point_decisions.LIKELIER"} < set(names)
+assert {"settings:BundleSettings.level", "strip_network.STRIP_LEVEL", "point_decisions.LIKELIER"} < set(names)
 ablation.put(rejection.__name__, "UNCONTROLLED", 0.25)
 assert point_decisions.UNCONTROLLED == reliability.UNCONTROLLED == 0.25
 ablation.put(global_test.__name__, "FIFTH_WRONG", 2.5)  # the default of a class method, and of a named argument
 assert global_test.ParallaxScatter.of.__defaults__ == (2.5,)
 assert pair_search.search.__kwdefaults__ == {"start": True, "sets": True, "spoiled": 2.5}
-ablation.put(deletion.__name__, "LARGEST", 5)  # of a method of another module
+ablation.put(deletion.__name__, "LARGEST_SET", 5)  # of a method of another module
 assert pair_search._Log.without_sets.__defaults__ == (5,) and point_decisions.LARGEST == 5
 for make in list(ablation.changes().values()):
     make()

@@ -32,8 +32,8 @@ from photostrip.frozen import replace
 
 LOCAL = "local"
 CONNECT_SECONDS = 5.0  # seconds for a scheduler to answer
-AHEAD = 2  # tasks sent for each thread of the cluster
-LEAST_AHEAD = 4
+PER_THREAD = 2  # tasks sent for each thread of the cluster
+LEAST_TASKS = 4
 CLOSING_SECONDS = 1.0  # seconds that an orderly end may take
 COUNT_INTERVAL = 1.0  # seconds between two looks at how many workers there are
 
@@ -66,7 +66,7 @@ class Cluster:
         self.client: Any = client
         self.limits, self.work, self.begun, self.say = limits, work, begun, say
         self._sent: dict[str, tuple[Any, Task]] = {}
-        self._room, self._counted = LEAST_AHEAD, -COUNT_INTERVAL
+        self._room, self._counted = LEAST_TASKS, -COUNT_INTERVAL
         self._heard_of = time.monotonic()
         self._done: queue.SimpleQueue[str] = queue.SimpleQueue()
 
@@ -99,7 +99,7 @@ class Cluster:
             workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
             if not workers and self._counted < 0.0:
                 self.say("the cluster has no workers yet; waiting for them")
-            self._room, self._counted = max(AHEAD * sum(each["nthreads"] for each in workers), LEAST_AHEAD), now
+            self._room, self._counted = max(PER_THREAD * sum(each["nthreads"] for each in workers), LEAST_TASKS), now
         return self._room
 
     def _send(self, task: Task) -> Iterator[Answer]:

@@ -16,7 +16,7 @@ from photostrip.frozen import dataclass
 PROJECT = "project.yaml"
 ENDINGS = {".yaml", ".yml"}
 LIST = "@"
-LARGEST_LIST = 100 * MEGABYTE
+LARGEST_LIST_FILE = 100 * MEGABYTE
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def _listed(arguments: Iterable[str], faults: list[Fault]) -> Iterator[str]:
             continue
         file = argument.removeprefix(LIST)
         try:
-            data = sys.stdin.buffer.read() if file == "-" else read_bytes(file, LARGEST_LIST)
+            data = sys.stdin.buffer.read() if file == "-" else read_bytes(file, LARGEST_LIST_FILE)
             text, _ = decode(file, data)
         except InputError as error:
             faults += error.faults

@@ -17,10 +17,10 @@ def _keys(incomplete: str) -> list[str]:
 
 
 def _page(width: int | None) -> int | None:
-    from photostrip.report.page.layout import NARROWEST, WIDEST
+    from photostrip.report.page.layout import NARROWEST, WIDEST_PAGE
 
-    if width is not None and not NARROWEST <= width <= WIDEST:
-        msg = f"{width} characters; the text is {NARROWEST} to {WIDEST} wide"
+    if width is not None and not NARROWEST <= width <= WIDEST_PAGE:
+        msg = f"{width} characters; the text is {NARROWEST} to {WIDEST_PAGE} wide"
         raise typer.BadParameter(msg)
     return width
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 
-HIGHEST = 3  # power
-FEWEST = 2  # points in both zones
+HIGHEST_POWER = 3  # power
+FEWEST_COMMON = 2  # points in both zones
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ def join_zones(source: Floats, target: Floats) -> ZoneJoint:
     """
     given = _complex(source)
     center, size = complex(given.mean()), float(np.abs(given - given.mean()).max()) or 1.0
-    degree = min(HIGHEST, len(given) - 1)
+    degree = min(HIGHEST_POWER, len(given) - 1)
     design = _powers((given - center) / size, degree)
     coefficients = np.asarray(np.linalg.lstsq(design, _complex(target), rcond=None)[0], np.complex128)
     return ZoneJoint(

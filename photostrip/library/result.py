@@ -237,7 +237,7 @@ class Result:
 
             return to_json(document)
         title, sections = trace_title(document), trace_sections(document)
-        return text.to_markdown(title, sections) if form == "md" else text.to_text(title, sections, layout.WIDEST)
+        return text.to_markdown(title, sections) if form == "md" else text.to_text(title, sections, layout.WIDEST_PAGE)
 
     def files(self, *, html: bool = False) -> dict[str, str]:
         """Return the files of the result, content by name: result.json, the tables, with html the report as a page."""

@@ -18,7 +18,7 @@ from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.frozen import dataclass, replace
-from photostrip.geodesy.zones import FEWEST, join_zones
+from photostrip.geodesy.zones import FEWEST_COMMON, join_zones
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, counted, listed
 from photostrip.project.conversion import ground_columns
@@ -241,9 +241,9 @@ def in_one_zone(
         here, there = np.array(pairs, np.intp).reshape(-1, 2).T
         both = read.xyz[here][:, columns], first.xyz[there][:, first_columns]
         known = np.isfinite(both[0]).all(axis=1) & np.isfinite(both[1]).all(axis=1)
-        if len(np.unique(both[0][known], axis=0)) < FEWEST:
+        if len(np.unique(both[0][known], axis=0)) < FEWEST_COMMON:
             message = f"{counted(int(known.sum()), 'point')} of this list in the first one, too, to join the two zones"
-            expected = f"{FEWEST} or more, with `use: off` in one of the lists; 4 for the third power"
+            expected = f"{FEWEST_COMMON} or more, with `use: off` in one of the lists; 4 for the third power"
             faults.append(fault_at(root, place, message, "zone-joint", expected=expected))
             continue
         joint = join_zones(both[0][known], both[1][known])

@@ -26,7 +26,7 @@ SIGNIFICANT = 4  # digits of what has no natural size
 EXACT = 12  # digits of what others compute with
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}  # units of angles
 AT_ONCE = 2000  # numbers of a column that are read together, for the sake of memory
-DIGITS = re.compile("([0-9]+)")
+WHOLE_NUMBERS = re.compile("([0-9]+)")
 
 
 def rounded(values: ArrayLike | float, decimals: int) -> Plain:
@@ -93,7 +93,7 @@ def micrometres(millimetres: ArrayLike) -> Plain:
 
 def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
     """Return the key that puts ``P2`` before ``P10``; equal numbers (``7``, ``07``) by their text."""
-    split = DIGITS.split(name)
+    split = WHOLE_NUMBERS.split(name)
     parts: list[str | tuple[int, str]] = [*split]
     # numbers by length, then by digits: an id may have more digits than int() takes
     parts[1::2] = [(len(digits), digits) for digits in (part.lstrip("0") for part in split[1::2])]
@@ -113,7 +113,7 @@ def _padded(names: Sequence[str]) -> list[Any]:
     text = "\n".join(names)
     if text.count("\n") != len(names) - 1 or "\0" in text:
         return []
-    parts = DIGITS.split(text)
+    parts = WHOLE_NUMBERS.split(text)
     numbers = [part.lstrip("0") for part in parts[1::2]]
     width = max(map(len, numbers), default=0)
     parts[1::2] = ["\0" + digits.rjust(width, "0") for digits in numbers]  # a number comes before any other sign

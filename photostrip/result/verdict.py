@@ -23,7 +23,7 @@ PAIR_RATIO = 1.5  # of a pair's sigma0 to that of the others, or to the stated o
 PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
 POOR_CONTROL = 5.0  # rms of the control's residuals in standard deviations; a long strip bends by that much
 MANY_REJECTED, MANY_OF_PHOTO = 0.05, 0.2  # share of the points in pairs, of those of a photo
-SMALLEST = 0.001  # probability that is written as a number
+SMALLEST_PROBABILITY = 0.001  # probability that is written as a number
 PARTS = "plan", "height"
 TERMS = "twist", "bending"
 AREAS = {"plan": "ellipse", "height": "interval"}
@@ -260,7 +260,7 @@ def _known_cause(document: Document) -> str:
 
 
 def _percent(chance: float) -> str:
-    return f"{100 * chance:.1f} %" if chance >= SMALLEST else f"below {100 * SMALLEST:g} %"
+    return f"{100 * chance:.1f} %" if chance >= SMALLEST_PROBABILITY else f"below {100 * SMALLEST_PROBABILITY:g} %"
 
 
 def _stated(document: Document) -> float:

@@ -15,7 +15,7 @@ LEAST_LAP, LARGEST_LAP = 50.0, 95.0  # percent; up to 50 % no point lies on thre
 LARGEST_SIDE_LAP = 90.0
 MOST_PHOTOS = 20_000  # of all strips
 MOST_POINTS = 1_000_000
-LOWEST = 0.2  # of the flying height: nearer to the camera no terrain may come
+LEAST_DEPTH = 0.2  # of the flying height: nearer to the camera no terrain may come
 LARGEST_TILT_DEG = 25.0
 LARGEST_LON, LARGEST_LAT = 360.0, 90.0  # degrees
 LARGEST_ARC = 0.5  # radians of the body that strips may cover
@@ -190,7 +190,7 @@ def _together(spec: Spec) -> Iterator[Fault]:
     length, width = flight.photos * spec.base, flight.strips * spec.strip_distance
     rise = (abs(terrain.slope_percent[0]) * length + abs(terrain.slope_percent[1]) * width) / 200.0
     highest = terrain.relief + rise
-    if highest > (1.0 - LOWEST) * spec.flying_height:
+    if highest > (1.0 - LEAST_DEPTH) * spec.flying_height:
         message = (
             f"the terrain rises to {highest:.0f} m above its mean height, the camera is at {spec.flying_height:.0f} m"
         )

@@ -17,7 +17,7 @@ from photostrip.frozen import dataclass
 from photostrip.terrestrial.frame import ground_from_photo, partials
 from photostrip.units import ARCSECONDS
 
-LEVEL = 1e-12  # difference of a rotation from that of a level camera
+LEVEL_CAMERA = 1e-12  # difference of a rotation from that of a level camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ def grid(photo_format: tuple[float, float], step: float, *, level: bool = True) 
     axes = []
     for size in photo_format:
         half = size / 2
-        inside = step * np.arange(int(np.ceil(half / step - LEVEL)))
+        inside = step * np.arange(int(np.ceil(half / step - LEVEL_CAMERA)))
         upper = np.append(inside, half)
         axes.append(upper if level else np.concatenate([-upper[:0:-1], upper]))
     return axes[0], axes[1]

@@ -33,7 +33,7 @@ from photostrip.terrestrial.normal_case import SIDES, Normal, StereoPair, inters
 from photostrip.terrestrial.remarks import remarks
 
 COLUMNS = (slice(0, 2), slice(2, 4))  # of the left and of the right photo
-TURNS = (slice(0, 3), slice(3, 6))
+TURNS_OF_PHOTOS = (slice(0, 3), slice(3, 6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +180,7 @@ def _turns(series: Series, motion: Motion | None, removed: tuple[bool, ...]) -> 
     for camera, turn in enumerate(motion.turns):
         if turn is None or not removed[camera]:
             continue
-        angles, columns = TURNS[camera], COLUMNS[camera]
+        angles, columns = TURNS_OF_PHOTOS[camera], COLUMNS[camera]
         weighted = turn.design * turn.weights[:, :, None]
         result.values[:, angles] = turn.values
         result.common[angles, :, columns] = np.einsum("jk,mik->jmi", turn.covariance, weighted)

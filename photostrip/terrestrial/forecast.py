@@ -19,7 +19,7 @@ from photostrip.terrestrial.monitoring import MonitoringSettings, Series
 from photostrip.terrestrial.normal_case import StereoPair
 
 HALVINGS = 60
-FARTHEST = 20.0  # of the distance: no photo shows more to the side
+FARTHEST_ASIDE = 20.0  # of the distance: no photo shows more to the side
 PLACES = ("middle", "side", "top")
 
 
@@ -86,7 +86,7 @@ def _place(spec: DisplacementSpec, distance: float, place: str) -> Floats:
 
     if not shown(0.0):
         return np.full(SPACE, np.nan)
-    inside, outside = 0.0, FARTHEST * distance
+    inside, outside = 0.0, FARTHEST_ASIDE * distance
     for _ in range(HALVINGS):
         reach = (inside + outside) / 2
         inside, outside = (reach, outside) if shown(reach) else (inside, reach)

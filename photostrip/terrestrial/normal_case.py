@@ -17,8 +17,8 @@ from photostrip.terrestrial.frame import GROUND_FROM_HOUSE, TURN_AXES, rays
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
 PARALLAX = 1e-3  # of the principal distance: a smaller x parallax is refused
-ALONG = 0.05  # sine of the angle between the base and the mean optical axis below which there is no normal case
-AHEAD = 1e-3  # cosine of the angle to the normal direction below which a ray cannot be transformed
+LEAST_SINE = 0.05  # sine of the angle between the base and the mean optical axis below which there is no normal case
+LEAST_COSINE_AHEAD = 1e-3  # cosine of the angle to the normal direction below which a ray cannot be transformed
 CONDITION = np.array([0.0, 1.0, 0.0, -1.0])  # the z coordinates of both photos are equal in the normal case
 
 
@@ -46,7 +46,7 @@ class StereoPair:
         along = (self.centers[RIGHT] - self.centers[LEFT]) / self.base
         mean = -(self.rotations[LEFT, :, 2] + self.rotations[RIGHT, :, 2])
         across = mean - (mean @ along) * along
-        if np.linalg.norm(across) < ALONG * max(float(np.linalg.norm(mean)), 1.0):
+        if np.linalg.norm(across) < LEAST_SINE * max(float(np.linalg.norm(mean)), 1.0):
             msg = "the cameras look along the base, or away from each other: there is no normal case"
             raise GeometryError(msg, photos=SIDES, code="along-base")
         across /= np.linalg.norm(across)
@@ -93,7 +93,7 @@ def to_normal(measured: Floats, variances: Floats, pair: StereoPair, rotations: 
     ray = np.stack([rays(complete[:, :2], focal[LEFT]), rays(complete[:, 2:], focal[RIGHT])], axis=1)
     turned = np.einsum("nsij,nsj->nsi", turn, ray)
     with np.errstate(invalid="ignore"):
-        bad = (turned[..., 1] < AHEAD * np.linalg.norm(turned, axis=-1)).any(axis=1)
+        bad = (turned[..., 1] < LEAST_COSINE_AHEAD * np.linalg.norm(turned, axis=-1)).any(axis=1)
     turned[bad] = np.nan
     common = focal[LEFT]
     scale = common / turned[..., 1]

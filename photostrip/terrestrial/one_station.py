@@ -17,7 +17,7 @@ from photostrip.terrestrial.camera_motion import ImagePair, Turn, fit
 from photostrip.terrestrial.displacement import SPACE
 from photostrip.terrestrial.frame import rays, small_turn
 
-STEPS = np.array([1e-4] * 4 + [1e-3] * 2 + [1e-6] * 3)  # of differences: mm, metres, radians
+DIFFERENCES = np.array([1e-4] * 4 + [1e-3] * 2 + [1e-6] * 3)  # of differences: mm, metres, radians
 ACROSS, COMPLETE = 2, 3  # components of a displacement
 
 
@@ -143,6 +143,6 @@ def _displacement(quantities: Floats, principal_distance: float, rotation: Float
 
 def _slope(quantities: Floats, principal_distance: float, rotation: Floats) -> Floats:
     """Differentiate the displacement, (3, 9), by differences; zero by a second distance that is not known."""
-    steps = np.diag(STEPS)
+    steps = np.diag(DIFFERENCES)
     ahead, behind = (_displacement(quantities + step, principal_distance, rotation)[0] for step in (steps, -steps))
-    return np.asarray((ahead - behind).T / (2 * STEPS), float)
+    return np.asarray((ahead - behind).T / (2 * DIFFERENCES), float)

@@ -13,7 +13,7 @@ from photostrip.terrestrial.camera_motion import Turn
 from photostrip.terrestrial.monitoring import MEASURED, REASONS, Monitoring
 from photostrip.units import ARCSECONDS, MICROMETRES
 
-SURE = 0.99  # probability below which a misfit may be chance
+SURE_PROBABILITY = 0.99  # probability below which a misfit may be chance
 
 
 def remarks(result: Monitoring) -> Iterator[Note]:
@@ -56,7 +56,7 @@ def _stable_points(result: Monitoring) -> Iterator[Note]:
         yield Note("not-stable", message, points=(name,))
     for state in result.cameras:
         turn = state.turn
-        if turn is None or turn.dof <= 0 or turn.weighted_sum <= chi2_quantile(SURE, turn.dof):
+        if turn is None or turn.dof <= 0 or turn.weighted_sum <= chi2_quantile(SURE_PROBABILITY, turn.dof):
             continue
         ratio = float(np.sqrt(turn.weighted_sum / turn.dof))
         message = (
@@ -75,7 +75,7 @@ def _parallaxes(result: Monitoring) -> Iterator[Note]:
         known = np.isfinite(ratio)
         if not known.any():
             continue
-        limit = float(np.sqrt(chi2_quantile(1 - (1 - SURE) / known.sum(), 1)))
+        limit = float(np.sqrt(chi2_quantile(1 - (1 - SURE_PROBABILITY) / known.sum(), 1)))
         for row in np.flatnonzero(known & (np.nan_to_num(ratio) > limit)):
             name = result.series.points[row]
             change = result.parallax_change[number, row] * MICROMETRES
@@ -91,7 +91,7 @@ def _misorientation(result: Monitoring) -> Iterator[Note]:
     """Compare the vertical parallaxes of the first epoch with what the measurements explain."""
     ratio = result.parallax[0] / result.parallax_sigma[0]
     ratio = ratio[np.isfinite(ratio)]
-    if len(ratio) and (ratio**2).sum() > chi2_quantile(SURE, len(ratio)):
+    if len(ratio) and (ratio**2).sum() > chi2_quantile(SURE_PROBABILITY, len(ratio)):
         rms = float(np.sqrt(np.nanmean(result.parallax[0] ** 2))) * MICROMETRES
         message = (
             f"the vertical parallaxes of the first epoch have an rms of {rms:.1f} µm,"

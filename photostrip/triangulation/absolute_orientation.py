@@ -34,12 +34,14 @@ LARGEST_SCALE_STEP = 5.0  # of the logarithm of the scale, in one iteration
 ITERATIONS = 50
 CONVERGED = 1e-10  # of the strip's half length; the next step would be its square
 LAST_AXES_UPDATE = 2  # iteration; afterwards the directions of the ground axes no longer change
-RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
+LEAST_MOTION = (
+    1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
+)
 WEAK_LIMIT = 1 / 8  # well spread control has about 1; at an eighth errors of the control grow eightfold somewhere
 MOST_OFF = 0.2  # of half the strip's length, of half of the control: an error of ids or of the place
 OFF_LINE = 0.1  # breadth of given coordinates on a line over that of the strip's points, as parts of their lengths
 LEAST_WITH_ONE_FAR = 3  # control points: of three none is far from two others
-FAR_OFF = 5.0  # times as far from the middle as any other control point: a strip is no longer than its control
+ALONE = 5.0  # times as far from the middle as any other control point: a strip is no longer than its control
 IDS_NAMED = 6  # in a message
 PLAN, HEIGHT = slice(0, 2), 2
 
@@ -269,7 +271,7 @@ def _refuse_given_on_line(strip: Floats, given: Floats, control: ControlPoints) 
     line as well, the rank of the design decides.
     """
     spread = collinearity(given)
-    if spread < RANK_LIMIT**2 < collinearity(strip) and spread < OFF_LINE**2 * collinearity(strip):
+    if spread < LEAST_MOTION**2 < collinearity(strip) and spread < OFF_LINE**2 * collinearity(strip):
         raise _on_line(given, control)
 
 
@@ -277,7 +279,7 @@ def _on_line(given: Floats, control: ControlPoints) -> GeometryError:
     """Say that control lies on a line, or which point lies so far off that all others are one place beside it."""
     away = np.linalg.norm(given - column_medians(given), axis=1)
     far, others = int(away.argmax()), float(np.delete(away, away.argmax()).max(initial=0.0))
-    if len(away) > LEAST_WITH_ONE_FAR and away[far] > FAR_OFF * others:
+    if len(away) > LEAST_WITH_ONE_FAR and away[far] > ALONE * others:
         times = away[far] / max(others, 1e-6)
         message = (
             f"absolute orientation: control point {control.ids[far]} lies {away[far] / 1000:.4g} km from the middle of "
@@ -294,7 +296,7 @@ def _on_line(given: Floats, control: ControlPoints) -> GeometryError:
 def _start(strip: Floats, targets: Targets, weight: Floats) -> Similarity:
     """Similarity to start from: closed form of the full points, else plan and height apart."""
     full = targets.control.use.all(axis=1)
-    if full.sum() >= 3 and collinearity(strip[full]) > RANK_LIMIT**2:
+    if full.sum() >= 3 and collinearity(strip[full]) > LEAST_MOTION**2:
         return Similarity.from_points(strip[full], targets.of(strip)[full], weight[full].mean(axis=1))
     return _start_apart(strip, targets)
 
@@ -365,7 +367,7 @@ def _refuse_deficient(design: Floats, root: Floats, xyz: Floats, targets: Target
     scaled = _scaled_design(design, root)
     # the triangular factor has the same singular values and directions, however many control points there are
     _, values, vt = np.linalg.svd(np.linalg.qr(scaled, mode="r") if len(scaled) > PARAMETERS else scaled)
-    if len(values) == PARAMETERS and values[-1] > RANK_LIMIT * values[0]:
+    if len(values) == PARAMETERS and values[-1] > LEAST_MOTION * values[0]:
         return
     free = free_motion(np.linalg.solve(root.T, vt[-1]), xyz, targets.control, half)
     msg = f"absolute orientation: the control does not determine {free}"

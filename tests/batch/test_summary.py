@@ -18,7 +18,7 @@ from photostrip.batch.run import named
 from photostrip.batch.selection import ChosenProject
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output.batch import parsed_record, record_text, summary_csv, summary_json
-from photostrip.report.commands.batch import ORDER, ROWS, batch_junit, batch_sections, counts, outcome_line
+from photostrip.report.commands.batch import MOST_ROWS, ORDER, batch_junit, batch_sections, counts, outcome_line
 from photostrip.report.page.progress import BatchTable, batch_table, clock
 from photostrip.report.page.text import to_text
 from tests.batch.projects import command, environment, write_projects
@@ -62,11 +62,11 @@ def test_counts_in_words() -> None:
 
 
 def test_of_too_many_projects_the_worst_are_shown() -> None:
-    many = lines(*[good() for _ in range(ROWS + 20)], *[FAULTY] * 3)
+    many = lines(*[good() for _ in range(MOST_ROWS + 20)], *[FAULTY] * 3)
     text = to_text("", batch_sections(many))
-    assert text.count(".yaml  good") + text.count(".yaml   good") == ROWS - 3
+    assert text.count(".yaml  good") + text.count(".yaml   good") == MOST_ROWS - 3
     assert "23 more projects not shown, none of them worse" in text
-    assert len(to_text("", batch_sections(many, everything=True)).splitlines()) > ROWS + 23
+    assert len(to_text("", batch_sections(many, everything=True)).splitlines()) > MOST_ROWS + 23
     assert "strip 0.yaml" not in to_text("", batch_sections(many, quiet=True))
 
 

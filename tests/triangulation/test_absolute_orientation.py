@@ -361,7 +361,7 @@ def test_heights_on_a_line_over_level_ground_name_their_line(use: dict[str, str]
 def test_plan_control_at_several_heights_holds_heights_on_a_line_weakly() -> None:
     """Relief of 50 m turns with the roll of the strip by little, but it turns: warned of, not refused."""
     found = case({"A": "xy", "D": "xy", "H": "xy", "I": "z", "J": "z", "K": "z"}).orient()
-    assert 1 / absolute_orientation.WEAK_LIMIT < found.condition < 1 / absolute_orientation.RANK_LIMIT
+    assert 1 / absolute_orientation.WEAK_LIMIT < found.condition < 1 / absolute_orientation.LEAST_MOTION
 
 
 def test_one_point_off_the_line_is_enough() -> None:

@@ -15,7 +15,7 @@ LEAST_TOGETHER = 4  # points measured several times, of which more than
 MOST_SHARE = 0.5  # disagree for one reason
 REACH_SHARE = 0.98  # of the coordinates
 AGREEING_SHARE = 3e-4  # of what coordinates reach to: 30 micrometres of 100 mm
-FARTHEST = 10.0  # standard deviations from the mean; beyond, two measurements are not of one point
+FARTHEST_SIGMAS = 10.0  # standard deviations from the mean; beyond, two measurements are not of one point
 DECIMALS = 9  # of the unit of a table: what is left beyond is rounding
 
 
@@ -87,7 +87,7 @@ def _refuse_all(
     Measurements that differ by next to nothing of what they reach to agree, and what they are tested against is wrong.
     """
     several = np.bincount(group)[group] > 1
-    far = several & (np.nan_to_num(ratio.max(axis=1)) > FARTHEST)
+    far = several & (np.nan_to_num(ratio.max(axis=1)) > FARTHEST_SIGMAS)
     names = len(distinct(group[several]))
     if names < LEAST_TOGETHER or far.sum() <= MOST_SHARE * several.sum():
         return False
@@ -95,7 +95,7 @@ def _refuse_all(
     reach = quantile(np.abs(read.xy), REACH_SHARE)
     head = (
         f"{names} {target}s are measured several times on a photo, and {len(distinct(group[far]))} of them lie more "
-        f"than {FARTHEST:g} standard deviations from their mean"
+        f"than {FARTHEST_SIGMAS:g} standard deviations from their mean"
     )
     if scatter < AGREEING_SHARE * reach:
         message = (
@@ -116,7 +116,7 @@ def _refuse_far(read: Measurements, target: str, ratio: Floats, group: Numbers, 
     """Refuse measurements that lie farther from their mean than one point's can."""
     farthest = np.zeros(group.max() + 1)
     np.maximum.at(farthest, group, np.nan_to_num(ratio.max(axis=1)))
-    for number in np.flatnonzero(farthest > FARTHEST).tolist():
+    for number in np.flatnonzero(farthest > FARTHEST_SIGMAS).tolist():
         if findings.full(read.table.file):
             findings.count(read.table.file, 1)
             continue

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 LARGEST_RESULT = 1000 * MEGABYTE
 SCHEMA = 1
 LINES = 2000  # that are written at a time
-FEW = 300  # lines below which their columns are not worth the trouble
-LINE = 160  # characters up to which a dictionary stands on one line
+FEW_LINES = 300  # lines below which their columns are not worth the trouble
+LONGEST_LINE = 160  # characters up to which a dictionary stands on one line
 
 
 def to_json(document: Document, *, ascii_only: bool = False) -> str:
@@ -55,7 +55,7 @@ def _block(value: Plain, encode: Encoder) -> Iterator[str]:
         return
     if isinstance(value, dict):
         parts = [f"{encode.text(key)}: {_text(each, encode)}" for key, each in value.items()]
-        if sum(map(len, parts)) + 2 * len(parts) > LINE:
+        if sum(map(len, parts)) + 2 * len(parts) > LONGEST_LINE:
             yield "{\n" + ",\n".join(f"  {part}" for part in parts) + "\n}"
             return
     yield _text(value, encode)
@@ -63,7 +63,7 @@ def _block(value: Plain, encode: Encoder) -> Iterator[str]:
 
 def _lines(records: Records | list[Document], encode: Encoder) -> str:
     """Write each record on a line of its own."""
-    if len(records) >= FEW:
+    if len(records) >= FEW_LINES:
         from photostrip.formats.output import json_lines  # with numpy, which nobody needs who reads a result
 
         columns = records.columns if isinstance(records, Records) else json_lines.columns_of(records)

@@ -16,7 +16,7 @@ from photostrip.result.numbers import ROTATION, rounded
 from photostrip.simulation import InjectedError, Simulation
 
 TRUE_STEP = 1e-7  # metres to which the truth is rounded
-ANGLE_DECIMALS = 10  # degrees: 2e-12 rad
+DEGREE_DECIMALS = 10  # degrees: 2e-12 rad
 ANGLE_SYSTEM = "alpha-omega-kappa"
 
 
@@ -61,7 +61,7 @@ def _photos(simulation: Simulation, output: GroundFrame) -> Iterator[Document]:
     truth = simulation.truth
     xyz = _rounded(output.user_from_internal(truth.centers_ground), ground_decimals(output, TRUE_STEP))
     rotations = rounded(truth.rotations_local.reshape(-1, 9), ROTATION)
-    turned = rounded(np.degrees(angles(truth.rotations_local, ANGLE_SYSTEM)), ANGLE_DECIMALS)
+    turned = rounded(np.degrees(angles(truth.rotations_local, ANGLE_SYSTEM)), DEGREE_DECIMALS)
     strip_of = {photo: name for name, photos in simulation.strips for photo in photos}
     for photo, center, rotation, values in zip(truth.photo_ids, xyz, rotations, turned, strict=True):
         place = dict(zip("xyz", center, strict=True))

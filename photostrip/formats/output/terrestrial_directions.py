@@ -19,10 +19,10 @@ from photostrip.units import ARCSECONDS, MICROMETRES
 Grid = tuple[Floats, Floats]  # x and z of a table over the photo in mm, from the principal point
 
 SCHEMA = 1
-ANGLE, ARCSEC, MILLIMETRE, MICROMETRE, RATIO = 8, 5, 6, 4, 5  # decimals: finer than any report prints
+ANGLE, ARCSEC, MILLIMETRE, IMAGE_UM, RATIO = 8, 5, 6, 4, 5  # decimals: finer than any report prints
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi}
 FULL_CIRCLE = 2 * np.pi
-ROUNDING = 1e-12  # rad
+ANGLE_ROUNDING = 1e-12  # rad
 
 
 class Attitude(NamedTuple):
@@ -64,7 +64,7 @@ def _oriented_head(kind: str, camera: Phototheodolite, attitude: Attitude) -> Do
 def positive(angle: float) -> float:
     """Bring an azimuth between 0 and a full circle; what rounds to the full circle is 0."""
     turned = float(np.mod(angle, FULL_CIRCLE))
-    return 0.0 if FULL_CIRCLE - turned < ROUNDING else turned
+    return 0.0 if FULL_CIRCLE - turned < ANGLE_ROUNDING else turned
 
 
 def directions_document(
@@ -79,7 +79,7 @@ def directions_document(
     directions = directions_from_photo(reduced, camera.principal_distance, attitude.rotation)
     document = _points_and_directions("directions", camera, attitude, ids, reduced, directions)
     if sigma is not None:
-        document["image_sigma_um"] = rounded(sigma * MICROMETRES, MICROMETRE)
+        document["image_sigma_um"] = rounded(sigma * MICROMETRES, IMAGE_UM)
         errors = accuracy.required(reduced, camera.principal_distance, sigma, attitude.rotation)
         for row, angle, vertical in zip(document["points"], errors.angle, errors.vertical, strict=True):
             row["sigma_lambda_arcsec"] = rounded(angle * ARCSECONDS, ARCSEC)
@@ -118,7 +118,7 @@ def required_accuracy(
     xz = _grid_points(grid)
     exact = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)
     document = _oriented_head("direction-accuracy", camera, attitude)
-    document["image_sigma_um"] = rounded(sigma * MICROMETRES, MICROMETRE)
+    document["image_sigma_um"] = rounded(sigma * MICROMETRES, IMAGE_UM)
     document["formulas"] = "as printed" if as_printed else "exact"
     document["units"] = {"x": "mm from the principal point", "z": "mm from the principal point"}
     columns = {"angle_arcsec": exact.angle, "horizontal_arcsec": exact.horizontal, "vertical_arcsec": exact.vertical}
@@ -166,19 +166,19 @@ def theodolite_accuracy(
         "mean_vertical_arcsec": rounded(means[1], ARCSEC),
     }
     document["supported_um"] = {
-        "by_horizontal": rounded(image[:, 0].max(), MICROMETRE),
-        "by_vertical": rounded(image[:, 1].max(), MICROMETRE),
-        "by_both": rounded(image.max(), MICROMETRE),
+        "by_horizontal": rounded(image[:, 0].max(), IMAGE_UM),
+        "by_vertical": rounded(image[:, 1].max(), IMAGE_UM),
+        "by_both": rounded(image.max(), IMAGE_UM),
     }
     if sigma is not None:
         needed = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)
         document["wanted"] = {
-            "image_sigma_um": rounded(sigma * MICROMETRES, MICROMETRE),
+            "image_sigma_um": rounded(sigma * MICROMETRES, IMAGE_UM),
             "rounds_horizontal": accuracy.rounds_for(horizontal, float(needed.horizontal.min()) * ARCSECONDS),
             "rounds_vertical": accuracy.rounds_for(vertical, float(needed.vertical.min()) * ARCSECONDS),
         }
     columns = {"by_horizontal_um": image[:, 0], "by_vertical_um": image[:, 1], "supported_um": image.max(axis=1)}
-    document["points"] = _table(xz, columns, MICROMETRE)
+    document["points"] = _table(xz, columns, IMAGE_UM)
     return document
 
 
@@ -194,7 +194,7 @@ def worked_examples() -> Document:
                 "f_mm": example.f,
                 "x_mm": example.x,
                 "z_mm": example.z,
-                "image_sigma_um": rounded(example.sigma * MICROMETRES, MICROMETRE),
+                "image_sigma_um": rounded(example.sigma * MICROMETRES, IMAGE_UM),
                 "horizontal_printed_arcsec": example.horizontal,
                 "horizontal_exact_arcsec": rounded(found.horizontal, ARCSEC),
                 "vertical_printed_arcsec": example.vertical,
@@ -266,7 +266,7 @@ def _element(name: str, value: float, sigma: float, unit: str) -> Document:
             "sigma_unit": "",
         }
     found = {"value": rounded(value, MILLIMETRE), "unit": "mm"}
-    return {"name": name, **found, "sigma": rounded(sigma * MICROMETRES, MICROMETRE), "sigma_unit": "um"}
+    return {"name": name, **found, "sigma": rounded(sigma * MICROMETRES, IMAGE_UM), "sigma_unit": "um"}
 
 
 def _sighted(sightings: Sightings, found: PhotoOrientation) -> list[Document]:

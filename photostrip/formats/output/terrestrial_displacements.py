@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.formats.output.csv_text import to_csv
-from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, Attitude, head
+from photostrip.formats.output.terrestrial_directions import ARCSEC, IMAGE_UM, RATIO, Attitude, head
 from photostrip.frozen import NamedTuple
 from photostrip.notes import Document, Note
 from photostrip.result.numbers import natural_rank, rounded, significant
@@ -150,7 +150,7 @@ def _summary(result: Monitoring) -> Document:
 
 def _rms_um(values: Floats) -> float | None:
     known = values[np.isfinite(values)]
-    found: float | None = rounded(np.sqrt(np.mean(known**2)) * MICROMETRES if len(known) else np.nan, MICROMETRE)
+    found: float | None = rounded(np.sqrt(np.mean(known**2)) * MICROMETRES if len(known) else np.nan, IMAGE_UM)
     return found
 
 
@@ -186,7 +186,7 @@ def _point(result: Monitoring, row: int, order: list[int], axes: Sequence[str]) 
         if np.isfinite(result.positions[number].values[row, 0]):
             entry |= _by_axis("", result.positions[number].values[row][order])
             entry |= _by_axis("sigma_", result.positions[number].sigma[row][order])
-            entry["parallax_um"] = rounded(result.parallax[number, row] * MICROMETRES, MICROMETRE)
+            entry["parallax_um"] = rounded(result.parallax[number, row] * MICROMETRES, IMAGE_UM)
         if number and np.isfinite(result.since_first[number - 1].values[row, 0]):
             entry["since_first"] = _step(result, result.since_first[number - 1], row, order, axes)
             if number > 1:

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Note
 
-LARGEST_LIST = 200  # faults kept of one file; a wrong export has one in every row
+MOST_FAULTS_KEPT = 200  # faults kept of one file; a wrong export has one in every row
 
 
 @dataclass
@@ -34,7 +34,7 @@ class Findings:
 
     def full(self, file: str) -> bool:
         """Whether further faults of a file are only counted, so that their texts need not be made."""
-        return self._count[file] >= LARGEST_LIST
+        return self._count[file] >= MOST_FAULTS_KEPT
 
     def number(self, file: str) -> int:
         return self._count[file]
@@ -56,9 +56,9 @@ class Findings:
         order = {file: number for number, file in enumerate(self._count)}
         found = sorted(self._faults, key=lambda fault: (order[fault.file], fault.line, fault.column))
         rest = [
-            Fault(f"and {count - LARGEST_LIST} more faults in this file", code="more", file=file)
+            Fault(f"and {count - MOST_FAULTS_KEPT} more faults in this file", code="more", file=file)
             for file, count in self._count.items()
-            if count > LARGEST_LIST
+            if count > MOST_FAULTS_KEPT
         ]
         return (*found, *rest)
 

@@ -18,29 +18,29 @@ Cells = NDArray[np.uint8]  # (w, n)
 Count = NDArray[np.uint64]
 
 MOST_DIGITS = 15  # of a decimal number that no other one of as many shares its float with
-LARGEST = 1e16  # numbers from which on Python writes an exponent
-EXPONENT = 1e-4  # below which Python writes one
-TRIED = (2, 4, 9, 12)  # decimals
+EXPONENT_FROM = 1e16  # numbers from which on Python writes an exponent
+EXPONENT_BELOW = 1e-4  # below which Python writes one
+DECIMALS_TRIED = (2, 4, 9, 12)  # decimals
 SMALL_DIGITS = 10  # from which on a number does not fit into 32 bits
 TIE = 1e-3  # parts of the last digit by which a number must be off the middle between two
 
 
 def as_repr(values: Floats, missing: str) -> Cells:
     """Write numbers as ``repr`` does, NaN as ``missing``."""
-    size, least = np.minimum(np.abs(values), LARGEST), 0.9 * (len(values) - np.count_nonzero(np.isnan(values)))
-    for decimals in TRIED:
+    size, least = np.minimum(np.abs(values), EXPONENT_FROM), 0.9 * (len(values) - np.count_nonzero(np.isnan(values)))
+    for decimals in DECIMALS_TRIED:
         scaled = np.rint(size * 10.0**decimals)
         known = (scaled / 10.0**decimals == size) & (scaled < 10.0**MOST_DIGITS)
         if np.count_nonzero(known) >= least:
             break
-    known &= (size >= EXPONENT) | (size == 0.0)
+    known &= (size >= EXPONENT_BELOW) | (size == 0.0)
     cells = _written(values < 0.0, np.where(known, scaled, 0.0).astype(np.uint64), decimals, short=True)
     return _with_others(cells, values, known, missing, repr)
 
 
 def as_fixed(values: Floats, decimals: int, missing: str) -> Cells:
     """Write numbers with this many decimals as ``%.3f`` does, NaN as ``missing``."""
-    scaled = np.minimum(np.abs(values), LARGEST) * 10.0**decimals
+    scaled = np.minimum(np.abs(values), EXPONENT_FROM) * 10.0**decimals
     known = (scaled < 10.0 ** (MOST_DIGITS - 3)) & (np.abs(scaled - np.floor(scaled) - 0.5) > TIE)
     cells = _written(np.signbit(values), np.where(known, np.rint(scaled), 0.0).astype(np.uint64), decimals, short=False)
     return _with_others(cells, values, known, missing, f"{{:.{decimals}f}}".format)

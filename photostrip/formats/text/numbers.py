@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import unicodedata
 
-LARGEST = 1e15  # no coordinate in any unit is larger, and its square is still a number
-SMALLEST = 1e-12  # no length, and no standard deviation in any unit, is smaller
+LARGEST_NUMBER = 1e15  # no coordinate in any unit is larger, and its square is still a number
+SMALLEST_LENGTH = 1e-12  # no length, and no standard deviation in any unit, is smaller
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+")
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ '’_\u00a0\u202f][0-9]{3})+(?:\.[0-9]*)?")
@@ -32,7 +32,7 @@ def number(text: str) -> float:
     word = text.strip()
     if NUMBER.fullmatch(word):
         value = float(word)
-        if abs(value) <= LARGEST:
+        if abs(value) <= LARGEST_NUMBER:
             return value
         raise NotANumber(f"`{shown(word)}` is too large")
     raise _reason(word)

@@ -18,7 +18,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import BYTE_ORDER_MARK
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import LARGEST, SMALLEST, NotANumber, number, shown
+from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber, number, shown
 from photostrip.formats.text.table_text import TableText, content
 from photostrip.formats.text.tables import CONTROL_CHARACTER, Column, Table
 from photostrip.frozen import replace
@@ -307,7 +307,7 @@ class _Reader:
 
     def _positive(self, column: Column, lines: list[int]) -> None:
         values = self.numbers[column.name][-1]
-        for row in np.flatnonzero(values < SMALLEST):
+        for row in np.flatnonzero(values < SMALLEST_LENGTH):
             message = f"{values[row]:g} cannot be a standard deviation"
             self._add(lines[row], column.name, message, "range", expected="a number larger than 0")
 
@@ -362,4 +362,4 @@ def _fast_floats(cells: Cells) -> Floats | None:
         values = np.fromiter(map(float, cells), float, len(cells))
     except ValueError:
         return None
-    return values if (np.abs(values) <= LARGEST).all() else None
+    return values if (np.abs(values) <= LARGEST_NUMBER).all() else None

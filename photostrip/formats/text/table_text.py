@@ -12,7 +12,7 @@ from photostrip.errors import Fault
 from photostrip.formats.text.files import BOM, GZIP, MEGABYTE, decode, read_bytes, refuse
 
 LARGEST_TABLE = 200 * MEGABYTE  # unpacked; a million points are 50 MB
-STEP = 4 * MEGABYTE
+BLOCK_BYTES = 4 * MEGABYTE
 
 
 @dataclass(eq=False)
@@ -80,7 +80,7 @@ def _unpack(file: str, data: bytes) -> bytes:
     try:
         with gzip.GzipFile(fileobj=BytesIO(data)) as stream:
             unpacked = b""
-            while len(unpacked) <= LARGEST_TABLE and (part := stream.read(STEP)):
+            while len(unpacked) <= LARGEST_TABLE and (part := stream.read(BLOCK_BYTES)):
                 unpacked += part
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         how = "ends too early" if isinstance(error, EOFError) else "is damaged"

@@ -13,7 +13,7 @@ from photostrip.points import ControlPoints
 from photostrip.triangulation.bundle.quality.joint_points import joint_cofactors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 
-MOST = 40  # check points that are tested together; in a block of 400 photos 60 of them take 11 % of a run
+MOST_TESTED = 40  # check points that are tested together; in a block of 400 photos 60 of them take 11 % of a run
 
 
 def check_errors(
@@ -25,8 +25,8 @@ def check_errors(
     rows = np.flatnonzero(given.check & np.isfinite(differences).any(axis=1))
     if not len(rows):
         return None
-    if len(rows) > MOST:
-        rows = rows[np.linspace(0, len(rows) - 1, MOST).round().astype(int)]
+    if len(rows) > MOST_TESTED:
+        rows = rows[np.linspace(0, len(rows) - 1, MOST_TESTED).round().astype(int)]
     rows = rows[np.argsort(places[rows], kind="stable")]
     at = places[rows]
     axes = axes_of(given.frame[rows], frames, points.cartesian[at])

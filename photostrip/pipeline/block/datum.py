@@ -24,7 +24,7 @@ LEAST_TIES = 3
 ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line
 FREE_BASE = 1000.0  # metres: mean length of the bases where nothing gives a scale
 DOWN, TURNED = 0.3, 0.01  # radians: standard deviations of cameras that are taken to look down, of given rotations
-STEPS, CLOSE = 20, 1e-6  # of a start on all that is given; of its half length, the last step
+START_STEPS, START_CONVERGED = 20, 1e-6  # of a start on all that is given; of its half length, the last step
 OF_PHOTO = "of photo {}"  # names a camera among given points
 
 
@@ -182,15 +182,15 @@ def _levelled(strip: Floats, targets: absolute_orientation.Targets, level: Level
     rise = (targets.of(found(strip)) - found(strip))[height, 2]
     found = replace(found, shift=found.shift + np.array([0.0, 0.0, rise.mean() if len(rise) else 0.0]))
     half = float(np.ptp(found(strip), axis=0).max()) / 2
-    for _ in range(STEPS):
+    for _ in range(START_STEPS):
         xyz = found(strip)
         rows, free = absolute_orientation.design(xyz, targets, targets.axes(xyz), half)
         up, weight = found.rotation @ level.up, float(np.sqrt((free**2).mean())) / (half * level.sigma)
         rows = np.concatenate([rows, weight * np.pad(-cross_matrix(up)[:2], ((0, 0), (3, 1)))])
         free = np.concatenate([free, -weight * half * up[:2]])
-        step = np.asarray(np.linalg.lstsq(rows, free, rcond=absolute_orientation.RANK_LIMIT)[0], float)
+        step = np.asarray(np.linalg.lstsq(rows, free, rcond=absolute_orientation.LEAST_MOTION)[0], float)
         found = absolute_orientation.corrected(found, step, xyz.mean(axis=0), half)
-        if np.abs(step).max() < CLOSE * half:
+        if np.abs(step).max() < START_CONVERGED * half:
             break
     return found
 

@@ -29,7 +29,7 @@ from photostrip.triangulation.bundle.quality.self_calibration import sigmas
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 
-FAR = 10.0  # times the median: a ray of no pair that misses its point by more waits outside at first
+FAR_FROM_RAY = 10.0  # times the median: a ray of no pair that misses its point by more waits outside at first
 LEAST_FAR = 50.0  # in standard deviations
 NO_CORRECTION, DRIFT, BLOCK = "none", "drift", "block"
 
@@ -276,10 +276,10 @@ def _begin(
         computed = project(problem.start.points[images.point], photos, images.photo)
         miss = (np.abs(images.xy - computed) / images.sigma).max(axis=1)
     known = miss[np.isfinite(miss)]
-    far = np.full(len(miss), max(LEAST_FAR, FAR * median(known) if len(known) else 0.0))
+    far = np.full(len(miss), max(LEAST_FAR, FAR_FROM_RAY * median(known) if len(known) else 0.0))
     loose = np.isin(images.point, images.point[start.rough[images.photo]]) & np.isfinite(miss)
     if loose.any():  # what an orientation that is only given approximately misses says nothing of the rays
-        far[loose] = np.maximum(far[loose], FAR * median(miss[loose]))
+        far[loose] = np.maximum(far[loose], FAR_FROM_RAY * median(miss[loose]))
     for strip in start.strips:
         if strangers := start.strangers.get(strip.strip.id):
             of_strip = np.isin(images.photo, start.rows_of(strip.strip.photos))

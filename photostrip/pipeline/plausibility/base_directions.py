@@ -21,7 +21,7 @@ from photostrip.triangulation.relative_orientation.orientation import orient_unc
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 
 LEAST_POINTS = 6  # one more than a pair has unknowns
-MOST_SIGMA0 = 0.01  # of a pair, over the principal distance: beyond it the base is no better known than by the layout
+PAIR_SIGMA0 = 0.01  # of a pair, over the principal distance: beyond it the base is no better known than by the layout
 
 
 def closer_look(
@@ -48,7 +48,7 @@ def closer_look(
                 doubtful = unusable_pairs(oriented, converged)
         except (GeometryError, np.linalg.LinAlgError):
             return None
-        if doubtful[0] or not oriented.sigma0[0] < MOST_SIGMA0 * focal:
+        if doubtful[0] or not oriented.sigma0[0] < PAIR_SIGMA0 * focal:
             return None
         base, turn = (each[0] for each in oriented.relative)
         back = -base @ turn

@@ -28,7 +28,7 @@ from photostrip.triangulation.plausibility.control.plan_fit import ODD_PROBABILI
 CODE = "P406"
 OF_DOUBTED_CONTROL = {"control-doubtful", "control-rejected"}  # notes
 LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)
-MOST_SIGMA0 = 2.0  # of a bundle, over what is stated: a principal distance of another lens leaves 4 and more
+BUNDLE_SIGMA0 = 2.0  # of a bundle, over what is stated: a principal distance of another lens leaves 4 and more
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Predicted:
 
 def fits_measurements(result: Result) -> bool:
     """Whether a bundle leaves no more than what measurements do; the strip method does not see all of it together."""
-    return result.bundle is not None and result.bundle.screened.solution.sigma0 < MOST_SIGMA0
+    return result.bundle is not None and result.bundle.screened.solution.sigma0 < BUNDLE_SIGMA0
 
 
 def is_doubtful(formed: EvidenceStrip, result: Result, predicted: Predicted) -> bool:

@@ -26,7 +26,7 @@ from photostrip.triangulation.resection.resection import Resection
 if TYPE_CHECKING:
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
-LARGEST = 100  # check points of a strip that are tested together, spread over it
+MOST_TESTED = 100  # check points of a strip that are tested together, spread over it
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +59,8 @@ def check_points(strip: StripResult, control: ControlPoints, observations: Photo
     rows = rows_of_given(control.ids, strip.formed.point, observations.point_ids)
     found = np.flatnonzero(control.check & (rows >= 0) & control.use.any(axis=1))
     found = found[np.argsort(strip.xyz[rows[found], 0], kind="stable")]
-    if len(found) > LARGEST:
-        found = found[np.linspace(0, len(found) - 1, LARGEST).round().astype(int)]
+    if len(found) > MOST_TESTED:
+        found = found[np.linspace(0, len(found) - 1, MOST_TESTED).round().astype(int)]
     return CheckPoints(control.take(found), rows[found])
 
 

@@ -18,7 +18,7 @@ from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 from photostrip.triangulation.error_propagation.control_errors import FitOperator
-from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL
+from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, SIGMA_LEVEL
 from photostrip.triangulation.independent_models import model_errors, model_misclosures, perspective_centers
 from photostrip.triangulation.independent_models.formation import FormedModels
 from photostrip.triangulation.independent_models.model_errors import ModelErrors
@@ -31,7 +31,7 @@ def variance_factor(formed: FormedModels) -> tuple[float, str]:
     redundancy, squares = int(solved.redundancy.sum()), float(solved.squares.sum())
     if redundancy < 1:
         return 1.0, A_PRIORI
-    low, high = (chi2_quantile(p, redundancy) for p in (LEVEL / 2, 1 - LEVEL / 2))
+    low, high = (chi2_quantile(p, redundancy) for p in (SIGMA_LEVEL / 2, 1 - SIGMA_LEVEL / 2))
     return (1.0, A_PRIORI) if low <= squares <= high else (squares / redundancy, A_POSTERIORI)
 
 

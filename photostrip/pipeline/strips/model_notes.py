@@ -15,8 +15,11 @@ from photostrip.triangulation.independent_models.link_screening import LEFT
 from photostrip.triangulation.independent_models.model_errors import far_ends
 
 ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others
-ANOTHER_UNIT, NOTHING = 100.0, 1e-5  # ratio of residuals to what is stated; below the second there are no errors at all
-WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model
+ANOTHER_UNIT, NO_ERRORS = (
+    100.0,
+    1e-5,
+)  # ratio of residuals to what is stated; below the second there are no errors at all
+WEAK_LINK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model
 
 
 def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -> Iterator[Note]:
@@ -37,7 +40,7 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
     for link in range(shared.count):
         names = strip.models[link : link + 2]
         photo = strip.photos[link + 1]
-        if far[link] > WEAK:
+        if far[link] > WEAK_LINK:
             why = "" if center[link] else f"; the perspective centre of photo {photo} is missing in one of them"
             text = (
                 f"strip {strip.id}: models {names[0]} and {names[1]} are linked weakly: the far end of the second is "
@@ -85,7 +88,7 @@ def _unit_notes(strip: ModelStrip, formed: FormedModels) -> Iterator[Note]:
     solved = formed.links.solved
     redundancy = int(solved.redundancy.sum())
     ratio = float(np.sqrt(solved.squares.sum() / redundancy)) if redundancy else 1.0
-    if ratio > ANOTHER_UNIT or NOTHING < ratio < 1 / ANOTHER_UNIT:
+    if ratio > ANOTHER_UNIT or NO_ERRORS < ratio < 1 / ANOTHER_UNIT:
         text = (
             f"strip {strip.id}: the misfits between the models are {ratio:.3g} times their stated standard deviations: "
             "are these in another unit?"

@@ -20,7 +20,7 @@ from photostrip.planning.model.element_errors import influence, measured_covaria
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
 from photostrip.triangulation.relative_orientation import six_points
 
-TERMS = ("E0", "A", "B", "C", "D")
+DEFORMATION_TERMS = ("E0", "A", "B", "C", "D")
 LEAST_POINTS = 5
 LEAST_REDUNDANCY = 3  # below it a standard deviation from the residuals is mostly luck
 RANK_TOLERANCE = 5e-3  # of the singular values of the scaled columns: below it x² is as good as a multiple of x
@@ -195,7 +195,7 @@ def fit_paraboloid(xy: ArrayLike, residuals: ArrayLike, sigmas: ArrayLike) -> Pa
     found, *_ = np.linalg.lstsq(rows / size, height / stated, rcond=None)
     inverse = np.linalg.inv((rows / size).T @ (rows / size)) / np.outer(size, size)
     left = height / stated - rows @ (found / size)
-    redundancy = len(height) - len(TERMS)
+    redundancy = len(height) - len(DEFORMATION_TERMS)
     sigma0 = float(np.sqrt(left @ left / redundancy)) if redundancy else float("nan")
     scale = sigma0 if redundancy >= LEAST_REDUNDANCY else 1.0
     return Paraboloid(

@@ -30,7 +30,7 @@ from photostrip.triangulation.polynomial import terms as polynomial_terms
 SIMILARITY, COVARIANCE, BUNDLE = "similarity", "covariance", "bundle"
 DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}
 METHODS = (SIMILARITY, *DEGREES, COVARIANCE, BUNDLE)
-TINY = 1e-9  # redundancy number of a control coordinate that nothing checks
+NO_REDUNDANCY = 1e-9  # redundancy number of a control coordinate that nothing checks
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     detectable = np.full((len(numbers), 3), np.nan)
     free = 1 - share
     with np.errstate(divide="ignore", invalid="ignore"):
-        size = np.where(free > TINY, DETECTABLE * np.sqrt(np.maximum(residual, 0.0)) / free, np.inf)
+        size = np.where(free > NO_REDUNDANCY, DETECTABLE * np.sqrt(np.maximum(residual, 0.0)) / free, np.inf)
     detectable[found.point, found.axis] = size
     return Accuracy(
         method=method,
@@ -178,7 +178,7 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     rows = np.flatnonzero(wanted.kind == conditions.CONTROL)
     redundant = cofactors[rows] * wanted.noise[rows]
     with np.errstate(divide="ignore", invalid="ignore"):
-        size = np.where(redundant > TINY, DETECTABLE / np.sqrt(cofactors[rows]), np.inf)
+        size = np.where(redundant > NO_REDUNDANCY, DETECTABLE / np.sqrt(cofactors[rows]), np.inf)
     detectable = np.full((len(numbers), 3), np.nan)
     source = wanted.source[rows]
     detectable[found.point[source], found.axis[source]] = size
@@ -199,7 +199,7 @@ def _bundle(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], c
     given = np.where(control.use, control.sigma, np.nan)
     redundant = np.diagonal(found.control_residuals, axis1=1, axis2=2) / given**2
     with np.errstate(divide="ignore", invalid="ignore"):
-        detectable = np.where(redundant > TINY, DETECTABLE * given / np.sqrt(redundant), np.inf)
+        detectable = np.where(redundant > NO_REDUNDANCY, DETECTABLE * given / np.sqrt(redundant), np.inf)
     return Accuracy(
         method=BUNDLE,
         used=BUNDLE,

@@ -21,7 +21,7 @@ SHORT = 20  # photos; in longer strips only edges and middle are tried
 EDGES_AND_MIDDLE = 3
 DECIMALS = 9  # of the score: strips are symmetric, and of equal places the first is taken
 TIE = 1e-3  # weight of the smaller of plan and height
-FARTHEST = 3  # photos that a point is moved by in one step
+MOST_PHOTOS_MOVED = 3  # photos that a point is moved by in one step
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def _exchanged(search: _Search, chosen: frozenset[Spot], free: list[Spot]) -> fr
         helped = False
         for spot in _in_order(chosen):
             rest = chosen - {spot}
-            near = [each for each in free if each not in rest and abs(each.photo - spot.photo) <= FARTHEST]
+            near = [each for each in free if each not in rest and abs(each.photo - spot.photo) <= MOST_PHOTOS_MOVED]
             best = min((rest | {other} for other in near), key=search.score)
             if search.score(best) < search.score(chosen) * (1 - 1e-9):
                 chosen, helped = best, True

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.numbers import SMALLEST, NotANumber, shown
+from photostrip.formats.text.numbers import SMALLEST_LENGTH, NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.tables import CONTROL_CHARACTER
 from photostrip.frozen import NamedTuple
@@ -172,8 +172,8 @@ def quoted(words: tuple[str, ...]) -> str:
 
 
 _read_number = number_between("a number")
-_read_not_negative = number_between("a number from 0 on", least=-SMALLEST)
-_read_positive = number_between("a number larger than 0", least=SMALLEST)
+_read_not_negative = number_between("a number from 0 on", least=-SMALLEST_LENGTH)
+_read_positive = number_between("a number larger than 0", least=SMALLEST_LENGTH)
 _read_fraction = number_between("a number between 0 and 1", least=0.0, most=1.0)
 _ANY = {"type": ["string", "number", "boolean", "null"]}  # whatever an id looks like, it is read as text
 _NUMBER = {"type": "number"}

@@ -23,7 +23,7 @@ COLUMNS = (
     number("plan", "rms_plan_m", 3, "m"),
     number("height", "rms_height_m", 3, "m"),
 )
-ROWS = 60  # projects that are shown; more stand in summary.csv
+MOST_ROWS = 60  # projects that are shown; more stand in summary.csv
 MESSAGES = 3  # of one project that are shown
 # How bad each status is, and the style in which it is shown.
 ORDER = (
@@ -60,7 +60,7 @@ def batch_page_sections(outcomes: Sequence[Document]) -> list[Section]:
     ]
     worst = [each for each in _worst_first(outcomes) if each["messages"]]
     if worst:
-        found.append(Section("The worst things", tuple(_messages(worst[:ROWS], everything=False))))
+        found.append(Section("The worst things", tuple(_messages(worst[:MOST_ROWS], everything=False))))
     return found
 
 
@@ -70,7 +70,7 @@ def _worst_first(outcomes: Sequence[Document]) -> list[Document]:
 
 def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
     """Return the table of the projects; of too many, the worst."""
-    shown = list(outcomes) if everything or len(outcomes) <= ROWS else _worst_first(outcomes)[:ROWS]
+    shown = list(outcomes) if everything or len(outcomes) <= MOST_ROWS else _worst_first(outcomes)[:MOST_ROWS]
     missing = len(outcomes) - len(shown)
     note = (
         f"{counted(missing, 'more project')} not shown, none of them worse: see --verbose or summary.csv"
@@ -81,7 +81,7 @@ def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
 
 
 def _messages(wrong: Sequence[Document], *, everything: bool) -> list[Words]:
-    shown = wrong if everything else wrong[:ROWS]
+    shown = wrong if everything else wrong[:MOST_ROWS]
     found = []
     for each in shown:
         messages = each["messages"] if everything else each["messages"][:MESSAGES]

@@ -11,7 +11,7 @@ from photostrip.report.page.messages import EMPTY
 from photostrip.report.page.numbers import short, unit
 
 ALONE = {"missing": "there is a baseline and no result", "new": "there is a result and no baseline"}
-MOST = 50  # annotations of one comparison; a server shows no more
+MOST_ANNOTATIONS = 50  # annotations of one comparison; a server shows no more
 
 
 def compare_findings(document: Document, lines_of: Callable[[str], Callable[[str, str], int]]) -> list[Document]:
@@ -30,10 +30,10 @@ def compare_findings(document: Document, lines_of: Callable[[str], Callable[[str
         for key, why in ALONE.items()
         for folder in document.get(key, ())
     ]
-    if len(found) <= MOST:
+    if len(found) <= MOST_ANNOTATIONS:
         return found
-    rest = f"and {len(found) - MOST} more differences; photostrip compare --verbose lists them"
-    return [*found[:MOST], _finding(document, 0, rest)]
+    rest = f"and {len(found) - MOST_ANNOTATIONS} more differences; photostrip compare --verbose lists them"
+    return [*found[:MOST_ANNOTATIONS], _finding(document, 0, rest)]
 
 
 def _findings(document: Document, line_of: Callable[[str, str], int]) -> Iterator[Document]:

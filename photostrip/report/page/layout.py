@@ -13,7 +13,7 @@ from photostrip.visible import visible
 
 Plain = Callable[[str], str]
 
-NARROWEST, WIDEST, USUAL = 60, 200, 100
+NARROWEST, WIDEST_PAGE, USUAL = 60, 200, 100
 GAP = "  "
 LONGEST_LABEL = 28
 SHORTEST_WORD = 8  # cells that a column of words keeps
@@ -41,7 +41,7 @@ _ASCII = str.maketrans(ASCII)
 
 def clamp(width: int) -> int:
     """Bring a width between the narrowest and the widest page."""
-    return min(max(width, NARROWEST), WIDEST)
+    return min(max(width, NARROWEST), WIDEST_PAGE)
 
 
 def lay_out(title: str, sections: Iterable[Section], width: int, *, ascii_only: bool = False) -> list[Line]:

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 PATIENCE = 1.0  # seconds before anything is shown
-STEP = 0.2  # seconds between two looks
+LOOK_EVERY = 0.2  # seconds between two looks
 WIPE = "\r\x1b[2K"
-TURNS = "|/-\\"
+WHEEL = "|/-\\"
 
 
 class Progress:
@@ -42,14 +42,14 @@ class Progress:
 
     def line(self, seconds: float, width: int) -> str:
         """Return the line after some seconds, cut to a width."""
-        turn = TURNS[int(seconds / STEP) % len(TURNS)]
+        turn = WHEEL[int(seconds / LOOK_EVERY) % len(WHEEL)]
         count = f" {self.done} of {self.total}" if self.total else ""
         head, tail = f"{turn}{count} ", f" {seconds:.0f} s"
         return head + cut(visible(self.text), max(width - cells(head + tail) - 1, 0), "...") + tail
 
     def run(self) -> None:
         """Show the line again and again until the work is done."""
-        while not self._stop.wait(STEP):
+        while not self._stop.wait(LOOK_EVERY):
             seconds = time.monotonic() - self._begin
             if seconds >= PATIENCE:
                 self._shown = True
@@ -97,7 +97,7 @@ def progress(stream: TextIO, total: int = 0, *, quiet: bool = False) -> Iterator
         line.stop(worker)
 
 
-ROWS = 16  # processes shown in the table of a batch
+PROCESS_ROWS = 16  # processes shown in the table of a batch
 BAR = 30  # characters
 
 
@@ -174,10 +174,10 @@ class BatchTable:
         page.title, page.title_justify, page.title_style = self.head(now - self._begin), "left", ""
         page.add_column(justify="right")
         page.add_column(no_wrap=True, overflow="ellipsis")
-        for project, begin in running[:ROWS]:
+        for project, begin in running[:PROCESS_ROWS]:
             page.add_row(clock(now - begin), visible(project))
-        if len(running) > ROWS:
-            page.add_row("", f"and {len(running) - ROWS} more")
+        if len(running) > PROCESS_ROWS:
+            page.add_row("", f"and {len(running) - PROCESS_ROWS} more")
         return page
 
 

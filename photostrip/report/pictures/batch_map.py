@@ -12,7 +12,7 @@ from photostrip.report.pictures.ground.sheet import bars, ids, sheet_of
 
 MARGIN = 60.0
 NAMED = 40  # projects whose names stand in the description
-AHEAD = 18.0  # on the picture
+ARROW_LENGTH = 18.0  # on the picture
 SHAPES = {"good": "dot", "unverified": "square", "look": "diamond", "failed": "triangle"}
 
 
@@ -58,7 +58,7 @@ def _map(number: int, projects: Sequence[Document]) -> svg.Picture:
 
 def _ahead(start: svg.Point, end: svg.Point) -> svg.Point:
     """Return where a strip goes from its first photo: its name stands elsewhere."""
-    share = AHEAD / max(dist(start, end), AHEAD)
+    share = ARROW_LENGTH / max(dist(start, end), ARROW_LENGTH)
     return start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])
 
 

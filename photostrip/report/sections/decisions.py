@@ -12,7 +12,7 @@ from photostrip.report.sections.strip import elsewhere
 
 WEIGHED = ("polynomial", "covariance")
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
-CLOSE = 0.10  # methods that differ by less are said to agree
+AGREEING = 0.10  # methods that differ by less are said to agree
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
 
 
@@ -82,7 +82,7 @@ def _why(block: Document) -> str:
     if block["contradicted"]:
         return "because left-out control contradicts the standard deviations of the covariance"
     if block["taken"] == "polynomial":
-        return f"which the covariance of the strip betters by less than {100 * CLOSE:.0f} %"
+        return f"which the covariance of the strip betters by less than {100 * AGREEING:.0f} %"
     return f"which betters the polynomial by {fixed(100 * (1 - block['predicted']['ratio']), 0)} %"
 
 

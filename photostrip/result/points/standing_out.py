@@ -11,7 +11,7 @@ from photostrip.statistics import TEST_LEVEL, f_p_value
 LEVEL = TEST_LEVEL / 6
 ODD_POINT = 4.0  # times the rms of the others: points at the ends of a strip are not as good as those within
 ODD_CHANCE = 0.0027  # of a larger difference, from its own standard deviation (3 sigma): few others may be too good
-MOST = 4  # at most one in so many points stands out
+LARGEST_PART = 4  # at most one in so many points stands out
 
 
 def stand_out(size: Floats, coordinates: int, chance: Floats) -> Flags:
@@ -27,7 +27,7 @@ def stand_out(size: Floats, coordinates: int, chance: Floats) -> Flags:
     known = np.flatnonzero(np.isfinite(size))
     order = known[np.argsort(-np.abs(size[known]), kind="stable")]
     count, squares = len(order), size[order] ** 2
-    number = np.arange(1, min(max(1, count // MOST), count - 1) + 1)
+    number = np.arange(1, min(max(1, count // LARGEST_PART), count - 1) + 1)
     rest = np.cumsum(squares[::-1])[::-1][number] / (count - number)
     far = (squares[number - 1] > ODD_POINT**2 * rest) & (chance[order[number - 1]] < ODD_CHANCE)
     for k, mean in zip(number[far].tolist(), rest[far].tolist(), strict=True):

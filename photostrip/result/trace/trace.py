@@ -23,7 +23,7 @@ from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 from photostrip.triangulation.strip_formation.strip import FirstPhoto, base_angles, intersect_models
 
 SCHEMA = 1
-ANGLE, STEP, SQUARES, MILLIMETRES, MODEL, COSINE, METRES = 9, 6, 6, 5, 9, 10, 4  # decimals, digits of steps and squares
+ANGLE, CHANGE, SQUARES, IMAGE, MODEL, COSINE, METRES = 9, 6, 6, 5, 9, 10, 4  # decimals, digits of steps and squares
 RATIO = 10  # digits
 PAIRED = 15  # control points whose 105 distances can still be read
 SYMBOLS = {
@@ -118,7 +118,7 @@ def _round(each: PairRound, factor: float) -> Document:
             "iteration": number,
             "elements": _named(step.elements * factor, ANGLE),
             "[wqq]": significant(step.squares, SQUARES),
-            "d": dict(zip(ELEMENTS, significant(step.step * factor, STEP), strict=True)),
+            "d": dict(zip(ELEMENTS, significant(step.step * factor, CHANGE), strict=True)),
         }
         for number, step in enumerate(each.steps, 1)
     ]
@@ -133,7 +133,7 @@ def _rejected(result: Result, strip: StripResult, number: int) -> list[Document]
             "test": each.test,
             "value": significant(each.value),
             "limit": significant(each.limit),
-            "q": rounded(each.worst, MILLIMETRES),
+            "q": rounded(each.worst, IMAGE),
             "readmitted": bool(each.readmitted),
         }
         for each in strip.of_photos.rejections
@@ -149,11 +149,11 @@ def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
     pairs = orientation.pairs.take(np.array([number]))
     left = FirstPhoto(formed.rotations[number], formed.first.base)
     model, _ = intersect_models(orientation.take(np.array([number])), left, left_ray=formed.left_ray)
-    image = rounded(np.column_stack([pairs.left, pairs.right]).T, MILLIMETRES)
+    image = rounded(np.column_stack([pairs.left, pairs.right]).T, IMAGE)
     columns = {
         "point": [ids[point] for point in orientation.point[rows]],
         **dict(zip(("x1", "y1", "x2", "y2"), image, strict=True)),
-        "q": rounded(orientation.parallax[rows], MILLIMETRES),
+        "q": rounded(orientation.parallax[rows], IMAGE),
         "N": rounded(model.ray_factor * left.base, MODEL),
         **dict(zip("XYZ", rounded(formed.model_xyz[rows].T, MODEL), strict=True)),
         "used": (pairs.weight > 0).tolist(),
@@ -266,9 +266,9 @@ def _similarity_step(number: int, step: SimilarityStep, factor: float) -> Docume
         "iteration": number,
         "[wvv]": significant(step.squares, SQUARES),
         **_similarity(step.similarity, factor),
-        "d_shift": significant(step.step[:3], STEP),
-        "d_rotation": significant(step.step[3:6], STEP),
-        "d_scale": significant(step.step[6], STEP),
+        "d_shift": significant(step.step[:3], CHANGE),
+        "d_rotation": significant(step.step[3:6], CHANGE),
+        "d_scale": significant(step.step[6], CHANGE),
     }
 
 

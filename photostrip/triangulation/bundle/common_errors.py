@@ -34,7 +34,7 @@ ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group, or every camera, have one of their own
 LEAST_SHARE = 1e-6  # of the weight of a list that other observations leave to its shift
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
-UP = 2
+UP_AXIS = 2
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def taken_up(problem: BundleProblem, error: CommonError) -> BundleProblem:
     positions, cameras = problem.positions, problem.cameras
     if error.kind == LIST:
         off = np.abs(error.shift) > SHOWN_SIGMAS * np.array(error.sigma)
-        outside = (problem.control.frame == error.number)[:, None] & (off[:UP].any() | (np.arange(3) == UP))
+        outside = (problem.control.frame == error.number)[:, None] & (off[:UP_AXIS].any() | (np.arange(3) == UP_AXIS))
         control = replace(problem.control, sigma=np.where(outside, np.inf, problem.control.sigma))
         return replace(problem, control=control)
     if error.kind == DISTANCE:

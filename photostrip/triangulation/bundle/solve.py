@@ -41,7 +41,7 @@ MOST_STEPS = 30
 # what the steps after the last one may still move, in standard deviations over all parameters together, estimated by
 # how much shorter the last step was than the one before it
 CONVERGED = 1e-6
-ROUNDING = 1e-9  # part of the sum of squares by which it may seem to grow at the minimum
+SQUARES_ROUNDING = 1e-9  # part of the sum of squares by which it may seem to grow at the minimum
 # part of the sum of squares by which it falls in a step that is the last of a rough solution: what is left then are
 # bends of a whole long strip, which no ray feels
 ROUGH = 1e-3
@@ -80,7 +80,7 @@ def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> tuple[Par
         if damping == 0.0 and _still_to_come(steps) < CONVERGED:
             return moved, tuple(steps)
         found = reduce(prepared, moved)
-        if found.chi_square <= best.chi_square * (1.0 + ROUNDING):
+        if found.chi_square <= best.chi_square * (1.0 + SQUARES_ROUNDING):
             if rough and found.chi_square > best.chi_square * (1.0 - ROUGH):
                 return moved, tuple(steps)
             state, best = moved, found

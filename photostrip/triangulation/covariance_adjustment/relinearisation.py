@@ -21,7 +21,7 @@ from photostrip.frozen import replace
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.covariance_adjustment.system import System
 from photostrip.triangulation.error_propagation.covariances import by_images
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, y_parallaxes
@@ -45,11 +45,11 @@ def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Float
     """
     points = errors.images
     ends = np.searchsorted(points.photo, np.arange(errors.models + 2)).tolist()
-    components = np.zeros((REACH + errors.models + rows.by_component.shape[1], COMPONENTS))  # from model -REACH on
+    components = np.zeros((SHARING + errors.models + rows.by_component.shape[1], COMPONENTS))  # from model -SHARING on
     for photo, (start, stop) in enumerate(pairwise(ends)):
         moved = images[start:stop].ravel() @ points.components[start:stop].reshape(-1, SPAN * COMPONENTS)
         components[photo : photo + SPAN] += moved.reshape(SPAN, COMPONENTS)
-    components = components[REACH:]
+    components = components[SHARING:]
     result = np.zeros(rows.by_similarity.shape[:2])
     for slot in range(rows.by_component.shape[1]):
         result += (rows.by_component[:, slot] @ components[rows.first + slot, :, None])[:, :, 0]

@@ -18,7 +18,7 @@ from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
 from photostrip.triangulation.covariance_adjustment.conditions import Conditions
 from photostrip.triangulation.error_propagation.covariances import NearImages
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, ErrorRows, ranges
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, ErrorRows, ranges
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
@@ -45,10 +45,10 @@ class PaddedRows:
         rank = rank_in_model(first, len(models))
         places = max(int(rank.max(initial=0)) + 1, 1) * size
         by_component = np.zeros((len(models), slots, COMPONENTS, places))
-        images = np.zeros((len(models), slots + 2 * REACH, COMPONENTS, places))
+        images = np.zeros((len(models), slots + 2 * SHARING, COMPONENTS, places))
         at = rank[:, None] * size + np.arange(size)
         by_component[first[:, None], :have, :, at] = rows.by_component.transpose(0, 2, 1, 3)
-        images[first[:, None], : have + 2 * REACH, :, at] = with_components
+        images[first[:, None], : have + 2 * SHARING, :, at] = with_components
         whole = images + _with_components(errors.component_covariances, by_component, models)
         return cls(begin=models.start, by_component=by_component, images=images, whole=whole)
 
@@ -56,15 +56,15 @@ class PaddedRows:
 def _with_components(covariances: Floats, by_component: Floats, models: range) -> Floats:
     """Covariances of sums of components with the components from two models before to two after."""
     _, slots, _, places = by_component.shape
-    result = np.zeros((len(models), slots + 2 * REACH, COMPONENTS, places))
+    result = np.zeros((len(models), slots + 2 * SHARING, COMPONENTS, places))
     for slot in range(slots):
-        for apart in range(-REACH, REACH + 1):
+        for apart in range(-SHARING, SHARING + 1):
             low = max(models.start, -apart - slot)
             high = max(min(models.stop, len(covariances) - slot - max(apart, 0)), low)
             mixed = covariances[low + slot + min(apart, 0) : high + slot + min(apart, 0), abs(apart)]
             mixed = mixed.transpose(0, 2, 1) if apart >= 0 else mixed
             row = slice(low - models.start, high - models.start)
-            result[row, slot + apart + REACH] += mixed @ by_component[row, slot]
+            result[row, slot + apart + SHARING] += mixed @ by_component[row, slot]
     return result
 
 
@@ -77,8 +77,8 @@ def products(a: PaddedRows, b: PaddedRows, models: range, apart: int) -> Floats:
     of_b = slice(models.start + apart - b.begin, models.stop + apart - b.begin)
     total = np.zeros((len(models), a.by_component.shape[3], b.by_component.shape[3]))
     for first, second, low in (
-        (a.whole[of_a], b.by_component[of_b], apart + REACH),
-        (a.by_component[of_a], b.images[of_b], apart - REACH),
+        (a.whole[of_a], b.by_component[of_b], apart + SHARING),
+        (a.by_component[of_a], b.images[of_b], apart - SHARING),
     ):
         skip_first, skip_second = max(low, 0), max(-low, 0)
         length = min(first.shape[1] - skip_first, second.shape[1] - skip_second)
@@ -211,7 +211,7 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     ``factor`` is the variance factor of the image coordinates.
     """
     rows = wanted.rows
-    slots = max(rows.by_component.shape[1], errors.points.by_component.shape[1], REACH)
+    slots = max(rows.by_component.shape[1], errors.points.by_component.shape[1], SHARING)
     layout = SystemLayout.of(rows.first, errors.models, min(slots, errors.models))
     padded = PaddedRows.of(errors, rows, NearImages.of(errors, rows).with_components, slots, range(errors.models))
     shape = (layout.blocks, layout.height, layout.height)

@@ -19,13 +19,13 @@ from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows, add_rows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows, add_rows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
-LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
+SIGMA_LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
 ENTRIES = 9000  # coefficients of image points worked on at a time: what fits into the processor's cache
 
 
@@ -39,7 +39,7 @@ def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
     squares = float((orientation.pairs.weight * orientation.parallax**2)[orientation.used].sum()) / (2 * sigma**2)
     if redundancy < 1:
         return 1.0, A_PRIORI
-    low, high = (chi2_quantile(p, redundancy) for p in (LEVEL / 2, 1 - LEVEL / 2))
+    low, high = (chi2_quantile(p, redundancy) for p in (SIGMA_LEVEL / 2, 1 - SIGMA_LEVEL / 2))
     return (1.0, A_PRIORI) if low <= squares <= high else (squares / redundancy, A_POSTERIORI)
 
 
@@ -64,7 +64,7 @@ class ParameterCovariances:
 def none_along(errors: StripErrors) -> SimilarityCovariances:
     """Take the similarities of the models as known."""
     zero = np.zeros((errors.models + 1, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
-    return SimilarityCovariances(zero, np.zeros((errors.models + 1, REACH, SIMILARITY_PARAMETERS, COMPONENTS)))
+    return SimilarityCovariances(zero, np.zeros((errors.models + 1, SHARING, SIMILARITY_PARAMETERS, COMPONENTS)))
 
 
 def along_strip(errors: StripErrors) -> SimilarityCovariances:
@@ -138,7 +138,7 @@ def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Sums:
     add_rows(by_image, entry, rows.by_image[:, 0, :, None] * operator.T[rows.item][:, None, :])
     of_images = np.zeros_like(by_component)
     for slot in range(SPAN):
-        model = images.photo[image] - REACH + slot
+        model = images.photo[image] - SHARING + slot
         inside = np.flatnonzero((model >= 0) & (model < errors.models))
         values = images.components[image[inside], :, slot].transpose(0, 2, 1) @ by_image[inside]
         add_rows(of_images, model[inside], values)
@@ -168,7 +168,7 @@ def _summed_components(errors: StripErrors, rows: ErrorRows, weights: Floats) ->
 def _by_photo(errors: StripErrors, by_component: Floats) -> Floats:
     """Coefficients of all image coordinates in sums of components, shape (k, 2, t)."""
     images, count = errors.images, by_component.shape[2]
-    none = np.zeros((REACH, *by_component.shape[1:]))
+    none = np.zeros((SHARING, *by_component.shape[1:]))
     padded = np.concatenate([none, by_component, none[:1]])
     around = np.concatenate([padded[slot : slot + errors.models + 1] for slot in range(SPAN)], axis=1)
     result = np.empty((len(images.row), 2, count))
@@ -237,14 +237,14 @@ class NearImages(NamedTuple):
         image[rows.item, photo, place] = rows.image
         by_image = np.zeros((n, photos, most, 2, size))
         by_image[rows.item, photo, place] = rows.by_image.transpose(0, 2, 1)
-        with_components = np.zeros((n, size, (photos + REACH + 1) * COMPONENTS))
+        with_components = np.zeros((n, size, (photos + SHARING + 1) * COMPONENTS))
         for slot in range(photos):
             components = errors.images.components[image[:, slot]].reshape(n, 2 * most, SPAN * COMPONENTS)
             products = by_image[:, slot].reshape(n, 2 * most, size).transpose(0, 2, 1) @ components
             with_components[:, :, slot * COMPONENTS : (slot + SPAN) * COMPONENTS] += products
         return cls(
             by_image.reshape(n, 2 * photos * most, size).transpose(0, 2, 1),
-            with_components.reshape(n, size, photos + REACH + 1, COMPONENTS),
+            with_components.reshape(n, size, photos + SHARING + 1, COMPONENTS),
         )
 
 
@@ -267,9 +267,9 @@ def _halves(
     models = distinct(rows.first)
     by = by_model(rows)
     half = _by_model(by, rows.first, covariances_of_models(errors, along, models, slots) / 2)
-    before = near.with_components[:, :, :REACH].reshape(n, size, -1)
+    before = near.with_components[:, :, :SHARING].reshape(n, size, -1)
     half[:, :, :SIMILARITY_PARAMETERS] += _by_model(before, rows.first, _stacked(steps_before(errors, models)))
-    half[:, :, SIMILARITY_PARAMETERS:] += near.with_components[:, :, REACH : REACH + slots].reshape(n, size, -1)
+    half[:, :, SIMILARITY_PARAMETERS:] += near.with_components[:, :, SHARING : SHARING + slots].reshape(n, size, -1)
     return by, half
 
 
@@ -290,9 +290,9 @@ def covariances_of_models(
     of_similarity = result[:, :SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS:]
     with_similarity = result[:, SIMILARITY_PARAMETERS:, :SIMILARITY_PARAMETERS]
     among = result[:, SIMILARITY_PARAMETERS:, SIMILARITY_PARAMETERS:]
-    for slot, part in enumerate(parts[:REACH]):
+    for slot, part in enumerate(parts[:SHARING]):
         of_similarity[:, :, part] = along.with_components[models, slot]
-    for slot, part in enumerate(parts[: min(REACH, slots)]):
+    for slot, part in enumerate(parts[: min(SHARING, slots)]):
         with_similarity[:, part] = along.with_components[models, slot].transpose(0, 2, 1)
     around = around_models(errors.component_covariances, models, 0, slots + ahead)
     for slot, part in enumerate(parts):
@@ -306,7 +306,7 @@ def covariances_of_models(
 
 def steps_before(errors: StripErrors, models: Numbers) -> Floats:
     """Give the steps (m, 2, 6, 7), transposed, of the two models before each."""
-    return around_models(errors.steps.transpose(0, 2, 1), models, REACH, 0)
+    return around_models(errors.steps.transpose(0, 2, 1), models, SHARING, 0)
 
 
 def around_models(of_models: Floats, models: Numbers, before: int, after: int) -> Floats:
@@ -325,7 +325,7 @@ def with_parameters(rows: ErrorRows, near: NearImages, fit: ParameterCovariances
         [fit.similarities[models], _stacked(around_models(sums.with_components, models, 0, slots))], axis=1
     )
     result = _by_model(by_model(rows), rows.first, matrices)
-    around = _stacked(around_models(sums.by_component, models, REACH, slots + REACH))
+    around = _stacked(around_models(sums.by_component, models, SHARING, slots + SHARING))
     result += _by_model(near.with_components.reshape(n, size, -1), rows.first, around)
     of_fit = np.searchsorted(sums.image, rows.image)
     entry = np.flatnonzero(sums.image[np.minimum(of_fit, len(sums.image) - 1)] == rows.image)

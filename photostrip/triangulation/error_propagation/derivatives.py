@@ -19,8 +19,10 @@ from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 COMPONENTS = 6  # of the error of a model: five elements of its pair, logarithm of the scale that it hands on
 ELEMENTS, SCALE = slice(0, 5), 5
-REACH = 2  # models between which error components share image coordinates: pairs share a photo, a scale transfer three
-SPAN = REACH + 1  # photos on which the image coordinates of an error component lie
+SHARING = (
+    2  # models between which error components share image coordinates: pairs share a photo, a scale transfer three
+)
+SPAN = SHARING + 1  # photos on which the image coordinates of an error component lie
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from photostrip.triangulation.error_propagation.covariances import (
     steps_before,
     with_parameters,
 )
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, ErrorRows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
@@ -35,18 +35,18 @@ def joint_covariance(errors: StripErrors, rows: ErrorRows, along: SimilarityCova
     order = np.argsort(rows.first, kind="stable")
     rows = rows.take(order)
     count, slots, _, _ = rows.by_component.shape
-    similar, by_component, reach = rows.by_similarity[:, 0], rows.by_component[:, :, 0], slots + REACH
+    similar, by_component, reach = rows.by_similarity[:, 0], rows.by_component[:, :, 0], slots + SHARING
     images = NearImages.of(errors, rows).with_components[:, 0]
     models, place = np.unique(rows.first, return_inverse=True)
     before = steps_before(errors, models)[place]
     # of each row, the components from two models before its first on: its coefficients, and its covariances from that
     # model on with them
     coefficients = np.concatenate([np.einsum("nkci,ni->nkc", before, similar), by_component], axis=1)
-    mixed = by_model(rows) @ covariances_of_models(errors, along, models, slots, REACH)[place]
-    ahead = mixed[:, 0, SIMILARITY_PARAMETERS:].reshape(count, reach, COMPONENTS) + images[:, REACH:]
+    mixed = by_model(rows) @ covariances_of_models(errors, along, models, slots, SHARING)[place]
+    ahead = mixed[:, 0, SIMILARITY_PARAMETERS:].reshape(count, reach, COMPONENTS) + images[:, SHARING:]
     # its covariances with the similarities of its first model and of those that follow, until nothing changes
     with_similarity = np.empty((count, reach + 1, SIMILARITY_PARAMETERS))
-    of_first = np.einsum("nkci,nkc->ni", before, images[:, :REACH])
+    of_first = np.einsum("nkci,nkc->ni", before, images[:, :SHARING])
     with_similarity[:, 0] = mixed[:, 0, :SIMILARITY_PARAMETERS] + of_first
     with_similarity[:, 1:] = np.einsum("nkic,nkc->nki", around_models(errors.steps, models, 0, reach)[place], ahead)
     with_similarity = np.cumsum(with_similarity, axis=1)

@@ -17,7 +17,7 @@ from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.absolute_orientation import Targets
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 
-LARGEST = 100  # control coordinates of a section: what one adjustment takes
+LARGEST_SECTION = 100  # control coordinates of a section: what one adjustment takes
 
 
 class ControlRay(NamedTuple):
@@ -54,7 +54,7 @@ class StripAtControl:
         order = np.argsort(self.placed[:, 0], kind="stable")
         before = np.cumsum(self.control.use[order].sum(axis=1)) - 1
         total = len(self.coordinates.point)
-        part = before * -(-total // LARGEST) // max(total, 1)
+        part = before * -(-total // LARGEST_SECTION) // max(total, 1)
         parts = [np.sort(order[part == number]) for number in distinct(part)]
         return [(rows, self._section(rows)) for rows in parts] if len(parts) > 1 else [(np.sort(order), self)]
 

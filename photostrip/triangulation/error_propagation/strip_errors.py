@@ -25,8 +25,8 @@ from photostrip.triangulation.error_propagation import pair_errors
 from photostrip.triangulation.error_propagation.derivatives import (
     COMPONENTS,
     ELEMENTS,
-    REACH,
     SCALE,
+    SHARING,
     SPAN,
     ErrorRows,
     ImagePoints,
@@ -187,7 +187,7 @@ def _component_covariances(images: ImagePoints, models: int) -> Floats:
     result = np.zeros((models, SPAN, COMPONENTS, COMPONENTS))
     for apart in range(SPAN):
         for slot in range(SPAN - apart):  # the earlier model is photo - 2 + slot
-            of_photo = gram[REACH - slot :, slot, :, slot + apart]
+            of_photo = gram[SHARING - slot :, slot, :, slot + apart]
             result[: len(of_photo), apart] += of_photo[:models]
     return result
 

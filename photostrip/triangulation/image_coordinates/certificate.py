@@ -24,7 +24,7 @@ PLACES = {
     if (x, y) != (0.0, 0.0)
 }
 POOR_FIT = 0.03  # mm; distances were measured to a hundredth
-LOOSE = 1e-4  # relative size of a singular value below which the figure can change without changing a distance
+LOOSE_FIGURE = 1e-4  # relative size of a singular value below which the figure can change without changing a distance
 CONVERGED = 1e-10  # mm
 ITERATIONS = 50
 
@@ -111,12 +111,12 @@ def _adjusted(xy: Floats, ends: Numbers, given: Floats) -> Floats:
     for _ in range(ITERATIONS):
         lengths, design = _lengths(xy, ends)
         values = np.linalg.svd(design, compute_uv=False)
-        rank = int((values > LOOSE * values[:1]).sum())
+        rank = int((values > LOOSE_FIGURE * values[:1]).sum())
         if rank < unknowns:
             message = f"{rank} independent distances do not fix a figure of {len(xy)} marks; it takes {unknowns}"
             fix = "give a diagonal, or distances of the loose mark to two others"
             raise InputError(Fault(message, code="certificate", key="fiducial_distances", fix=fix))
-        step = np.linalg.lstsq(design, given - lengths, rcond=LOOSE)[0]
+        step = np.linalg.lstsq(design, given - lengths, rcond=LOOSE_FIGURE)[0]
         xy = xy + step.reshape(-1, 2)
         if np.abs(step).max() <= CONVERGED:
             return xy

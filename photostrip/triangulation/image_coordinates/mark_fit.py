@@ -19,7 +19,7 @@ from photostrip.triangulation.image_coordinates.film_deformation import Deformat
 
 SHAPE = ("scale_x", "scale_y", "rotation", "shear")
 BY_PHOTO = ("photo_ids", "transforms", "marks", "residuals", "sigma0", "redundancy", *SHAPE, "mirrored")
-WEAK = 0.01  # strength of a transformation below which marks count as lying on one line
+LEAST_STRENGTH = 0.01  # strength of a transformation below which marks count as lying on one line
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ def _kinds(marks: Marks, kind: str) -> tuple[NDArray[np.str_], list[Fault]]:
 
 
 def _weak(kind: str, marks: Marks) -> Flags:
-    return plane.strength(kind, marks.measured, marks.weights) < WEAK
+    return plane.strength(kind, marks.measured, marks.weights) < LEAST_STRENGTH
 
 
 def _described(marks: Marks, kinds: tuple[str, ...], photo_from_measured: plane.PlaneTransform) -> InteriorOrientation:

@@ -8,7 +8,7 @@ from photostrip.errors import Fault, InputError
 
 # Standard atmosphere, ICAO Doc 7488 (ISO 2533): layers to 11 km and above.
 LAPSE = 6.5 / 288.15  # relative fall of temperature per km
-EXPONENT = 5.25588  # of pressure; one less for density
+PRESSURE_EXPONENT = 5.25588  # of pressure; one less for density
 TROPOPAUSE = 11.0  # km
 STRATOSPHERE_SCALE = 6.341616  # km, height in which the pressure above the tropopause falls to 1/e
 SCALE_HEIGHT = 8.43450  # km, pressure over density and gravity at sea level
@@ -57,5 +57,5 @@ def _require_above(flying_height: float, ground_height: float, what: str) -> Non
 def _pressure(height_km: float) -> float:
     """Pressure of the standard atmosphere over that at sea level; above 20 km little is left to be wrong."""
     if height_km <= TROPOPAUSE:
-        return float((1 - LAPSE * height_km) ** EXPONENT)
+        return float((1 - LAPSE * height_km) ** PRESSURE_EXPONENT)
     return _pressure(TROPOPAUSE) * float(np.exp((TROPOPAUSE - height_km) / STRATOSPHERE_SCALE))

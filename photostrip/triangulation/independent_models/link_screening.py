@@ -23,12 +23,12 @@ from photostrip.triangulation.independent_models.settings import LinkSettings
 
 MEDIAN = 2.366  # of chi-square with three degrees of freedom
 MEDIAN_SPREAD = 1.124  # standard deviation of the ratio of a sample's median to it, times the root of the sample's size
-SURE = 2.6  # standard deviations beyond which the stated precision is contradicted
+SURE_SIGMAS = 2.6  # standard deviations beyond which the stated precision is contradicted
 EQUALLY_GOOD = 9.2  # difference of two test values below which the odds are less than one in a hundred
 LEFT = 4  # common points, centre included, that a link keeps
 REFLECTED = 0.1  # squares of the best similarity of the other hand over those of the best one
 CONSPICUOUS = 36.0  # mean square in units of the stated variance that makes a reflection worth a look
-POWER = 21.5  # non-centrality of chi-square with three degrees of freedom found in 80 % of cases at a level of 0.001
+DETECTED = 21.5  # non-centrality of chi-square with three degrees of freedom found in 80 % of cases at a level of 0.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ def _scatter(tests: PointTests, solved: SolvedLinks) -> float:
     if len(known) < LEFT or independent < LEFT:
         return 1.0
     ratio = median(known) / MEDIAN
-    return ratio if ratio > 1 + SURE * MEDIAN_SPREAD / np.sqrt(independent) else 1.0
+    return ratio if ratio > 1 + SURE_SIGMAS * MEDIAN_SPREAD / np.sqrt(independent) else 1.0
 
 
 def _limits(shared: CommonPoints, used: Flags, alpha: float) -> Floats:
@@ -171,4 +171,4 @@ def detectable(shared: CommonPoints, screened: ScreenedLinks) -> Floats:
     least = np.linalg.eigvalsh((reduced + reduced.transpose(0, 2, 1)) / 2)[:, 0]
     checked = least > linking.HELD * np.trace(weight, axis1=1, axis2=2)
     size = np.where(checked, 1 / np.maximum(least, 1e-300), np.inf)
-    return np.where(screened.used, np.sqrt(POWER * screened.factor * size), np.nan)
+    return np.where(screened.used, np.sqrt(DETECTED * screened.factor * size), np.nan)

@@ -242,7 +242,7 @@ def _carried_without(problem: FitProblem, counted: Numbers, inner: Sequence[Numb
         for drop in polynomial_terms.DROP_ORDER:
             if not chosen or not len(left):
                 break
-            good = _conditions_without(problem, counted, left, chosen) < 1 / polynomial_terms.RANK_LIMIT
+            good = _conditions_without(problem, counted, left, chosen) < 1 / polynomial_terms.LEAST_RATIO
             if good.any() and chosen != terms:
                 return False
             left, chosen = left[~good], polynomial_terms.dropped(chosen, drop)

@@ -24,7 +24,7 @@ LADDER = (
 )
 DROP_ORDER = ("XY", "Y", "X^3", "X^2", "X")
 # smallest over largest singular value of the scaled design; below it the control cannot tell the terms apart
-RANK_LIMIT = 0.02
+LEAST_RATIO = 0.02
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def choose_terms(xyz: Floats, degree: int, sizes: Sizes, *, forced: bool = False
     stations = count_stations(xyz[:, 0], sizes.spacing)
     terms = ladder(stations, len(xyz) if forced else len(xyz) - 1, degree)
     for drop in DROP_ORDER:
-        if not terms or condition(xyz, terms, sizes) < 1 / RANK_LIMIT:
+        if not terms or condition(xyz, terms, sizes) < 1 / LEAST_RATIO:
             break
         terms = dropped(terms, drop)
     return terms

@@ -15,7 +15,7 @@ from photostrip.triangulation.relative_orientation import solution
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.triangulation.robust import TUNING, falling_weights, medians, scales
 
-STEPS = 10  # what follows is least squares
+ROBUST_ITERATIONS = 10  # what follows is least squares
 SETS = 300  # with a third of the points wrong, 13 % of the sets of five are right
 
 
@@ -42,7 +42,7 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats) -> RobustElements:
     sigma: (p,), a-priori standard deviation of a y parallax of weight one, mm; the scale is not smaller.
     """
     elements = start.copy()
-    for _ in range(STEPS):
+    for _ in range(ROBUST_ITERATIONS):
         with np.errstate(all="ignore"):
             q, jacobian = solution.linearised_parallaxes(elements, pairs)
         q = np.where(np.isfinite(q), q, 1e6)

@@ -15,7 +15,7 @@ from photostrip.triangulation.strip_formation.non_neighbours import meeting
 
 ITERATIONS = 12
 CONVERGED = 1e-12  # of the distance of a point from its photos
-PARALLEL = 1e-9  # reciprocal condition of rays that meet nowhere
+PARALLEL_CONDITION = 1e-9  # reciprocal condition of rays that meet nowhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def _solved(normal: Floats, right: Floats) -> tuple[Floats, Flags]:
     size[size == 0.0] = 1.0
     scaled = normal / size[:, :, None] / size[:, None, :]
     values = np.linalg.eigvalsh(scaled)
-    sound = values[:, 0] > PARALLEL
+    sound = values[:, 0] > PARALLEL_CONDITION
     scaled[~sound] = np.eye(3)
     solution = np.linalg.solve(scaled, (right / size)[:, :, None])[:, :, 0] / size
     solution[~sound] = np.nan

@@ -7,7 +7,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats
 from photostrip.frozen import dataclass
 
-PARALLEL = 1e-6  # of the principal distance: a smaller x parallax intersects nothing
+LEAST_X_PARALLAX = 1e-6  # of the principal distance: a smaller x parallax intersects nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ def intersect(base: Floats, left: Floats, right: Floats, focal: float, *, left_r
         n1 = (bx + x2 * bz / focal) / parallax  # eq. 138
         n2 = n1 + bz / focal
         y_left, y_right = n1 * y1, by + n2 * y2
-        sound = (np.abs(parallax) > PARALLEL * focal) & (n1 > 0) & (n2 > 0) & (left[2] < 0) & (right[2] < 0)
+        sound = (np.abs(parallax) > LEAST_X_PARALLAX * focal) & (n1 > 0) & (n2 > 0) & (left[2] < 0) & (right[2] < 0)
         y = y_left if left_ray else (y_left + y_right) / 2
         xyz = np.column_stack([n1 * x1, y, -n1 * focal])
     xyz[~sound] = np.nan

@@ -25,7 +25,7 @@ SCALE_TRANSFERS = ("least_squares", "distances")
 LEFT_RAY = "left"
 INTERSECTIONS = ("mean", LEFT_RAY)
 ALPHA = 0.01  # probability that a strip without gross errors loses a pass point
-FEWEST = 3  # with two ratios nobody can tell which is wrong
+FEWEST_RATIOS = 3  # with two ratios nobody can tell which is wrong
 SMALLEST_SIGMA = 1e-3  # mm, of a y parallax, when the pairs' own residuals have to say it
 
 
@@ -151,7 +151,7 @@ def contradictions(
     junction: (t,), junction of each ratio, ascending.
     """
     value = np.log(ratio)
-    many = (np.bincount(junction, minlength=junctions) >= FEWEST)[junction]
+    many = (np.bincount(junction, minlength=junctions) >= FEWEST_RATIOS)[junction]
     off = np.abs(value - medians(value, weight, junction, junctions)[junction])
     counts = (many & (off > 0)).astype(float)  # the median itself says nothing
     scale = float(scales(off / size, counts, np.zeros(len(off), np.intp), 1)[0])

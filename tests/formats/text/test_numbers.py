@@ -8,14 +8,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from photostrip.formats.text.numbers import LARGEST, NotANumber, number, shown
+from photostrip.formats.text.numbers import LARGEST_NUMBER, NotANumber, number, shown
 from photostrip.formats.text.table_reader import _fast_floats
 from tests.loops import nonempty
 
 
-@given(st.floats(-LARGEST, LARGEST))
+@given(st.floats(-LARGEST_NUMBER, LARGEST_NUMBER))
 @example(-0.0)
-@example(LARGEST)
+@example(LARGEST_NUMBER)
 @example(5e-324)
 def test_every_number_python_writes_is_read_back(value: float) -> None:
     assert number(repr(value)) == value
@@ -95,7 +95,7 @@ def test_a_column_is_converted_at_once_only_if_every_cell_is_a_number(column: li
     assert fast.tolist() == [number(cell) for cell in column]
 
 
-@given(st.lists(st.floats(-LARGEST, LARGEST), min_size=1))
+@given(st.lists(st.floats(-LARGEST_NUMBER, LARGEST_NUMBER), min_size=1))
 def test_a_column_of_numbers_is_converted_at_once(values: list[float]) -> None:
     fast = _fast_floats(tuple(map(repr, values)))
     assert fast is not None

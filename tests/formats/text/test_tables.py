@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from photostrip.formats.measured.observations import OBSERVATIONS, read_measurements
 from photostrip.formats.text import table_reader, table_text
-from photostrip.formats.text.findings import LARGEST_LIST, Findings, suggestion
+from photostrip.formats.text.findings import MOST_FAULTS_KEPT, Findings, suggestion
 from photostrip.formats.text.table_reader import read_table
 from photostrip.notes import counted, listed
 
@@ -168,7 +168,7 @@ def test_a_compressed_table_that_unpacks_without_end_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(table_text, "LARGEST_TABLE", 10_000)
-    monkeypatch.setattr(table_text, "STEP", 1000)
+    monkeypatch.setattr(table_text, "BLOCK_BYTES", 1000)
     packer = zlib.compressobj(wbits=31)
     bomb = packer.compress(b"1," * 1_000_000) + packer.flush()
     assert len(bomb) < 10_000
@@ -191,10 +191,10 @@ def test_what_reads_on_after_a_fault(tmp_path: Path) -> None:
 
 
 def test_long_lists_of_faults_are_cut_and_counted(tmp_path: Path) -> None:
-    path = write(tmp_path / "o.csv", HEADER + "".join(f"1,P{i},x,y\n" for i in range(LARGEST_LIST)))
+    path = write(tmp_path / "o.csv", HEADER + "".join(f"1,P{i},x,y\n" for i in range(MOST_FAULTS_KEPT)))
     told = faults(path)
-    assert len(told) == LARGEST_LIST + 1
-    assert told[-1] == f"o.csv: and {LARGEST_LIST} more faults in this file"
+    assert len(told) == MOST_FAULTS_KEPT + 1
+    assert told[-1] == f"o.csv: and {MOST_FAULTS_KEPT} more faults in this file"
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from photostrip.errors import GeometryError
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.simulation import Control, Flight, Ground, Spec, Terrain
-from photostrip.triangulation.bundle.normal_equations.defects import GROWN, LOOSE
+from photostrip.triangulation.bundle.normal_equations.defects import GROWN, LOOSE_SHARE
 from tests.pipeline.blocks import adjusted, errors, photos_of, positions, simulate
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ def test_over_a_plain_plan_and_heights_of_one_flight_line_leave_its_roll_open(se
 
 def judge(simulation: Simulation, inputs: Inputs) -> None:
     truth = truth_of(simulation, inputs)
-    if truth.radians > LOOSE:
+    if truth.radians > LOOSE_SHARE:
         with pytest.raises(GeometryError, match=r"does not determine|connect it to the ground") as caught:
             adjusted(simulation, inputs)
         assert caught.value.code in {"bundle-rank", "strip-not-tied"}

@@ -129,7 +129,7 @@ def test_centers_may_be_missing() -> None:
 @pytest.mark.parametrize("coordinates", [100, 27])
 def test_a_wrong_control_point_is_named(monkeypatch: pytest.MonkeyPatch, coordinates: int) -> None:
     """In sections, too."""
-    monkeypatch.setattr(strip_at_control, "LARGEST", coordinates)
+    monkeypatch.setattr(strip_at_control, "LARGEST_SECTION", coordinates)
     given = truth(8, 3, 4)
     noise = np.random.default_rng(1).normal(size=(len(given.model), 3))
     whole = inputs(given, given.measured(noise), bands=5)

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from photostrip.pipeline.precision.model_precision import variance_factor
-from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL
+from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, SIGMA_LEVEL
 
 if TYPE_CHECKING:
     from photostrip.triangulation.independent_models.formation import FormedModels
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @pytest.mark.parametrize("redundancy", [1, 2, 30])
 def test_the_stated_precision_counts_until_chi_square_contradicts_it(redundancy: int) -> None:
-    limit = chi2.ppf(1 - LEVEL / 2, redundancy)
+    limit = chi2.ppf(1 - SIGMA_LEVEL / 2, redundancy)
     for squares, factor, basis in (
         (0.999 * limit, 1.0, A_PRIORI),
         (1.001 * limit, 1.001 * limit / redundancy, A_POSTERIORI),

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.report.page.layout import NARROWEST, WIDEST, cells, clamp, cut, lay_out, pad, plain_ascii, wrapped
+from photostrip.report.page.layout import NARROWEST, WIDEST_PAGE, cells, clamp, cut, lay_out, pad, plain_ascii, wrapped
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
 
 WORDS = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=90)
@@ -58,8 +58,8 @@ def test_a_table_gives_way_as_soon_as_it_is_one_cell_too_wide(columns: list[tupl
     def widest(page: int) -> int:
         return max(cells(line.text) for line in lay_out("", [Section("", (table,))], page))
 
-    width = widest(WIDEST)
-    while NARROWEST < width <= WIDEST:
+    width = widest(WIDEST_PAGE)
+    while NARROWEST < width <= WIDEST_PAGE:
         assert widest(width) == width
         width, wider = widest(width - 1), width
         assert width < wider
@@ -90,7 +90,7 @@ def test_cutting_leaves_room_for_the_dots() -> None:
 
 
 def test_widths_have_limits() -> None:
-    assert [clamp(width) for width in (0, 60, 100, 999)] == [NARROWEST, 60, 100, WIDEST]
+    assert [clamp(width) for width in (0, 60, 100, 999)] == [NARROWEST, 60, 100, WIDEST_PAGE]
 
 
 def lines(table: Table, width: int) -> list[str]:

@@ -31,7 +31,7 @@ def test_a_terminal_sees_it_and_it_goes_away(
     monkeypatch: pytest.MonkeyPatch, *, quiet: bool, term: str, shown: bool
 ) -> None:
     monkeypatch.setattr(module, "PATIENCE", 0.0)
-    monkeypatch.setattr(module, "STEP", 0.01)
+    monkeypatch.setattr(module, "LOOK_EVERY", 0.01)
     monkeypatch.setenv("TERM", term)
     stream = Terminal()
     with progress(stream, 3, quiet=quiet) as line:
@@ -44,7 +44,7 @@ def test_a_terminal_sees_it_and_it_goes_away(
 
 
 def test_short_work_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "STEP", 0.01)
+    monkeypatch.setattr(module, "LOOK_EVERY", 0.01)
     monkeypatch.setenv("TERM", "xterm")
     stream = Terminal()
     with progress(stream) as line:
@@ -62,7 +62,7 @@ def test_the_line_never_breaks() -> None:
 
 def test_a_failure_takes_the_line_away(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "PATIENCE", 0.0)
-    monkeypatch.setattr(module, "STEP", 0.01)
+    monkeypatch.setattr(module, "LOOK_EVERY", 0.01)
     monkeypatch.setenv("TERM", "xterm")
     stream = Terminal()
 
@@ -79,7 +79,7 @@ def test_a_failure_takes_the_line_away(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_terminal_that_is_gone_stops_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "PATIENCE", 0.0)
-    monkeypatch.setattr(module, "STEP", 0.01)
+    monkeypatch.setattr(module, "LOOK_EVERY", 0.01)
     monkeypatch.setenv("TERM", "xterm")
     stream = Terminal()
     with progress(stream) as line:

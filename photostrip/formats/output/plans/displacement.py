@@ -8,7 +8,7 @@ from photostrip.notes import Document
 from photostrip.result.numbers import micrometres, rounded, significant
 from photostrip.terrestrial.forecast import PLACES, DisplacementSpec, plan_displacements
 
-SMALL = 6  # decimals of metres: displacements are small
+DECIMALS = 6  # decimals of metres: displacements are small
 
 
 def displacement_document(name: str, spec: DisplacementSpec) -> Document:
@@ -18,9 +18,9 @@ def displacement_document(name: str, spec: DisplacementSpec) -> Document:
     for distance, each in zip(distances, plan_displacements(spec), strict=True):
         row: Document = {"distance_m": distance, "place": each.place}
         for what, values in (("", each.at), ("sigma_", each.sigma), ("found_", each.found)):
-            for axis, value in zip(("x", "y", "z"), rounded(values, SMALL), strict=True):
+            for axis, value in zip(("x", "y", "z"), rounded(values, DECIMALS), strict=True):
                 row[f"{what}{axis}_m"] = value
-        rows.append({**row, "worst_found_m": rounded(each.worst, SMALL)})
+        rows.append({**row, "worst_found_m": rounded(each.worst, DECIMALS)})
     return {
         "kind": "displacement",
         "name": name,

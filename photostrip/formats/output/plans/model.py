@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.notes import Document
 from photostrip.planning.model.closed_form import ORDER
-from photostrip.planning.model.deformation import TERMS
+from photostrip.planning.model.deformation import DEFORMATION_TERMS
 from photostrip.planning.model.element_errors import ELEMENTS, FREE
 from photostrip.planning.model.plan import (
     BothForms,
@@ -26,7 +26,7 @@ from photostrip.units import ARCSECONDS, MICROMETRES
 
 IN_PHOTO = 2  # decimals of mm: places of points
 AXES = ("x", "y", "z")
-NOTHING = 9  # decimals of coefficients below which there are errors of rounding only
+ROUNDING_DECIMALS = 9  # decimals of coefficients below which there are errors of rounding only
 DIGITS = 8  # of coefficients, so that two forms can be compared
 
 
@@ -242,7 +242,7 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Document:
                     "value": significant(value * unit),
                     "unit": "m" if not power else f"m/mm{'²' if power == 2 else ''}",
                 }
-                for name, value, power in zip(TERMS, bent.surface.tolist(), (0, 1, 1, 2, 2), strict=True)
+                for name, value, power in zip(DEFORMATION_TERMS, bent.surface.tolist(), (0, 1, 1, 2, 2), strict=True)
             ],
             # against the middle of the model
             "twist_at_corner_m": rounded(abs(twist) * spec.base / 2 * spec.width * unit, GROUND),
@@ -256,7 +256,7 @@ def _bent(spec: ModelSpec, given: GivenErrors, places: Floats) -> Document:
 
 def _digits(value: float) -> float:
     """Round so that two forms can be compared; what is nothing but rounding becomes 0."""
-    return float(significant(round(float(value), NOTHING), DIGITS))
+    return float(significant(round(float(value), ROUNDING_DECIMALS), DIGITS))
 
 
 def _forms(forms: BothForms, control: Sequence[str], *, printed: bool) -> Document:

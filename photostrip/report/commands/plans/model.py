@@ -10,7 +10,7 @@ from photostrip.report.page.parts import Column, Facts, Section, Table, Words, n
 from photostrip.report.page.tables import Shown, number, over_plane, tabulated, words
 
 USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}
-ALIKE = 1e-6  # relative: below it two forms say the same
+SAME_FORM = 1e-6  # relative: below it two forms say the same
 UNITS = {"um": "µm", "arcsec": "″", "m": "m", "ppm": "ppm"}
 PARTS = {
     "measuring": "measuring, dx1",
@@ -261,7 +261,7 @@ def _forms(document: Document) -> tuple[Section, ...]:
 
 def _misprint(row: Document) -> str:
     closed, printed = row["closed"], row["printed"]
-    return "misprint" if abs(printed - closed) > ALIKE * max(abs(closed), abs(printed)) else ""
+    return "misprint" if abs(printed - closed) > SAME_FORM * max(abs(closed), abs(printed)) else ""
 
 
 def _long(value: float) -> str:

@@ -9,14 +9,14 @@ from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
 from photostrip.report.pictures.ground.plan_view import Pair, Plan, middle
-from photostrip.report.pictures.ground.sheet import LETTER, LINE, bars, ids, north_arrow, sheet_of
+from photostrip.report.pictures.ground.sheet import LETTER, LETTER_HEIGHT, bars, ids, north_arrow, sheet_of
 from photostrip.report.pictures.ground.terrain import footprints, straightened
 from photostrip.report.pictures.svg import Picture
 
 MARGIN = 20.0
-CELLS = 240  # of the overlap along the picture
-MOST = 6  # photos that are told apart by colour
-STRAIGHT = 0.5  # on the picture
+OVERLAP_CELLS = 240  # of the overlap along the picture
+MOST_COLOURS = 6  # photos that are told apart by colour
+STRAIGHT_EDGE = 0.5  # on the picture
 
 
 def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
@@ -27,12 +27,12 @@ def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
     corners = [corner for outline in outlines.values() for corner in outline]
     sheet = sheet_of(corners, MARGIN)
     drawn_outlines = {photo: [sheet.place(corner) for corner in outline] for photo, outline in outlines.items()}
-    counts = _overlap(list(drawn_outlines.values()), WIDTH / CELLS)
+    counts = _overlap(list(drawn_outlines.values()), WIDTH / OVERLAP_CELLS)
     middles = [(photo, middle(outline)) for photo, outline in drawn_outlines.items() if _holds(outline, photo)]
     kind = "outline" if middles else "outline narrow"
-    drawn = [_area(runs, f"overlap-{count}", WIDTH / CELLS) for count, runs in sorted(counts.items())]
+    drawn = [_area(runs, f"overlap-{count}", WIDTH / OVERLAP_CELLS) for count, runs in sorted(counts.items())]
     drawn += [
-        svg.polygon(straightened(outline, STRAIGHT), kind, f"photo {photo}")
+        svg.polygon(straightened(outline, STRAIGHT_EDGE), kind, f"photo {photo}")
         for photo, outline in drawn_outlines.items()
     ]
     drawn += _scale(counts)
@@ -51,7 +51,7 @@ def footprint_pictures(document: Document, plan: Plan) -> list[Picture]:
 def _holds(outline: Sequence[svg.Point], name: str) -> bool:
     """Whether there is room for an id within an outline."""
     wide, high = (max(place) - min(place) for place in zip(*outline, strict=True))
-    return bool(wide > LETTER * len(name) and high > LINE)
+    return bool(wide > LETTER * len(name) and high > LETTER_HEIGHT)
 
 
 def _size(outline: Sequence[Pair]) -> float:
@@ -77,7 +77,7 @@ def _overlap(outlines: Iterable[Sequence[svg.Point]], cell: float) -> dict[int, 
         count, start = 0, 0
         for at in sorted(line):
             if count and at > start:
-                found.setdefault(min(count, MOST), []).append((row, start, at))
+                found.setdefault(min(count, MOST_COLOURS), []).append((row, start, at))
             count, start = count + line[at], at
     return found
 
@@ -117,10 +117,10 @@ def _area(runs: Runs, kind: str, cell: float) -> str:
 def _scale(counts: Iterable[int]) -> list[str]:
     found, x = [], LEFT
     for count in range(1, max(counts, default=0) + 1):
-        words = f"{count}" if count < MOST else f"{MOST} and more"
+        words = f"{count}" if count < MOST_COLOURS else f"{MOST_COLOURS} and more"
         found += [
             svg.rectangle((x, TOP - 50.0), (22.0, 14.0), f"overlap overlap-{count}"),
             svg.text((x + 28.0, TOP - 38.5), words),
         ]
         x += 62.0
-    return [*found, svg.text((x + 70.0 * (max(counts, default=0) >= MOST), TOP - 38.5), "photos")]
+    return [*found, svg.text((x + 70.0 * (max(counts, default=0) >= MOST_COLOURS), TOP - 38.5), "photos")]

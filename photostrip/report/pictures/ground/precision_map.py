@@ -13,7 +13,7 @@ from photostrip.report.pictures.ground.sheet import bars, ids, metres, north_arr
 from photostrip.report.pictures.svg import Picture
 
 CLASSES = 6
-SMALLEST, LARGEST = 2.5, 6.5  # dots of the first and the last class: they differ without colour, too
+SMALLEST_DOT, LARGEST_DOT = 2.5, 6.5  # dots of the first and the last class: they differ without colour, too
 MARGIN = 24.0
 MOST_HINTS = 1500  # more points have none
 CROWDED = 5.0  # smaller dots where there are many
@@ -78,7 +78,7 @@ def _map(plan: Plan, part: str, title: str, known: Sequence[tuple[Spot, float]])
 
 
 def _radius(level: int) -> float:
-    return SMALLEST + (LARGEST - SMALLEST) * level / (CLASSES - 1)
+    return SMALLEST_DOT + (LARGEST_DOT - SMALLEST_DOT) * level / (CLASSES - 1)
 
 
 def _limits(sizes: Sequence[float]) -> list[float]:

@@ -11,10 +11,10 @@ from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
 from photostrip.report.pictures.ground.plan_view import Pair
 
 LOWEST, HIGHEST = 220.0, 560.0  # of a picture
-FOOT = 30.0  # room for the scale bars
-LETTER, LINE = 6.4, 12.0  # size of a letter of an id on the picture
+BARS_HEIGHT = 30.0  # room for the scale bars
+LETTER, LETTER_HEIGHT = 6.4, 12.0  # size of a letter of an id on the picture
 APART = 4.0  # ids side by side
-TRIED = 600  # ids for which room is looked for
+MOST_TRIED = 600  # ids for which room is looked for
 
 
 class Sheet(NamedTuple):
@@ -36,10 +36,10 @@ def sheet_of(places: Sequence[Pair], margin: float) -> Sheet:
     along, across = [each[0] for each in places], [each[1] for each in places]
     length, depth = max(along) - min(along), max(across) - min(across)
     scale = min((WIDTH - 2 * margin) / max(length, 1e-9), (HIGHEST - TOP - 2 * margin) / max(depth, 1e-9))
-    height = max(TOP + 2 * margin + depth * scale + FOOT, LOWEST)
+    height = max(TOP + 2 * margin + depth * scale + BARS_HEIGHT, LOWEST)
     return Sheet(
         low=(min(along), min(across)),
-        origin=((WIDTH - length * scale) / 2, height - FOOT - margin),
+        origin=((WIDTH - length * scale) / 2, height - BARS_HEIGHT - margin),
         scale=scale,
         height=height,
     )
@@ -87,12 +87,12 @@ def ids(
     for x, y in taken:
         boxes.add((x - 4.0, y - 4.0, x + 4.0, y + 4.0))
     for number, (name, (x, y)) in enumerate(named):
-        if number >= TRIED:
+        if number >= MOST_TRIED:
             break
         wide = LETTER * len(name)
         around = (x + 7.0, y + 4.0), (x - 7.0 - wide, y + 4.0), (x - wide / 2, y - 8.0), (x - wide / 2, y + 16.0)
         for left, low in around if beside else ((x - wide / 2, y + 4.0),):
-            box = left - APART / 2, low - LINE + 2.0, left + wide + APART / 2, low + 1.0
+            box = left - APART / 2, low - LETTER_HEIGHT + 2.0, left + wide + APART / 2, low + 1.0
             if box[0] < 0 or box[1] < 0 or box[2] > size[0] or box[3] > size[1] or not boxes.free(box):
                 continue
             boxes.add(box)

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 NEAR = 1.5  # points that tell of the ground
 STEADY = 0.15  # extent of the points from which their plane may slope; those of less tell of its height only
 SPREAD = 0.3  # from where what a point lies above the plane counts for less than half
-POINT = 0.02  # from where its own height counts alone
+POINT_RADIUS = 0.02  # from where its own height counts alone
 LOWEST_RAY = 0.1  # descent towards the plane, in principal distances, from which a ray meets the ground
 PIECES = 4  # of each side of a photo
 
@@ -54,7 +54,7 @@ class Terrain(NamedTuple):
 
     def above_plane(self, places: Floats) -> Floats:
         """Return heights of the ground above the plane."""
-        squares = np.subtract.outer(places[:, 0], self.points[:, 0]) ** 2 + (POINT * self.reach) ** 2
+        squares = np.subtract.outer(places[:, 0], self.points[:, 0]) ** 2 + (POINT_RADIUS * self.reach) ** 2
         squares += np.subtract.outer(places[:, 1], self.points[:, 1]) ** 2
         weight = 1.0 / squares**2
         found: Floats = weight @ self.rest / (weight.sum(axis=1) + (SPREAD * self.reach) ** -4.0)

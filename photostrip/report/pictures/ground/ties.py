@@ -18,8 +18,8 @@ MOST_PHOTOS = 300  # more of them are drawn as strips
 MOST_HINTS = 1000  # more ties have none
 BOW = 0.16  # of a line, in shares of its length
 MARGIN = 50.0
-WIDEST = 5.0  # the line of the strongest tie
-FEW = 3  # points from which a tie between strips is weak
+WIDEST_LINE = 5.0  # the line of the strongest tie
+FEW_TIES = 3  # points from which a tie between strips is weak
 
 
 class Tie(NamedTuple):
@@ -84,7 +84,7 @@ def _picture(plan: Plan, nodes: dict[str, Pair], ties: list[Tie], what: str) -> 
     drawn += ids(at.items(), at.values(), (WIDTH, sheet.height - 30.0))
     both = {tie.across for tie in ties} == {True, False}
     entries = [Entry("in a strip", "tie-inside"), Entry("between strips", "tie-across")] if both else []
-    weak = [tie for tie in ties if tie.across and tie.points < FEW] if what == "strip" else []
+    weak = [tie for tie in ties if tie.across and tie.points < FEW_TIES] if what == "strip" else []
     drawn += [*legend(entries, TOP - 40.0), *bars(sheet), *north_arrow(plan.north)]
     groups = _groups(nodes, ties)
     caption = f"Lines join {what}s that have points in common"
@@ -94,7 +94,7 @@ def _picture(plan: Plan, nodes: dict[str, Pair], ties: list[Tie], what: str) -> 
     if groups > 1:
         caption += f" The {what}s fall into {groups} groups that no point ties together."
     if weak:
-        caption += f" {counted(len(weak), 'tie')} of fewer than {FEW} points."
+        caption += f" {counted(len(weak), 'tie')} of fewer than {FEW_TIES} points."
     tied = {name for tie in ties for name in tie[:2]}
     lone = [name for name in nodes if name not in tied]
     if lone:
@@ -113,7 +113,7 @@ def _lines(ties: list[Tie], at: dict[str, svg.Point], strongest: int) -> list[st
     found = []
     for tie in ties:
         title = svg.titled(f"{tie.one} and {tie.other}: {counted(tie.points, 'point')}")
-        width = max(0.6, WIDEST * tie.points / strongest)
+        width = max(0.6, WIDEST_LINE * tie.points / strongest)
         curve = _curve(at[tie.one], at[tie.other])
         found.append(svg.element("path", title, d=curve, kind=kind, stroke_width=width))
     return found

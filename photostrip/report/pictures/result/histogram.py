@@ -13,8 +13,8 @@ from photostrip.report.pictures.chart import WIDTH, Entry, Layout, Panel, framed
 from photostrip.report.pictures.ground.image_plane import Residual
 from photostrip.report.pictures.svg import Picture
 
-CLASSES = 33  # of a histogram, an odd number
-REACH = 4.5  # standard deviations that a histogram holds, at least
+BARS = 33  # of a histogram, an odd number
+LEAST_REACH = 4.5  # standard deviations that a histogram holds, at least
 
 
 class Sample(NamedTuple):
@@ -33,7 +33,7 @@ class Sample(NamedTuple):
 
 
 def _sample(name: str, values: list[float], unit: str, sigma: float, limits: list[float]) -> Sample:
-    reach = max(REACH * sigma, 1.1 * max(limits, default=0.0)) or 1.0
+    reach = max(LEAST_REACH * sigma, 1.1 * max(limits, default=0.0)) or 1.0
     return Sample(name=name, values=values, unit=unit, sigma=sigma, limits=limits, reach=reach)
 
 
@@ -85,15 +85,15 @@ def _parallaxes(document: Document) -> list[Sample]:
 
 def _columns(sample: Sample) -> tuple[list[int], list[tuple[float, float]]]:
     """Return the counts of the classes, and the normal curve."""
-    width, counts = 2 * sample.reach / CLASSES, [0] * CLASSES
+    width, counts = 2 * sample.reach / BARS, [0] * BARS
     for value in sample.values:
-        counts[min(max(int((value + sample.reach) / width), 0), CLASSES - 1)] += 1
+        counts[min(max(int((value + sample.reach) / width), 0), BARS - 1)] += 1
     normal, scale = NormalDist(0.0, sample.sigma or 1.0), len(sample.values) * width
     return counts, [(x, scale * normal.pdf(x)) for x in (sample.reach * (n / 60.0 - 1.0) for n in range(121))]
 
 
 def _panel(panel: Panel, sample: Sample, counts: Sequence[int], title: str) -> list[str]:
-    width = 2 * sample.reach / CLASSES
+    width = 2 * sample.reach / BARS
     drawn = []
     if sample.limits:
         low, high = min(sample.limits), max(sample.limits)

@@ -14,7 +14,7 @@ from photostrip.report.pictures.svg import Picture
 # as the zones lie in the left photo, by rows: 3 and 4 on top, 1 and 2 on the base, 5 and 6 below
 ZONES = {3: "top left", 4: "top right", 1: "left centre", 2: "right centre", 5: "bottom left", 6: "bottom right"}
 MOST_POINTS = 2400  # of all zones that are drawn one by one
-SEEN = 0.995  # share of the parallaxes that the axis holds; those beyond stand at its end
+SHARE_ON_AXIS = 0.995  # share of the parallaxes that the axis holds; those beyond stand at its end
 STACKED_AT = 1.04  # where the mean of all pairs is drawn, in widths of a panel
 
 
@@ -71,7 +71,7 @@ def parallax_pictures(document: Document) -> list[Picture]:
 
 def _limit(everything: Sequence[Parallax]) -> float:
     sizes = sorted(abs(each.size) for each in everything)
-    return svg.nice(max(sizes[min(int(SEEN * len(sizes)), len(sizes) - 1)], 1e-6)) * 1.05
+    return svg.nice(max(sizes[min(int(SHARE_ON_AXIS * len(sizes)), len(sizes) - 1)], 1e-6)) * 1.05
 
 
 def _borders(rows: Sequence[Document]) -> list[float]:

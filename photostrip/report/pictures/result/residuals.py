@@ -14,13 +14,13 @@ from photostrip.report.pictures.ground.plan_view import Pair, middle
 from photostrip.report.pictures.result.histogram import histogram_picture, rms
 from photostrip.report.pictures.svg import Picture
 
-COLUMNS, ROWS = 6, 4  # of photos on the picture
+COLUMNS, PHOTO_ROWS = 6, 4  # of photos on the picture
 TILE, BETWEEN = 142.0, 14.0  # a photo on the picture
 LONGEST = 28.0  # a vector in a photo
 CELLS = 8  # of the grid along the longer side of the image plane
 PLANE = 400.0  # the image plane of a camera on the picture
 LEAST_IN_CELL = 3  # residuals from which a cell has a mean
-SEEN = 0.95  # share of the vectors that are not longer than LONGEST
+SHARE_ON_SCALE = 0.95  # share of the vectors that are not longer than LONGEST
 CAMERAS = 4  # whose image planes are drawn
 
 
@@ -46,7 +46,7 @@ def _frame(document: Document, found: Iterable[Residual], photos: set[str]) -> F
 def _unit(lengths: Iterable[float], longest: float) -> tuple[float, float]:
     """Return picture units for each micrometre, and the length of the bar in micrometres."""
     ordered = sorted(lengths)
-    typical = max(ordered[min(int(SEEN * len(ordered)), len(ordered) - 1)], 1e-3)
+    typical = max(ordered[min(int(SHARE_ON_SCALE * len(ordered)), len(ordered) - 1)], 1e-3)
     return longest / typical, svg.nice(typical / 2)
 
 
@@ -66,7 +66,7 @@ def _vectors(document: Document, found: Sequence[Residual]) -> list[Picture]:
     for each in found:
         by_photo.setdefault(each.photo, []).append(each)
     sizes = {photo: rms([v for each in rows if each.used for v in each.size]) for photo, rows in by_photo.items()}
-    chosen = sorted(by_photo, key=lambda photo: -sizes[photo])[: COLUMNS * ROWS]
+    chosen = sorted(by_photo, key=lambda photo: -sizes[photo])[: COLUMNS * PHOTO_ROWS]
     shown = [photo for photo in by_photo if photo in chosen]
     frame = _frame(document, found, set(shown))
     wide, high = frame.high[0] - frame.low[0], frame.high[1] - frame.low[1]

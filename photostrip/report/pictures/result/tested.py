@@ -26,7 +26,7 @@ CELL = 46.0  # of a correlation matrix
 INSIDE = "square", "mark check"
 OUTSIDE = Entry("outside", "left-out", "diamond")
 LARGE = 0.9  # a correlation that says that two parameters are hard to tell apart
-WIDEST = 150.0  # for the names of the parameters
+WIDEST_NAME = 150.0  # for the names of the parameters
 POSITIONS = ("d_east", "east"), ("d_north", "north"), ("d_up", "up")
 SIGMAS = 2.0  # bars of given positions
 
@@ -110,8 +110,8 @@ def correlation_pictures(document: Document) -> list[Picture]:
     single = len({row["camera"] for row in known}) == 1
     names = [("" if single else f"{row['camera']}: ") + row["parameter"] for row in known]
     count = len(names)
-    cell = min(CELL, (WIDTH - LEFT - WIDEST - 40.0) / count)
-    left, top = LEFT + WIDEST, 44.0 + WIDEST * 0.72
+    cell = min(CELL, (WIDTH - LEFT - WIDEST_NAME - 40.0) / count)
+    left, top = LEFT + WIDEST_NAME, 44.0 + WIDEST_NAME * 0.72
     numbered = cell >= CELL * 0.7
     room = cell - 12.0 if numbered else cell
     drawn, largest = [], (0.0, "", "")

@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import as_strided
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.triangulation.bundle.normal_equations.lapack import lapack
 
-STEP = 48  # columns of the inverse that are found at a time
+COLUMNS_AT_A_TIME = 48  # columns of the inverse that are found at a time
 
 
 class Band:
@@ -22,7 +22,7 @@ class Band:
     def __init__(self, size: int, width: int) -> None:
         self.size, self.width = size, min(width, size - 1)
         # The last few rows of views reach beyond the end.
-        self.flat = np.zeros((size + self.width + STEP) * (self.width + 1))
+        self.flat = np.zeros((size + self.width + COLUMNS_AT_A_TIME) * (self.width + 1))
 
     @property
     def columns(self) -> Floats:
@@ -66,8 +66,8 @@ class Band:
         """
         inverse = Band(self.size, self.width)
         window = np.zeros((self.width, self.width))
-        for first in range((self.size - 1) // STEP * STEP, -1, -STEP):
-            count = min(STEP, self.size - first)
+        for first in range((self.size - 1) // COLUMNS_AT_A_TIME * COLUMNS_AT_A_TIME, -1, -COLUMNS_AT_A_TIME):
+            count = min(COLUMNS_AT_A_TIME, self.size - first)
             below = min(self.width, self.size - first - count)
             diagonal, _ = lapack().dtrtri(np.tril(np.triu(self.look(first, first, count, count), -self.width)), lower=1)
             # Below the diagonal blocks, what is within the band: first + count + row - (first + column) <= width.

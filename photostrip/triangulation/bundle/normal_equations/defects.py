@@ -19,18 +19,20 @@ from photostrip.triangulation.bundle.observations.given_orientations import Line
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
 
-PARALLEL = 1e-10  # square of the sine of the angle between rays
-LOOSE = 0.1  # standard deviation, as a part of the size of the network, from which a datum parameter is not determined
+SQUARED_SINE = 1e-10  # square of the sine of the angle between rays
+LOOSE_SHARE = (
+    0.1  # standard deviation, as a part of the size of the network, from which a datum parameter is not determined
+)
 ALIKE = 0.95  # part of a named movement that lies among the undetermined ones
-ALONG = 0.94  # cosine of 20 degrees: a line counts as the flight line
+COSINE_ALONG = 0.94  # cosine of 20 degrees: a line counts as the flight line
 LEFT_OVER = 1e-11  # part of its information that the other parameters leave a common parameter
-STRAIGHT = 1e-3  # breadth of control on one line, as part of its length
+STRAIGHT_BREADTH = 1e-3  # breadth of control on one line, as part of its length
 GROWN = 4.0  # times the standard deviation of a given coordinate, rms of the points, from which a movement is told
-FAR_OFF = 10.0  # standard deviations of a control coordinate that is told then
+ODD_SIGMAS = 10.0  # standard deviations of a control coordinate that is told then
 ITERATIONS = 3
 MOST_FAILED = 8  # adjustments of a search that may fail: each takes six times as long as one that converges
 SHARE = 0.5  # of the largest element of a null vector: what is named with it
-TINY = 1e-9
+UNMOVED = 1e-9
 MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll about x", "turn about y", "turn about z")
 
 
@@ -60,7 +62,7 @@ def refuse_weak_points(prepared: PreparedProblem, reduced: Reduced) -> None:
     weak = [
         prepared.problem.point_name(number)
         for batch, each in zip(prepared.structure.batches, reduced.points, strict=True)
-        for number in batch.point[batch.real][~(each.strength[batch.real] > PARALLEL)].tolist()
+        for number in batch.point[batch.real][~(each.strength[batch.real] > SQUARED_SINE)].tolist()
     ]
     if weak:
         message = (
@@ -87,7 +89,7 @@ class Held:
         root = np.linalg.inv(np.linalg.cholesky(self.motion))
         values, vectors = np.linalg.eigh(root @ self.normal @ root.T)
         move = root.T @ vectors[:, 0]
-        return float(max(values[0], TINY) ** -0.5), move / np.linalg.norm(move)
+        return float(max(values[0], UNMOVED) ** -0.5), move / np.linalg.norm(move)
 
 
 def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
@@ -100,7 +102,7 @@ def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
     for photos in parts:
         held = _held(prepared, state, photos)
         values, vectors = np.linalg.eigh(held.normal)
-        loose = vectors[:, values < LOOSE**-2.0]
+        loose = vectors[:, values < LOOSE_SHARE**-2.0]
         if loose.shape[1]:
             names = [prepared.problem.photo_name(number) for number in photos.tolist()]
             reason = _reason(held, unknown_errors=bool(prepared.problem.positions.offset_sigma.any()))
@@ -134,7 +136,7 @@ def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> Geomet
         off = np.nan_to_num(np.abs(control_residuals(prepared, state)) / control.sigma)
     if loose:
         message += f": {loose}"
-    elif off.max(initial=0.0) > FAR_OFF:
+    elif off.max(initial=0.0) > ODD_SIGMAS:
         row, axis = np.unravel_index(int(off.argmax()), off.shape)
         point = prepared.problem.point_name(int(control.point[row]))
         metres = off[row, axis] * control.sigma[row, axis]
@@ -202,7 +204,7 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
         photos=photos,
         normal=normal,
         control=places,
-        motion=motions.T @ motions / len(everything) + TINY * radius**2 * np.eye(datum.DEFECT),
+        motion=motions.T @ motions / len(everything) + UNMOVED * radius**2 * np.eye(datum.DEFECT),
         sigma=median(sigmas) if len(sigmas) else np.inf,
     )
 
@@ -226,7 +228,7 @@ def _moves(state: Parameters, held: Held, loose: Floats) -> str:
     turns = {"roll about the flight line": flight, "pitch": across, "heading": up}
     candidates: list[tuple[str, Floats]] = []
     if line is not None:
-        alike = [name for name, axis in turns.items() if abs(line @ axis) > ALONG]
+        alike = [name for name, axis in turns.items() if abs(line @ axis) > COSINE_ALONG]
         name = alike[0] if alike else "the rotation about the line of control"
         candidates.append((name, np.concatenate([zero, line, [0.0]])))
     candidates += [
@@ -257,7 +259,7 @@ def _line(control: Floats) -> Floats | None:
     if len(control) < 2:
         return None
     _, spread, axes = np.linalg.svd(control - control.mean(axis=0), full_matrices=False)
-    straight = spread[0] > 0.0 and (len(spread) == 1 or spread[1] < STRAIGHT * spread[0])
+    straight = spread[0] > 0.0 and (len(spread) == 1 or spread[1] < STRAIGHT_BREADTH * spread[0])
     return axes[0] if straight else None
 
 
@@ -279,7 +281,7 @@ def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats |
     """
     blocks = reduced.blocks[prepared.structure.diagonal] + (0.0 if extra is None else extra)
     diagonal = np.maximum(np.einsum("nii->ni", blocks), 0.0)
-    least = TINY * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1.0))
+    least = UNMOVED * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1.0))
     add = np.zeros_like(blocks)
     add[:, range(PHOTO), range(PHOTO)] = least
     band = factored(prepared, reduced, add if extra is None else add + extra)

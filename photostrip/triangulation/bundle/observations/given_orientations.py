@@ -10,7 +10,7 @@ from photostrip.geometry.rotation import cross_matrix, to_vector
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
 from photostrip.triangulation.bundle.observations.problem import AttitudeObservations, PositionObservations
 
-SMALL = 1e-4  # radians: below it the series of the rotation's derivative is exact
+LITTLE = 1e-4  # radians: below it the series of the rotation's derivative is exact
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def _vector_by_turn(vector: Floats) -> Floats:
     I + [v]/2 + (1/a^2 - (1 + cos a) / (2 a sin a)) [v]^2 with the angle a = |v|.
     """
     angle = np.linalg.norm(vector, axis=1)
-    safe = np.where(angle < SMALL, 1.0, angle)
-    factor = np.where(angle < SMALL, 1.0 / 12.0, 1.0 / safe**2 - (1.0 + np.cos(safe)) / (2.0 * safe * np.sin(safe)))
+    safe = np.where(angle < LITTLE, 1.0, angle)
+    factor = np.where(angle < LITTLE, 1.0 / 12.0, 1.0 / safe**2 - (1.0 + np.cos(safe)) / (2.0 * safe * np.sin(safe)))
     cross = cross_matrix(vector)
     return np.asarray(np.eye(3) + 0.5 * cross + factor[:, None, None] * (cross @ cross))

@@ -19,7 +19,7 @@ from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 LEAST_REDUNDANCY = 3.0  # of a group, below which its residuals say nothing about it
 ITERATIONS = 12
 CONVERGED = 0.005  # relative change of a standard deviation
-SMALLEST, LARGEST = 0.05, 20.0  # factors of a stated standard deviation in one step: rounding of a perfect fit
+LEAST_FACTOR, MOST_FACTOR = 0.05, 20.0  # factors of a stated standard deviation in one step: rounding of a perfect fit
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def _component(name: str, group: reliability.Group, given: Flags) -> Component:
     squares = float(((group.error[given] / group.sigma[given]) ** 2).sum())
     redundancy = float(group.redundancy[given].sum())
     estimated = redundancy >= LEAST_REDUNDANCY
-    factor = float(np.clip(np.sqrt(squares / redundancy), SMALLEST, LARGEST)) if estimated else 1.0
+    factor = float(np.clip(np.sqrt(squares / redundancy), LEAST_FACTOR, MOST_FACTOR)) if estimated else 1.0
     sigma = float(1 / np.sqrt(2 * redundancy)) if estimated else float("nan")
     return Component(
         name=name, observations=int(given.sum()), redundancy=redundancy, factor=factor, sigma=sigma, estimated=estimated

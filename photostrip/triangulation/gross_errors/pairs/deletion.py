@@ -18,7 +18,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.rejection import UNCONTROLLED
 
-LARGEST = 3  # points of a set
+LARGEST_SET = 3  # points of a set
 TRIPLES_OF = 24  # points from which sets of three are formed; those of the best sets of two
 
 
@@ -86,7 +86,7 @@ def search(residuals: Floats, basis: Floats, target: Floats) -> list[Numbers]:
         v = np.take_along_axis(residuals[todo], places, axis=1)
         q = np.take_along_axis(basis[todo], places[:, :, None], axis=1)
         m = np.eye(places.shape[1]) - q @ q.transpose(0, 2, 1)
-        sets = subsets(places.shape[1], k) if k < LARGEST else _triples(v, m)
+        sets = subsets(places.shape[1], k) if k < LARGEST_SET else _triples(v, m)
         gain = gains(v, m, sets)
         best = gain.argmax(axis=1)
         rows = np.arange(len(todo))
@@ -117,7 +117,7 @@ def _triples(residuals: Floats, matrix: Floats) -> Numbers:
     """Form sets of three, of all points or of those that stand in the best sets of two."""
     g, n = residuals.shape
     if n <= TRIPLES_OF:
-        return subsets(n, LARGEST)
+        return subsets(n, LARGEST_SET)
     pairs = subsets(n, 2)
     gain = gains(residuals, matrix, pairs)
     best = np.full((g, n), -np.inf)
@@ -125,5 +125,5 @@ def _triples(residuals: Floats, matrix: Floats) -> Numbers:
     for side in (0, 1):
         np.maximum.at(best, (rows, pairs[:, side]), gain)
     chosen = np.sort(np.argsort(-best, axis=1, kind="stable")[:, :TRIPLES_OF], axis=1)
-    triples: Numbers = chosen[:, subsets(TRIPLES_OF, LARGEST)]
+    triples: Numbers = chosen[:, subsets(TRIPLES_OF, LARGEST_SET)]
     return triples

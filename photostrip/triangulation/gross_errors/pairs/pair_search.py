@@ -79,7 +79,7 @@ def search(
     from photostrip.triangulation.relative_orientation.robust import orient_robustly
 
     part, part_test, log = given.take(failed), test.take(failed), _Log.of(len(failed))
-    found = orient_robustly(part.pairs, part_test.sigma, deletion.LARGEST)
+    found = orient_robustly(part.pairs, part_test.sigma, deletion.LARGEST_SET)
     robust = assess_pairs(found.elements, part.pairs, part.iterations)
     if start:
         part = robust
@@ -100,7 +100,7 @@ def search(
     least = given.points_used[failed] // 2  # with more points wrong than right nobody can tell which are which
     while len(todo := todo[(part_test.failing(part) & (part.points_used >= least))[todo]]):
         before = len(log.removed)
-        part = log.without_sets(part, part_test, todo, deletion.LARGEST if sets else 1, worst=True)
+        part = log.without_sets(part, part_test, todo, deletion.LARGEST_SET if sets else 1, worst=True)
         if len(log.removed) == before:
             break
     part = orient_again(part, part.pairs.weight, np.arange(len(failed)))
@@ -126,7 +126,7 @@ class _Log:
         part: Orientation,
         test: GlobalTest,
         todo: Numbers,
-        largest: int = deletion.LARGEST,
+        largest: int = deletion.LARGEST_SET,
         *,
         worst: bool = False,
     ) -> Orientation:

@@ -20,11 +20,11 @@ from photostrip.frozen import NamedTuple, dataclass
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.quality.reliability import Limit
-from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST, subsets
+from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST_SET, subsets
 from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
 
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
-ROUNDING = 1e-9  # keeps a point that holds its photos alone from stopping the others
+REGULARISATION = 1e-9  # keeps a point that holds its photos alone from stopping the others
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def decide(points: PointRays, limit: Limit) -> list[Decision]:
     total = np.einsum("mi,mij,mj->m", gap, weight, gap)
     out = np.repeat((value > limit.of(r) * limit.unit)[:, None], r, axis=1)
     size, told, left_over = np.full((m, r, 2), np.nan), np.zeros(m, bool), np.flatnonzero(out[:, 0])
-    for count in range(1, min(r, LARGEST) + 1):
+    for count in range(1, min(r, LARGEST_SET) + 1):
         if not len(left_over) or (count > 1 and freedom - 2 * count < 1):
             break
         left, sets, errors = _without(total[left_over], pulled[left_over], normal[left_over], subsets(r, count))
@@ -124,7 +124,7 @@ def _misclosures(point: PointRays) -> _Misclosures:
     beside = np.eye(misfit.shape[-2]) * inside - place @ place.swapaxes(-1, -2)
     part = beside @ point.by_photos
     pull, own = (each @ cofactors @ part.swapaxes(-1, -2) for each in (design, part))
-    lever = pull @ np.linalg.inv(np.eye(own.shape[-1]) * (1 + ROUNDING) - own)
+    lever = pull @ np.linalg.inv(np.eye(own.shape[-1]) * (1 + REGULARISATION) - own)
     gap = across @ misfit + lever @ (beside @ misfit)
     variance = np.eye(design.shape[-2]) + design @ cofactors @ design.swapaxes(-1, -2) + lever @ pull.swapaxes(-1, -2)
     return _Misclosures(gap[..., 0], np.asarray(np.linalg.inv(variance), float), basis)

@@ -26,7 +26,7 @@ from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT
 from photostrip.triangulation.robust import MEDIAN_SPREAD, scales
 from photostrip.triangulation.strip_formation.strip import FormedStrip, mean_points
 
-LEVEL = 0.012  # of a whole strip, and of what is rejected the part that is not wrong
+STRIP_LEVEL = 0.012  # of a whole strip, and of what is rejected the part that is not wrong
 
 
 def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> tuple[Rejection, ...] | None:
@@ -38,7 +38,7 @@ def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> t
     problem, kept = _free_network(oriented, formed, rays, rows), np.isin(rows, rays.kept)
     begin = replace(Selection.everything(problem), images=~_suspected(oriented, formed, rays, rows))
     try:
-        found = screen_bundle(problem, begin, BundleSettings(level=LEVEL), kept, rough=True)
+        found = screen_bundle(problem, begin, BundleSettings(level=STRIP_LEVEL), kept, rough=True)
     except GeometryError:
         return None
     return tuple(replace(each, row=int(rows[each.row])) for each in found.rejections if not each.readmitted)

@@ -15,7 +15,9 @@ from photostrip.triangulation.plausibility.control.straightening import GivenPoi
 _LevelPoints = tuple[Floats, Callable[[], WrittenAxes]]  # (n, 3) in the level frame; what the written axes are
 
 USUAL_SIGMA = 0.1  # metres, of coordinates without one
-FAR = 20.0  # times as far from the middle of a list as a good half of it: strip and map say nothing of such a place
+FAR_AWAY = (
+    20.0  # times as far from the middle of a list as a good half of it: strip and map say nothing of such a place
+)
 LEAST_OF_LIST = 4  # points that tell where a list lies
 
 
@@ -70,7 +72,7 @@ def _moved(written: Floats, lists: Numbers) -> Floats:
         if len(rows) < LEAST_OF_LIST:
             continue
         off = written[rows, :2] - column_medians(written[rows, :2])
-        far = np.abs(off) > FAR * column_medians(np.abs(off)).max()
+        far = np.abs(off) > FAR_AWAY * column_medians(np.abs(off)).max()
         moved[rows, :2] = np.where(far, off, 0.0)
     return moved
 

@@ -23,7 +23,9 @@ MARGIN_SHARES = (0.6, 0.25)  # of the width and the height of the area: a neighb
 MARGIN_LIMITS_DEG = (1.0, 4.0)
 CIRCLE_DEG = 360.0
 MOST_OUTSIDE_SHARE = 0.5  # of the points: single ones are slips
-FAR = 1000.0  # times the median distance from the median place: a slip of the pen, which says nothing of the others
+SLIP_OF_PEN = (
+    1000.0  # times the median distance from the median place: a slip of the pen, which says nothing of the others
+)
 MOST_ROUND_TRIP = 1.0  # units of the frame between a point and where its geocentric coordinates lead back to
 MILLION = 1e6
 TENS = (10.0, 100.0, 1000.0)  # of coordinates with lost digits, or in kilometres
@@ -83,7 +85,7 @@ def _together(enu: Floats) -> Floats:
     if not len(enu):
         return enu
     far = np.abs(enu[:, :2] - column_medians(enu[:, :2])).max(axis=1)
-    return np.asarray(enu[far <= FAR * median(far)], float)
+    return np.asarray(enu[far <= SLIP_OF_PEN * median(far)], float)
 
 
 def _readings(level: Floats) -> Iterator[tuple[str, Floats, str, str]]:

@@ -31,7 +31,9 @@ LEAST_BREADTH = 0.15  # breadth over length of the common points: mirror images 
 MOST_SHARE = (
     0.4  # of the spread of the points left by a link: relief leaves 0.1, an oblique mount 0.33, other points 0.9
 )
-FAR = 3.0  # times as far from the centre of a photo as four fifths of its points: a gross error, which turns any fit
+FAR_OUTSIDE = (
+    3.0  # times as far from the centre of a photo as four fifths of its points: a gross error, which turns any fit
+)
 FAR_SHARE = 0.8
 SCALE_JUMP = 4.0  # ratio of the scales of two photos that neither height nor an oblique mount explains
 TINY = 1e-12
@@ -158,7 +160,7 @@ def _near(size: Floats, photo: Numbers) -> Floats:
     last = np.cumsum(count) - count + (FAR_SHARE * (count - 1)).astype(np.intp)
     reach = np.zeros(len(count))
     reach[count > 0] = size[order[last[count > 0]]]
-    return np.where(size > FAR * reach[photo], TINY, 1.0)
+    return np.where(size > FAR_OUTSIDE * reach[photo], TINY, 1.0)
 
 
 class _Similarities(NamedTuple):

@@ -280,7 +280,7 @@ def test_a_plan_error_of_two_metres_does_not_pass() -> None:
 
 
 def test_a_wrong_point_is_found_in_sections_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(strip_at_control, "LARGEST", 27)
+    monkeypatch.setattr(strip_at_control, "LARGEST_SECTION", 27)
     strip = flown()
     found = adjusted(strip, strip.bands(0, 3, 6, 9, 12), {"p6_1": (0.0, 0.0, 8.0)}).strips[0]
     assert [(found.control.ids[each.row], each.axes) for each in found.wrong_control] == [("p6_1", (2,))]

@@ -51,7 +51,7 @@ def test_the_level_grows_with_the_errors_that_are_established(problem: BundlePro
 
 def test_the_level_along_a_strip() -> None:
     """At a twentieth of the points wrong, as in the benchmark, errors of 3.4 standard deviations are found."""
-    q, i, left = strip_network.LEVEL, 18, 330
+    q, i, left = strip_network.STRIP_LEVEL, 18, 330
     assert normal_quantile(1 - i * q / (left + i * q) / 2) == pytest.approx(3.41, abs=0.08)
 
 
