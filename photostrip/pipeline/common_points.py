@@ -12,6 +12,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple
 from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
@@ -39,7 +40,7 @@ def join_strips(
     """
     points = _joined(strips, observations.point_ids, output)
     precision = None
-    notes = []
+    notes: list[Note] = []
     for strip in strips:
         notes += strip.notes
         covariance = None if strip.photo_stages is None else strip.photo_stages.covariance
