@@ -50,6 +50,8 @@ def kept_of(strip: StripAtControl, found: Found) -> Flags:
 
 def control_rejections(strip: StripAtControl, found: Found, rows: Numbers) -> list[Rejection]:
     """List the points with rejected coordinates; rows: of the section's control in that of the whole strip."""
+    if not found.coordinates:
+        return []
     place, partner, rejections = strip.coordinates, _exchanges(strip, found), []
     for point in found.whole.points:
         part = tuple(column for column in point if column in found.coordinates)
