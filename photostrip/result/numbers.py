@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from itertools import chain
 from math import isfinite
 from typing import Any
@@ -27,6 +28,8 @@ EXACT = 12  # digits of what others compute with
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}  # units of angles
 AT_ONCE = 2000  # numbers of a column that are read together, for the sake of memory
 WHOLE_NUMBERS = re.compile("([0-9]+)")
+TENS = 10.0 ** np.arange(23)  # those that a float holds exactly
+TIE = 1e-3  # parts of the last digit by which a number must be off the middle between two
 
 
 def rounded(values: ArrayLike | float, decimals: int) -> Plain:
@@ -81,10 +84,20 @@ def plain(values: Floats) -> Plain:
 
 
 def significant(values: ArrayLike, digits: int = SIGNIFICANT) -> Plain:
-    """Round to significant digits; otherwise as ``rounded``."""
+    """Round to significant digits; otherwise as ``rounded``. All together, but what lies in the middle between two."""
     array = np.asarray(values, float)
-    flat = [float(f"{value:.{digits}g}") + 0.0 for value in array.ravel().tolist()]
-    return plain(np.array(flat).reshape(array.shape))
+    flat, large = array.ravel(), np.abs(array.ravel())
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shift = digits - 1 - np.floor(np.log10(large))
+        known = np.abs(shift) < len(TENS)  # not of 0, nor of what is not finite
+        ten = TENS[np.where(known, np.abs(shift), 0).astype(int)]
+        scaled = np.where(shift < 0, large / ten, large * ten)
+        known &= np.abs(scaled - np.floor(scaled) - 0.5) > TIE
+        whole = np.rint(scaled)
+        found = np.copysign(np.where(shift < 0, whole * ten, whole / ten), flat)
+    for place in np.flatnonzero(~known).tolist():
+        found[place] = float(f"{flat[place]:.{digits}g}") + 0.0
+    return plain(found.reshape(array.shape))
 
 
 def micrometres(millimetres: ArrayLike) -> Plain:
@@ -100,7 +113,8 @@ def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
     return parts, name
 
 
-def natural_rank(names: Sequence[str]) -> Numbers:
+@lru_cache(maxsize=8)  # the points of a run are asked for twice
+def natural_rank(names: tuple[str, ...]) -> Numbers:
     """Place of each name in natural order, from 0."""
     keys = _padded(names) or [natural(name) for name in names]
     rank = np.empty(len(names), np.intp)

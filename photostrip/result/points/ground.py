@@ -89,5 +89,5 @@ def _level_ties(result: Result) -> Floats:
 
 def not_determined_of(result: Result) -> list[Document]:
     """Return the list ``not_determined``: measured points without coordinates, and why."""
-    names = list(result.not_determined)
+    names = tuple(result.not_determined)
     return [{"id": names[row], "reason": result.not_determined[names[row]]} for row in np.argsort(natural_rank(names))]
