@@ -206,7 +206,7 @@ ablation.put(global_test.__name__, "FIFTH_WRONG", 2.5)  # the default of a class
 assert global_test.ParallaxScatter.of.__defaults__ == (2.5,)
 assert pair_search.search.__kwdefaults__ == {"start": True, "sets": True, "spoiled": 2.5}
 ablation.put(deletion.__name__, "LARGEST_SET", 5)  # of a method of another module
-assert pair_search._Log.without_sets.__defaults__ == (5,) and point_decisions.LARGEST == 5
+assert pair_search._Log.without_sets.__defaults__ == (5,) and point_decisions.LARGEST_SET == 5
 for make in list(ablation.changes().values()):
     make()
 assert BundleSettings.level == BundleSettings().level == 0.005

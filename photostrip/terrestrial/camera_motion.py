@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
@@ -38,6 +38,14 @@ class ImagePair:
     def measured(self) -> Flags:
         """Which coordinates can be compared, shape (m, 2)."""
         return np.asarray(np.isfinite(self.before + self.after), bool)
+
+
+class TurnsWithout(NamedTuple):
+    """Turns of a camera, each fitted without one of its points."""
+
+    values: Floats  # (r, 3)
+    normal: Floats  # (r, 3, 3)
+    known: Flags  # (r,): where the other points determine it
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,15 +82,15 @@ class Turn:
     def dof(self) -> int:
         return int((self.weights > 0).sum()) - ANGLES
 
-    def predict(self, rows: Numbers) -> tuple[Floats, Floats, Flags]:
-        """Fit the turn without each of some points alone: turns (r, 3), normal matrices, where others determine it."""
+    def predict(self, rows: Numbers) -> TurnsWithout:
+        """Fit the turn without each of some points alone."""
         design = self.design[rows]
         weighted = design * self.weights[rows][:, :, None]
         normal = self.normal - weighted.transpose(0, 2, 1) @ design
         known = determined(normal)
         normal = np.where(known[:, None, None], normal, np.eye(ANGLES))
         sums = np.einsum("rik,ri->rk", weighted, np.nan_to_num(self.residuals[rows]))
-        return self.values - np.linalg.solve(normal, sums[:, :, None])[:, :, 0], normal, known
+        return TurnsWithout(self.values - np.linalg.solve(normal, sums[:, :, None])[:, :, 0], normal, known)
 
 
 def turned(before: Floats, principal_distance: float, turn: Floats) -> Floats:

@@ -195,15 +195,11 @@ def _levelled(strip: Floats, targets: absolute_orientation.Targets, level: Level
     return found
 
 
-def _oriented(stages: Sequence[FormedPhotos], group: JoinedStrips) -> tuple[tuple[str, ...], Floats, Floats]:
-    """Names, centres and rotations of all photos, in the frame of the block."""
-    names: list[str] = []
-    centers, rotations = [], []
-    for number in group.members:
-        names += stages[number].strip.photos
-        centers.append(group.joined[number](stages[number].formed.centers))
-        rotations.append(group.joined[number].rotation @ stages[number].formed.rotations)
-    return tuple(names), np.concatenate(centers), np.concatenate(rotations)
+def _oriented(stages: Sequence[FormedPhotos], group: JoinedStrips) -> tuple[Floats, Floats]:
+    """Centres and rotations of all photos, in the frame of the block."""
+    strips = [(group.joined[number], stages[number].formed) for number in group.members]
+    centers = np.concatenate([to_block(formed.centers) for to_block, formed in strips])
+    return centers, np.concatenate([to_block.rotation @ formed.rotations for to_block, formed in strips])
 
 
 def _with_cameras(
@@ -218,7 +214,8 @@ def _with_cameras(
     Known rotations say what is level; without any its cameras are taken to look down, more or less: that is a start,
     the adjustment decides what is determined.
     """
-    names, centers, rotations = _oriented(stages, group)
+    names = [name for number in group.members for name in stages[number].strip.photos]
+    centers, rotations = _oriented(stages, group)
     rows = locate(cameras.ids, [OF_PHOTO.format(name) for name in names])
     turned = [row for row in rows.tolist() if names[row] in known.orientations]
     if turned:
@@ -242,7 +239,7 @@ def _with_cameras(
 
 def _of_its_own(stages: Sequence[FormedPhotos], group: JoinedStrips) -> Similarity:
     """Frame and scale of a block that nothing ties to the ground: X along the first strip, Z against the view."""
-    _, centers, rotations = _oriented(stages, group)
+    centers, rotations = _oriented(stages, group)
     first = stages[group.members[0]].formed.centers
     base = np.linalg.norm(np.diff(first, axis=0), axis=1).mean()
     up = rotations[:, :, 2].mean(axis=0)

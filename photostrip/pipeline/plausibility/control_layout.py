@@ -18,7 +18,7 @@ from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.pipeline.plausibility import evidence
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
-from photostrip.points import ControlPoints
+from photostrip.points import ControlPoints, concatenated
 from photostrip.triangulation.plausibility.control import given_points, layout
 
 if TYPE_CHECKING:
@@ -38,34 +38,42 @@ def weak_layout(
         yield from _of_block(inputs, strips, images, control, cameras, directory)
         return
     for strip in strips:
-        rows, place = evidence.places_along_strip(strip, images.observations, control.points, images.steps)
-        rows, place, plan = _in_plan(control, rows, place)
-        names = [control.points.ids[row] for row in rows]
-        breadth = evidence.half_breadth(strip, images.observations, names, plan, place, images.steps)
-        yield from _of_strip(strip, names, place, plan, breadth)
+        held = _of_photos(strip, images, control)
+        yield from _of_strip(strip, held, _half_breadth(strip, images, held))
 
 
 def weak_layout_of_models(held: ModelStripEvidence, control: GivenControl) -> Iterator[Finding]:
     """Look where the control of a strip of models lies along it and across."""
-    rows, place, plan = _in_plan(control, held.rows, held.place)
-    breadth = float(held.breadth * np.linalg.norm(np.ptp(plan, axis=0))) if len(rows) else 0.0
-    yield from _of_strip(held.strip, [control.points.ids[row] for row in rows], place, plan, breadth)
+    in_plan = _in_plan(control, held.rows, held.place)
+    breadth = float(held.breadth * np.linalg.norm(np.ptp(in_plan.plan, axis=0))) if in_plan.names else 0.0
+    yield from _of_strip(held.strip, in_plan, breadth)
 
 
-def _of_strip(
-    strip: Strip | ModelStrip, names: list[str], place: Floats, plan: Floats, breadth: float
-) -> Iterator[Finding]:
-    yield from layout.find_line(plan, breadth, names, f"strip {strip.id}", (strip.id,))
-    yield from layout.find_weak_ends(place, strip.photos, strip.id, names)
+class HeldInPlan(NamedTuple):
+    """Given points that hold the plan of a strip."""
+
+    names: list[str]
+    place: Floats  # along the strip
+    plan: Floats  # (n, 2), metres
 
 
-def _in_plan(control: GivenControl, rows: Numbers, place: Floats) -> tuple[Numbers, Floats, Floats]:
-    """Those of some given points that hold the plan: rows, places along the strip, plan coordinates in metres."""
+def _of_strip(strip: Strip | ModelStrip, held: HeldInPlan, breadth: float) -> Iterator[Finding]:
+    yield from layout.find_line(held.plan, breadth, held.names, f"strip {strip.id}", (strip.id,))
+    yield from layout.find_weak_ends(held.place, strip.photos, strip.id, held.names)
+
+
+def _of_photos(strip: Strip, images: ImageEvidence, control: GivenControl) -> HeldInPlan:
+    return _in_plan(control, *evidence.places_along_strip(strip, images.observations, control.points, images.steps))
+
+
+def _in_plan(control: GivenControl, rows: Numbers, place: Floats) -> HeldInPlan:
+    """Those of some given points that hold the plan."""
     counts = control.points.use[rows, 0] & ~control.points.check[rows]
-    given = given_points.level(control.points.take(rows[counts]), control.frames)
+    points = control.points.take(rows[counts])
+    given = given_points.level(points, control.frames)
     if given is None:
-        return rows[:0], place[:0], np.zeros((0, 2))
-    return rows[counts], place[counts], given.xyz[:, :2]
+        return HeldInPlan([], place[:0], np.zeros((0, 2)))
+    return HeldInPlan(list(points.ids), place[counts], given.xyz[:, :2])
 
 
 class HeldCameras(NamedTuple):
@@ -115,29 +123,16 @@ def _of_block(
             frames, _ = tie_frames([*inputs.frames, cameras.frame], inputs.output, directory=directory)
         except (GeometryError, InputError):
             return
-        points = _joined(points, cameras.points)
+        points = concatenated([points, cameras.points])
     given = given_points.level(points, frames)
     if given is None:
         return
     plan = given.xyz[:, :2]
-    breadth = next((half for strip in strips if (half := _half_breadth(strip, images, control)) > 0), 0.0)
+    halves = (_half_breadth(strip, images, _of_photos(strip, images, control)) for strip in strips)
+    breadth = next((half for half in halves if half > 0), 0.0)
     what = f"strip {strips[0].id}" if len(strips) == 1 else "the block"
     yield from layout.find_line(plan, breadth, names, what, [strip.id for strip in strips])
 
 
-def _half_breadth(strip: Strip, images: ImageEvidence, control: GivenControl) -> float:
-    rows, place = evidence.places_along_strip(strip, images.observations, control.points, images.steps)
-    rows, place, plan = _in_plan(control, rows, place)
-    names = [control.points.ids[row] for row in rows]
-    return evidence.half_breadth(strip, images.observations, names, plan, place, images.steps)
-
-
-def _joined(one: ControlPoints, other: ControlPoints) -> ControlPoints:
-    return ControlPoints(
-        ids=(*one.ids, *other.ids),
-        enu=np.concatenate([one.enu, other.enu]),
-        use=np.concatenate([one.use, other.use]),
-        check=np.concatenate([one.check, other.check]),
-        sigma=np.concatenate([one.sigma, other.sigma]),
-        frame=np.concatenate([one.frame, other.frame]),
-    )
+def _half_breadth(strip: Strip, images: ImageEvidence, held: HeldInPlan) -> float:
+    return evidence.half_breadth(strip, images.observations, held.names, held.plan, held.place, images.steps)

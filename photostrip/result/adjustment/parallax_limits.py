@@ -21,8 +21,8 @@ def parallax_limits(of_photos: PhotoStages, settings: RelativeSettings) -> Float
     if settings.screening in SEARCHES:
         limit = test.largest_limits(oriented.points_used)[pairs.pair] * residual_sigma(oriented, test.sigma)
     for name, bound in stages(settings, of_photos.sigma):
-        _, most, unit = tested(oriented, name, bound)
-        limit = np.minimum(limit, most * unit)
+        found = tested(oriented, name, bound)
+        limit = np.minimum(limit, found.limit * found.unit)
     known = np.flatnonzero(oriented.used & np.isfinite(limit))
     known = known[np.lexsort((limit[known], pairs.pair[known]))]
     ends = np.searchsorted(pairs.pair[known], np.arange(pairs.size + 1))

@@ -415,6 +415,16 @@ def test_every_layout_with_and_without_perspective_centres(capsys: pytest.Captur
     assert rows["corners + GNSS", "bundle"] < 0.5 * rows["corners", "bundle"]
 
 
+def test_the_worst_place_lies_at_the_photo_farthest_from_control(capsys: pytest.CaptureFixture[str]) -> None:
+    layout = "layouts.near={layout: points, points: [[1, 1], [1, 5], [2, 3]]}"
+    options = ("--models", "4", "--set", layout, "--methods", "similarity")
+    (row,) = json.loads(answer(capsys, "plan", "strip", *options, "--format", "json"))["accuracy"]
+    assert row["worst_z_at"]["photo"] == row["worst_plan_at"]["photo"] == 5
+    assert [f"{each['z_m']:.2f}" for each in row["along"]][-1] == f"{row['worst_z_m']:.2f}"
+    heads = [line.split()[2:] for line in answer(capsys, "plan", "strip", *options).splitlines() if "method  " in line]
+    assert ["1", "2", "3", "4", "5"] in heads
+
+
 def test_too_little_control_stands_in_the_table(capsys: pytest.CaptureFixture[str]) -> None:
     options = ("--models", "4", "--set", "layouts.one={layout: points, points: [[1, 1]]}", "--methods", "similarity")
     assert "cannot orient a strip" in answer(capsys, "plan", "strip", *options)

@@ -18,7 +18,7 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import InputError
-from photostrip.frozen import dataclass, replace
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.rejection import Rejection
 from photostrip.statistics import grubbs_limit, tau_limit
 from photostrip.triangulation.gross_errors.pairs.global_test import ParallaxScatter, by_number, residual_sigma
@@ -182,15 +182,23 @@ def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientati
         result = _without(result, rows)
 
 
-def tested(orientation: Orientation, test: str, bound: float) -> tuple[Floats, Floats, Floats]:
-    """Return value and limit of every row, and the millimetres of one unit of both, infinite where nothing can be told.
+class Tested(NamedTuple):
+    """Every row of the pairs as a test sees it."""
+
+    value: Floats
+    limit: Floats  # infinite where nothing can be told
+    unit: Floats  # millimetres of one unit of both
+
+
+def tested(orientation: Orientation, test: str, bound: float) -> Tested:
+    """Test single residuals.
 
     bound: the limit of the test ``parallax``, mm; the level of ``grubbs``, deviation from the mean of the pair, and of
         ``tau``, studentised residual.
     """
     pairs, count, size = orientation.pairs, orientation.points_used, orientation.parallax
     if test == "parallax":
-        return np.abs(size), np.full(len(size), bound), np.ones(len(size))
+        return Tested(np.abs(size), np.full(len(size), bound), np.ones(len(size)))
     if test == "grubbs":
         mean = pairs.sums(np.where(orientation.used, size, 0.0)) / count
         size = np.where(orientation.used, size - mean[pairs.pair], 0.0)
@@ -203,4 +211,4 @@ def tested(orientation: Orientation, test: str, bound: float) -> tuple[Floats, F
     limits = by_number(count, lambda n: limit(n) if n >= least else np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         value = np.nan_to_num(np.abs(size) / unit, posinf=0.0)
-    return value, np.where(spread > NEGLIGIBLE, limits, np.inf)[pairs.pair], unit
+    return Tested(value, np.where(spread > NEGLIGIBLE, limits, np.inf)[pairs.pair], unit)

@@ -205,7 +205,8 @@ def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, flo
     """
     size = np.maximum(np.abs(columns[in_fit]).max(axis=0, initial=TINY), TINY)
     scaled = columns / size
-    coefficient, residual, used = _reweighted(scaled, values, np.array(in_fit, bool), floor)
+    coefficient, used = _reweighted(scaled, values, np.array(in_fit, bool), floor)
+    residual = values - scaled @ coefficient
     parts = 2 if np.iscomplexobj(values) else 1
     freedom = parts * (int(used.sum()) - columns.shape[1])
     squares = float((np.abs(residual[used]) ** 2).sum())
@@ -231,19 +232,17 @@ def _weighted(columns: NDArray[Any], values: NDArray[Any], weight: Floats) -> tu
     return coefficient, values - columns @ coefficient
 
 
-def _reweighted(
-    columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, floor: float
-) -> tuple[NDArray[Any], NDArray[Any], Flags]:
-    """Fit with the weights of a first fit, then without what is far away; those kept come third."""
+def _reweighted(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, floor: float) -> tuple[NDArray[Any], Flags]:
+    """Fit with the weights of a first fit, then without what is far away; coefficients, and what is kept."""
     first = _least_median(columns, values, np.flatnonzero(in_fit))
     weight = in_fit.astype(float)
     if first is not None:
         weight = in_fit / np.maximum(first / max(_robust(first[in_fit], columns.shape[1]), floor), 0.5) ** 2
-    coefficient, residual = np.zeros(columns.shape[1], values.dtype), values
+    coefficient = np.zeros(columns.shape[1], values.dtype)
     for _ in range(REWEIGHTINGS):
         coefficient, residual = _weighted(columns, values, weight)
         middle = max(_robust(np.abs(residual[in_fit]), columns.shape[1]), floor)
         before, weight = weight, (in_fit & (np.abs(residual) < KEPT_SIGMAS * middle)).astype(float)
         if (before == weight).all():
             break
-    return coefficient, residual, weight > 0
+    return coefficient, weight > 0
