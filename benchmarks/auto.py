@@ -26,7 +26,6 @@ limit_threads()  # before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.pipeline.frames import tie_ground_frames  # noqa: E402
 from photostrip.pipeline.given_points import measured_control  # noqa: E402
 from photostrip.pipeline.image_coordinates import correct, orient_interior  # noqa: E402
@@ -36,6 +35,7 @@ from photostrip.pipeline.strips.forming import form_strips  # noqa: E402
 from photostrip.pipeline.strips.stages import Stages  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
+from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

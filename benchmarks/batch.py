@@ -85,7 +85,7 @@ def write_strips(folder: Path, strips: int, photos: int) -> list[Path]:
 
 def plain_loop(folders: Sequence[str]) -> dict[str, float]:
     """Compute strips one after the other; give seconds of computing: of the loop, of adjusting alone, at the start."""
-    from photostrip.formats.output.result_files import result_files
+    from photostrip.library.result import Result
     from photostrip.pipeline.run import triangulate
     from photostrip.project.loading import load_project
     from photostrip.result.document import document_of
@@ -97,7 +97,7 @@ def plain_loop(folders: Sequence[str]) -> dict[str, float]:
         before = time.process_time()
         result = triangulate(project.inputs, project.settings, directory=project.directory)
         adjusting += time.process_time() - before
-        result_files(document_of(result, project.remarks), project.resolved)
+        Result(document_of(result, project.remarks), resolved=project.resolved).files()
     return {"loop": time.process_time() - begin, "adjusting": adjusting, "start": begin}
 
 

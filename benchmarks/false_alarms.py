@@ -25,7 +25,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywher
 
 from benchmarks import plausibility
 from photostrip.errors import InputError, PhotostripError
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geometry.rotation import angles, from_angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.pipeline.plausibility import gate
@@ -48,6 +47,7 @@ from photostrip.simulation import (
 )
 from photostrip.simulation.simulation import simulate
 from photostrip.triangulation.bundle.settings import BundleSettings
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

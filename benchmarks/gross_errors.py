@@ -38,13 +38,13 @@ limit_threads()  # as the command does, before numpy is imported
 import numpy as np  # noqa: E402
 
 from photostrip.errors import PhotostripError  # noqa: E402
-from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.pipeline.inputs import CameraPositions  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.points import locate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE  # noqa: E402
+from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -22,7 +22,6 @@ limit_threads()  # as the command does, before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.geometry.rotation import from_vector  # noqa: E402
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
@@ -35,6 +34,7 @@ from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import orient_unchecked  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
 from photostrip.triangulation.strip_formation.strip import model_points  # noqa: E402
+from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -24,9 +24,9 @@ limit_threads()  # before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.simulation import Control, Flight, Points, Spec, simulate  # noqa: E402
+from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -28,7 +28,6 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.geodesy.tying import tie_frames  # noqa: E402
 from photostrip.pipeline.inputs import Inputs, Settings, Strip  # noqa: E402
@@ -66,6 +65,7 @@ from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import Pairs  # noqa: E402
 from photostrip.triangulation.strip_formation.strip import model_points  # noqa: E402
+from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -24,7 +24,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
 from photostrip.errors import InputError, PhotostripError
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geometry.rotation import angles, from_angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.pipeline.plausibility import gate
@@ -45,6 +44,7 @@ from photostrip.simulation import (
 )
 from photostrip.simulation.simulation import simulate
 from photostrip.triangulation.plausibility import KINDS
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

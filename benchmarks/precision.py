@@ -33,7 +33,6 @@ import numpy as np  # noqa: E402
 
 from benchmarks import accuracy  # noqa: E402
 from photostrip.camera import Camera  # noqa: E402
-from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.pipeline.inputs import Settings  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
@@ -43,6 +42,7 @@ from photostrip.simulation.spec import FILM, Control, Flight, Image, Points, Spe
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings  # noqa: E402
+from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -22,7 +22,6 @@ limit_threads()  # as the command does, before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.pipeline.strips.screened_formation import form_screened  # noqa: E402
 from photostrip.planning.screening import (  # noqa: E402
     PairLayout,
@@ -43,6 +42,7 @@ from photostrip.triangulation.relative_orientation.pairs import collect_pairs  #
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes  # noqa: E402
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings  # noqa: E402
 from photostrip.triangulation.strip_formation.strip import form_from_pairs  # noqa: E402
+from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

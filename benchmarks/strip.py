@@ -35,10 +35,10 @@ limit_threads()  # as the command does, before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.output.result_files import result_files  # noqa: E402
 from photostrip.formats.output.result_json import read_result  # noqa: E402
-from photostrip.formats.output.simulation import inputs_of, project_files  # noqa: E402
+from photostrip.formats.output.simulation import project_files  # noqa: E402
 from photostrip.formats.text.writing import write_files  # noqa: E402
+from photostrip.library.result import Result  # noqa: E402
 from photostrip.pipeline.plausibility import gate  # noqa: E402
 from photostrip.pipeline.precision import photo_precision  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
@@ -56,6 +56,7 @@ from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import orient_pairs  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, start_values  # noqa: E402
+from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -284,7 +285,7 @@ def parts(project: Path) -> dict[str, float]:
         with watch.on("result document"):
             document = document_of(result, loaded.hints)
         with watch.on("result as text"):
-            files = result_files(document, loaded.resolved)
+            files = Result(document, resolved=loaded.resolved).files()
         with watch.on(FILES):
             write_files(project.parent / "parts", files)
         with watch.on("reading result.json again"):

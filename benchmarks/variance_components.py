@@ -24,10 +24,10 @@ limit_threads()  # as the command does, before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.result.document import document_of  # noqa: E402
 from photostrip.simulation import Control, Flight, Image, Points, Spec, simulate  # noqa: E402
 from tests.pipeline.blocks import adjusted, positions  # noqa: E402
+from tests.simulated import inputs_of  # noqa: E402
 
 TRUE = {"image": 2.0, "control plan": 3.0, "control height": 1.0, "positions plan": 4.0, "positions height": 4.0}
 

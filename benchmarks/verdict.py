@@ -22,13 +22,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Points, Spec, Terrain
 from photostrip.threads import limit_threads
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.precision.photo_precision import propagation
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.absolute import OrientedStrip
@@ -15,6 +14,7 @@ from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

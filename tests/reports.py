@@ -13,13 +13,13 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from photostrip.formats.output.result_json import to_json
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.text import to_markdown, to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import GrossError
 from tests.results import solved, spec
+from tests.simulated import inputs_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

@@ -7,13 +7,15 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from photostrip.formats.output.simulation import inputs_of, project_files
+from photostrip.formats.output.simulation import project_files
 from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.library import result as library
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, GrossError, Ground, Image, Points, Spec
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,6 +40,11 @@ FRAMES = {
     "geocentric": Ground("geocentric", ("x", "y", "z")),
     "south": Ground("EPSG:32719", center_deg=(-68.0, -33.0)),
 }
+
+
+def result_files(document: Document, resolved: str = "") -> dict[str, str]:
+    """Give the files of a result, content by name."""
+    return library.Result(document, resolved=resolved).files()
 
 
 @dataclass(frozen=True, eq=False)

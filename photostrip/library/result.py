@@ -240,7 +240,7 @@ class Result:
         return text.to_markdown(title, sections) if form == "md" else text.to_text(title, sections, layout.WIDEST_PAGE)
 
     def files(self, *, html: bool = False) -> dict[str, str]:
-        """Return the files of the result, content by name: result.json, the tables, with html the report as a page."""
+        """Return the files of the result, content by name: tables, the report as a page, result.json as the last."""
         from photostrip.formats.output.result_json import to_json
 
         return self._beside_json(html=html) | {RESULT: to_json(self._document)}

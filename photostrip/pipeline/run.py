@@ -1,4 +1,4 @@
-"""The whole walk, as a table of contents: image coordinates, strips, all points together."""
+"""The whole walk, as a table of contents: numbers are those of the method in README.md."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     """Every stage takes what the stages before it found."""
     # 1 lens distortion, refraction
     refined = correct(photo, inputs, settings, ground, stages)
-    # 2-5 relative orientation, base direction and orientation chain, space intersection, strip formation
+    # 2-3 relative orientation; base direction, orientation chain, space intersection, scale transfer
     formed = form_strips(inputs, refined.observations, settings, stages)
 
     def on_the_ground(inputs: Inputs, whole: Result | None = None) -> Result:
@@ -107,7 +107,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
         missing = {}
         if whole is None:
             missing = not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips)
-        # 9 residuals, check points
+        # 6 residuals, check points
         rows, differences = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
         return Result(
             inputs=inputs,
@@ -135,7 +135,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
         )
 
     result = on_the_ground(inputs)
-    # 10 what the result says of control that it has not seen
+    # 6 what the result says of control that it has not seen
     if not settings.cross_validation:
         return result
     from photostrip.pipeline.cross_validation import cross_validate
@@ -166,13 +166,14 @@ def _adjusted(
     """Bring formed strips to the ground and adjust them, each by itself or all in a bundle."""
     control = measured_control(inputs.control, observations)
     if settings.adjustment == "bundle" and inputs.models is None:
+        # 4-5 all strips at once
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
         of_photos = cast("Sequence[FormedPhotos]", formed)
         return adjust_block(
             inputs, settings, observations, control, ground, of_photos, None if whole is None else whole.bundle
         )
-    # 6-7 intermediate frame, absolute orientation, wrong control
+    # 4 intermediate frame, absolute orientation, wrong control
     frames = tuple((frame.spec, frame.origin) for frame in (*ground.control, ground.output))
     wanted = replace(settings, adjustment="")
     screened = [
@@ -181,10 +182,11 @@ def _adjusted(
         )
         for strip in formed
     ]
-    # 8 polynomials, or the strip's own covariance
+    # 5 polynomials, or the strip's own covariance
     level = settings.covariance.level / max(len(screened), 1)  # all strips together keep it
     settings = replace(settings, covariance=replace(settings.covariance, level=level))
     strips = tuple(adjust(strip, settings) for strip in screened)
+    # 6 back to the map, with standard deviations
     return join_strips(
         strips, screened, observations, inputs.control, ground.output, settings, of_checks=whole is not None
     )

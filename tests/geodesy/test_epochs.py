@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Flight, Ground, Spec
 from photostrip.simulation.simulation import simulate
+from tests.simulated import inputs_of, settings_of
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 

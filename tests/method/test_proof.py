@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 from pyproj import Proj
 
 from photostrip.camera import Camera, Distortion
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.stages import Stages
@@ -44,6 +43,7 @@ from photostrip.triangulation.relative_orientation.orientation import RelativeSe
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 from tests.attitudes import angle_between
 from tests.loops import nonempty
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, GeometryError, InputError
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.inputs import Inputs, Settings
@@ -19,6 +18,7 @@ from photostrip.simulation import Control, Flight, Ground, Image, Simulation, Sp
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.polynomial import correction
 from tests.loops import nonempty
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

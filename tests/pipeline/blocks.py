@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Gnss, Image, Spec, simulate
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

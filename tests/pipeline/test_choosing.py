@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.choice import POLYNOMIAL, Witness, method_of
 from photostrip.pipeline.inputs import AUTO, METHODS
 from photostrip.pipeline.results import Result
@@ -20,6 +19,7 @@ from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
 from tests.loops import nonempty
+from tests.simulated import inputs_of, settings_of
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 GOOD = (0.02, 0.02, 0.02)

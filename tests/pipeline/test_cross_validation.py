@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.cross_validation import FOLDS
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.strips import forming
@@ -23,6 +22,7 @@ from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.rays import snooping
 from tests.loops import nonempty
 from tests.results import solved, spec
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from photostrip.triangulation.bundle.observations.problem import BundleProblem

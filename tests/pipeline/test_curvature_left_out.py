@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Spec
 from photostrip.simulation.simulation import simulate
+from tests.simulated import inputs_of, settings_of
 
 
 def remarks(photos: int, curvature: str = "auto") -> list[str]:

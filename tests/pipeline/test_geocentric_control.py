@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.inputs import Inputs
@@ -16,6 +15,7 @@ from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Spec, simulate
+from tests.simulated import inputs_of, settings_of
 
 MILLIMETRE = 1e-3  # m
 SIGMA = (0.05, 0.05, 0.05)  # alike in all directions: turning the axes changes nothing

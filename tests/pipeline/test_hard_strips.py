@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from tests.pipeline import blocks
+from tests.simulated import inputs_of, settings_of
 
 
 @pytest.mark.slow

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.notes import polynomial_notes
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Spec, simulate
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs, Strip

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.frames import tie_ground_frames
 from photostrip.pipeline.image_coordinates import heights_of, orient_interior
 from photostrip.pipeline.inputs import Inputs, Settings
@@ -18,6 +17,7 @@ from photostrip.simulation import simulate
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 from tests.geodesy.frames import write_gtx
 from tests.results import spec
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from pathlib import Path

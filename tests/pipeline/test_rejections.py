@@ -16,12 +16,13 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.formats.output.result_files import rejected_csv
-from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
+from photostrip.formats.output.simulation import project_files
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, GrossError, Points, Spec
 from tests.loops import nonempty
+from tests.simulated import inputs_of, settings_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

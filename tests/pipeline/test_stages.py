@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import METHODS, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips import absolute, forming
@@ -20,6 +19,7 @@ from photostrip.simulation.simulation import simulate
 from photostrip.triangulation.gross_errors.pairs import screening
 from tests.loops import nonempty
 from tests.results import spec
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs

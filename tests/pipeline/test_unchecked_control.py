@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Spec
 from photostrip.simulation.simulation import simulate
+from tests.simulated import inputs_of, settings_of
 
 
 def remarks(control: Control, method: str, photos: int = 8, strips: int = 1) -> list[str]:

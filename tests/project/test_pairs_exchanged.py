@@ -13,13 +13,13 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.formats.measured.observations import Manner, read_measurements
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.formats.text.findings import Findings
 from photostrip.project.checks.check import check_project
 from photostrip.simulation import Flight, Spec
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
 from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.report.html import to_html
 from photostrip.result.records import as_lists
@@ -22,6 +21,7 @@ from tests.browser import Browser, chromium, opened
 from tests.loops import nonempty
 from tests.reports import saved
 from tests.results import case, solved, spec
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.report.html import to_html
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight
 from tests.loops import nonempty
 from tests.results import solved, spec
+from tests.simulated import inputs_of
 
 MOST = 3000  # bytes for each photo
 

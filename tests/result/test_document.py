@@ -14,7 +14,6 @@ import pytest
 from pyproj import CRS, Transformer
 from scipy.spatial.transform import Rotation
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings
 from photostrip.result.document import document_of
@@ -25,6 +24,7 @@ from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, GrossError
 from tests.loops import nonempty
 from tests.results import FRAMES, NORTH_FIRST, Case, case, solved, spec, written_to
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from photostrip.formats.output.result_json import to_json
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.result.columns import photos_csv, points_csv, rejected_csv, reliability_csv
 from photostrip.result.description import Quantity, described, quantity_at
@@ -23,6 +22,7 @@ from photostrip.simulation import Models, simulate
 from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline
 from tests.results import case, solved, spec
+from tests.simulated import inputs_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

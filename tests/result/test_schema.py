@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
@@ -18,6 +17,7 @@ from photostrip.result.schema import result_page, result_schema
 from photostrip.simulation import Models, Spec, simulate
 from tests.loops import nonempty
 from tests.results import case, spec
+from tests.simulated import inputs_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

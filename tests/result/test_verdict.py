@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.report.page.text import to_text
@@ -20,6 +19,7 @@ from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Spec, Terrain
 from photostrip.statistics import binomial_p_value
 from tests.results import Document, case, solved, spec
+from tests.simulated import inputs_of, settings_of
 
 
 def with_checks(plan: int, height: int) -> Document:

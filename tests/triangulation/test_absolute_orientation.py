@@ -13,13 +13,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, GeometryError, InputError
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Flight, Ground, Spec, simulate
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, Targets, orient, weights
+from tests.simulated import inputs_of
 from tests.strips import attitude, control_points, fly, project, targets
 from tests.vectors import cases
 

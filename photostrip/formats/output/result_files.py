@@ -1,4 +1,4 @@
-"""The files of a result: result.json and the CSV tables beside it."""
+"""The files of a result beside result.json: CSV tables, and the project as it was resolved."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from photostrip.formats.output.result_json import to_json
 from photostrip.formats.text import number_columns
 from photostrip.formats.text.number_columns import Cells
 from photostrip.notes import Document
@@ -26,17 +25,12 @@ NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
 BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column
 
 
-def result_files(document: Document, resolved: str = "", refined: str = "") -> dict[str, str]:
-    """Return all files of a result: content by file name.
-
-    result.json comes last: when it is there, all are. `resolved` is the text of project.resolved.yaml, `refined` that
-    of refined.csv, which is not rendered from the document; they are not written when they are empty.
-    """
-    return {**beside_json(document, resolved, refined), "result.json": to_json(document)}
-
-
 def beside_json(document: Document, resolved: str, refined: str) -> dict[str, str]:
-    """Return the files beside result.json."""
+    """Return the files beside result.json: content by file name.
+
+    `resolved` is the text of project.resolved.yaml, `refined` that of refined.csv, which is not rendered from the
+    document; they are not written when they are empty.
+    """
     frame, photos = document["frame"], document["photos"]
     angles = photos[0]["angles"] if photos else {"system": "alpha-omega-kappa", "unit": "deg"}
     unit = angles["unit"]

@@ -1,4 +1,4 @@
-"""A simulation as a project: in memory as the pipeline takes it, and as files that ``photostrip run`` reads.
+"""A simulation as a project: the files that ``photostrip run`` reads.
 
 Files are the same to the byte for the same specification: fixed decimals, no time stamps, points in the order in
 which they were placed.
@@ -13,55 +13,12 @@ from photostrip.camera import Camera
 from photostrip.formats.output import simulation_tables as tables
 from photostrip.formats.output.simulation_tables import on_one_line
 from photostrip.formats.output.simulation_truth import truth_text
-from photostrip.frozen import replace
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted
-from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
-from photostrip.points import ModelPoints, PhotoPoints
+from photostrip.pipeline.inputs import ModelStrip
+from photostrip.points import ModelPoints
 from photostrip.simulation import Simulation
-from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
-
-
-def inputs_of(simulation: Simulation) -> Inputs:
-    """Return what a project file and its tables would say of a simulation, without rounding."""
-    if simulation.models is not None:
-        return _inputs_of_models(simulation, simulation.models)
-    return Inputs(
-        name=simulation.spec.name,
-        strips=tuple(Strip(name, simulation.camera, photos) for name, photos in simulation.strips),
-        observations=simulation.observations,
-        control=simulation.control,
-        frames=simulation.frames,
-        fiducials=simulation.fiducials,
-    )
-
-
-def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
-    """Return the same of a simulation of models; those of left-handed axes are turned over, as a project says it."""
-    if simulation.spec.models is not None and simulation.spec.models.hand == "left-handed":
-        points = replace(points, xyz=points.xyz * (1.0, -1.0, 1.0))
-    return Inputs(
-        name=simulation.spec.name,
-        strips=(),
-        observations=PhotoPoints.naming(points.point_ids),
-        control=simulation.control,
-        frames=simulation.frames,
-        models=MeasuredModels(tuple(_flights(simulation, points)), points),
-    )
-
-
-def _flights(simulation: Simulation, points: ModelPoints) -> Iterator[ModelStrip]:
-    first = 0
-    for name, photos in simulation.strips:
-        end = first + len(photos) - 1
-        yield ModelStrip(name, photos, points.model_ids[first:end])
-        first = end
-
-
-def settings_of(simulation: Simulation) -> Settings:
-    """Return the settings that the written project has: defaults, and refraction when it was simulated."""
-    return Settings(refinement=ImageCorrectionSettings(refraction=simulation.spec.refraction))
 
 
 def project_files(simulation: Simulation) -> dict[str, str]:
@@ -81,6 +38,15 @@ def project_files(simulation: Simulation) -> dict[str, str]:
     files["truth.json"] = truth_text(simulation, output)
     files["project.yaml"] = _project(simulation)
     return files
+
+
+def model_strips(simulation: Simulation, points: ModelPoints) -> Iterator[ModelStrip]:
+    """Name the strips of models as a project does, one for each strip of photos."""
+    first = 0
+    for name, photos in simulation.strips:
+        end = first + len(photos) - 1
+        yield ModelStrip(name, photos, points.model_ids[first:end])
+        first = end
 
 
 def control_file(number: int) -> str:
@@ -106,7 +72,7 @@ def _project(simulation: Simulation) -> str:
 def _of_models(simulation: Simulation, measured: ModelPoints) -> list[str]:
     lines = ["strips:"]
     listed = simulation.spec.models is not None and not simulation.spec.models.centers
-    for strip in _flights(simulation, measured):
+    for strip in model_strips(simulation, measured):
         lines += [f"  - id: {on_one_line(strip.id)}", f"    photos: {on_one_line(strip.photos)}"]
         if listed:  # without centres nothing else tells which photos a model shows
             lines += [f"    models: {on_one_line(strip.models)}"]

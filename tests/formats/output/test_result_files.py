@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from tests.loops import nonempty
-from tests.results import FRAMES, case, solved
+from tests.results import FRAMES, case, result_files, solved
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -89,7 +88,7 @@ def test_every_record_stands_on_a_line_of_its_own() -> None:
 def test_two_runs_write_the_same_bytes() -> None:
     """In two processes, with different orders of sets and dictionaries of texts."""
     code = (
-        "from tests.results import *\nfrom photostrip.formats.output.result_files import result_files\nimport hashlib\n"
+        "from tests.results import *\nimport hashlib\n"
         "files = result_files(case('projected', 2).document, 'resolved')\n"
         "print({name: hashlib.sha256(text.encode()).hexdigest() for name, text in files.items()})"
     )

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from photostrip.camera import Distortion
-from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
+from photostrip.formats.output.simulation import project_files
 from photostrip.formats.text.writing import write_files
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.project.loading import load_project
@@ -34,6 +34,7 @@ from photostrip.simulation import (
     simulate,
 )
 from tests.loops import nonempty
+from tests.simulated import inputs_of, settings_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Strip
 from photostrip.points import PhotoPoints
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Image, Points, Spec, Terrain
 from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

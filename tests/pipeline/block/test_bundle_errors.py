@@ -10,7 +10,6 @@ import pytest
 
 from benchmarks.variance_components import TRUE, factors
 from photostrip.errors import GeometryError
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
@@ -18,6 +17,7 @@ from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.solve import solve
 from tests.loops import nonempty
 from tests.pipeline.blocks import adjusted, corners, errors, positions, simulate, with_control
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result
@@ -152,8 +152,8 @@ def test_what_the_user_keeps_stays() -> None:
     simulation = simulate(replace(BLOCK, gross_errors=(GrossError("image", count=1, size_um=120.0),)))
     (error,) = simulation.truth.errors
     inputs = inputs_of(simulation)
-    from photostrip.formats.output.simulation import settings_of
     from photostrip.pipeline.run import triangulate
+    from tests.simulated import settings_of
 
     settings = replace(settings_of(simulation), adjustment="bundle")
     keep = replace(settings, relative=replace(settings.relative, keep=[f"{error.photo}/{error.point}"]))

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.simulation import Control, Flight, Ground, Spec, Terrain
 from photostrip.triangulation.bundle.normal_equations.defects import GROWN, LOOSE_SHARE
 from tests.pipeline.blocks import adjusted, errors, photos_of, positions, simulate
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs

@@ -9,8 +9,6 @@ import pytest
 
 from photostrip.comparison import compare_results
 from photostrip.errors import GeometryError
-from photostrip.formats.output.result_files import result_files
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
@@ -21,6 +19,8 @@ from photostrip.result.trace.trace import trace_of
 from photostrip.result.verdict import verdict_of
 from photostrip.simulation import Control, Flight, Ground, Simulation, Spec
 from tests.pipeline.blocks import adjusted, errors, exact, orientations, simulate, with_control
+from tests.results import result_files
+from tests.simulated import inputs_of, settings_of
 
 MICROMETRE = 1e-6  # metres
 MANY = Control(noise=(0.0, 0.0, 0.0), layout="bands", bands=6, per_band=3)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings
 from photostrip.pipeline.results import StripResult
@@ -26,6 +25,7 @@ from photostrip.triangulation.polynomial import correction
 from tests.draws import orthogonal_normal
 from tests.loops import nonempty
 from tests.models import inputs, truth
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

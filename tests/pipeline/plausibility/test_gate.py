@@ -14,7 +14,7 @@ from benchmarks import plausibility
 from photostrip.camera import Distortion
 from photostrip.cli.main import main
 from photostrip.errors import InputError, PhotostripError
-from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
+from photostrip.formats.output.simulation import project_files
 from photostrip.geometry.rotation import angles
 from photostrip.pipeline.inputs import GivenOrientations, Settings
 from photostrip.pipeline.plausibility import evidence, gate, image_evidence
@@ -38,6 +38,7 @@ from photostrip.triangulation.plausibility import KINDS
 from photostrip.triangulation.plausibility.control.straightening import StripPoints
 from photostrip.triangulation.plausibility.photos import flight_order
 from tests.pipeline.blocks import positions
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

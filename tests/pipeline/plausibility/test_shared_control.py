@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.inputs import CameraPositions
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Spec
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Gnss
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

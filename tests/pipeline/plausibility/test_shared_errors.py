@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from benchmarks import plausibility
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.inputs import CameraPositions
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, GrossError, Spec, Terrain
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Gnss
 from tests.loops import nonempty
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from benchmarks import false_alarms
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import FILM, Control, Flight, Gnss, Ground, Image, Models, Points, Spec, Terrain, simulate
 from tests.pipeline.blocks import orientations, positions, with_control
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers

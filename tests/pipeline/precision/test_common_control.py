@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.precision import photo_precision
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Image, Points, Spec, simulate
 from photostrip.triangulation.polynomial import correction
 from tests.derivatives import UNSCREENED, oriented_of
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,13 +6,13 @@ from unittest.mock import Mock
 
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.geodesy import proj_operation
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Points, Spec
+from tests.simulated import inputs_of
 
 ADJUSTMENTS = ("polynomial", "covariance", "bundle")
 

@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_files import result_files
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.html import to_html
 from photostrip.report.page.angles import UNITS
@@ -22,7 +20,8 @@ from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.adjustment.bundle import kinds
 from photostrip.simulation.simulation import simulate
 from tests.loops import nonempty
-from tests.results import solved, spec, write_project
+from tests.results import result_files, solved, spec, write_project
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from pathlib import Path

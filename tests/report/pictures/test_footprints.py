@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.report.pictures.ground.footprints import footprint_pictures
 from photostrip.report.pictures.ground.plan_view import plan_of
 from photostrip.report.pictures.ground.terrain import footprints, straightened
@@ -20,6 +19,7 @@ from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Ground, Image, Spec, Terrain
 from tests.loops import nonempty
 from tests.results import Document, solved
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

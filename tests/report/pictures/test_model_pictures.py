@@ -10,13 +10,13 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.html import to_html
 from photostrip.report.pictures.result.pictures import pictures_of
 from photostrip.simulation import Models, simulate
 from tests.loops import nonempty
 from tests.results import Document, solved, spec
+from tests.simulated import inputs_of
 
 
 @cache

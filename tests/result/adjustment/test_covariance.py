@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
@@ -16,6 +15,7 @@ from photostrip.simulation.spec import GrossError
 from photostrip.statistics import gamma_cdf
 from tests.loops import nonempty
 from tests.results import Case, case, solved, spec
+from tests.simulated import inputs_of
 
 
 @cache

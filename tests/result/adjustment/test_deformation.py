@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline.run import triangulate
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.adjustment.deformation import model_deformations
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Points, Spec, Terrain, simulate
 from tests.loops import nonempty
+from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result

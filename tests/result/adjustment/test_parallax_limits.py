@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.pictures.result.pictures import pictures_of
 from photostrip.simulation.simulation import simulate
@@ -17,6 +16,7 @@ from photostrip.simulation.spec import GrossError
 from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest
 from tests.loops import nonempty
 from tests.results import Case, case, solved, spec
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from tests.results import Document

@@ -9,8 +9,8 @@ from functools import cache
 
 import numpy as np
 
-from photostrip.formats.output.result_files import refined_csv, result_files
-from photostrip.formats.output.simulation import inputs_of
+from photostrip.formats.output.result_files import refined_csv
+from photostrip.library.result import Result
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.page.parts import Table
 from photostrip.report.sections.accuracy_report import SectionName, chosen_sections
@@ -19,6 +19,7 @@ from photostrip.simulation.spec import Film
 from tests.loops import nonempty
 from tests.result.test_quantities import faults
 from tests.results import Case, case, solved, spec
+from tests.simulated import inputs_of
 
 MICROMETRES = 1e3  # in a millimetre
 
@@ -81,10 +82,10 @@ def test_refined_csv_has_every_image_point_after_every_correction() -> None:
 
 
 def test_refined_csv_is_written_of_photos_only() -> None:
-    assert "refined.csv" in result_files(film().document, refined=refined_csv(film().result))
+    assert "refined.csv" in Result(film().document, computed=film().result).files()
     models = solved(inputs_of(simulate(replace(spec(), models=Models()))))
     assert refined_csv(models.result) == ""
-    assert "refined.csv" not in result_files(models.document, refined=refined_csv(models.result))
+    assert "refined.csv" not in Result(models.document, computed=models.result).files()
 
 
 def test_ids_are_quoted_in_refined_csv() -> None:

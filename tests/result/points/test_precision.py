@@ -10,7 +10,6 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from photostrip.formats.output.result_files import result_files
 from photostrip.geometry.rotation import SYSTEMS, angle_rates, angles, from_angles, from_vector
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Precision
@@ -19,7 +18,7 @@ from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.result.document import document_of
 from photostrip.result.points.precision import ellipses
 from tests.loops import nonempty
-from tests.results import FRAMES, Case, case, solved
+from tests.results import FRAMES, Case, case, result_files, solved
 
 SAMPLES = 200_000
 

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from photostrip.formats.output.simulation import inputs_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec, Terrain
 from photostrip.triangulation.plausibility.control import layout
@@ -19,6 +18,7 @@ from photostrip.triangulation.plausibility.control.digits import slip
 from photostrip.triangulation.plausibility.control.plan_fit import fit_robustly, fit_similarity, upright
 from photostrip.triangulation.plausibility.control.straightening import Rays
 from photostrip.triangulation.plausibility.photos import flight, flight_order, rotations
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -1,0 +1,48 @@
+"""A simulation as the pipeline takes it, in memory: what its project file and tables would say."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip.formats.output.simulation import model_strips
+from photostrip.frozen import replace
+from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
+from photostrip.points import PhotoPoints
+from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
+
+if TYPE_CHECKING:
+    from photostrip.points import ModelPoints
+    from photostrip.simulation import Simulation
+
+
+def inputs_of(simulation: Simulation) -> Inputs:
+    """Return what a project file and its tables would say of a simulation, without rounding."""
+    if simulation.models is not None:
+        return _inputs_of_models(simulation, simulation.models)
+    return Inputs(
+        name=simulation.spec.name,
+        strips=tuple(Strip(name, simulation.camera, photos) for name, photos in simulation.strips),
+        observations=simulation.observations,
+        control=simulation.control,
+        frames=simulation.frames,
+        fiducials=simulation.fiducials,
+    )
+
+
+def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
+    """Return the same of a simulation of models; those of left-handed axes are turned over, as a project says it."""
+    if simulation.spec.models is not None and simulation.spec.models.hand == "left-handed":
+        points = replace(points, xyz=points.xyz * (1.0, -1.0, 1.0))
+    return Inputs(
+        name=simulation.spec.name,
+        strips=(),
+        observations=PhotoPoints.naming(points.point_ids),
+        control=simulation.control,
+        frames=simulation.frames,
+        models=MeasuredModels(tuple(model_strips(simulation, points)), points),
+    )
+
+
+def settings_of(simulation: Simulation) -> Settings:
+    """Return the settings that the written project has: defaults, and refraction when it was simulated."""
+    return Settings(refinement=ImageCorrectionSettings(refraction=simulation.spec.refraction))
