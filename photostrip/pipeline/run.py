@@ -22,7 +22,7 @@ from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
 from photostrip.pipeline.results import AdjustedStrips, Result
 from photostrip.pipeline.strips.absolute import StripStage, on_control
-from photostrip.pipeline.strips.adjusting import adjust
+from photostrip.pipeline.strips.adjusting import adjust, adjust_without
 from photostrip.pipeline.strips.forming import as_single_photos, form_strips
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.pipeline.strips.stages import Stages
@@ -178,14 +178,25 @@ def _adjusted(
     wanted = replace(settings, adjustment="")
     screened = [
         stages.once(
-            "control", partial(on_control, strip, control, ground.control, settings), strip, control, frames, wanted
+            "control",
+            partial(on_control, strip, control, ground.control, settings, searched=whole is not None),
+            strip,
+            control,
+            frames,
+            wanted,
+            whole is None,
         )
         for strip in formed
     ]
     # 5 polynomials, or the strip's own covariance
     level = settings.covariance.level / max(len(screened), 1)  # all strips together keep it
     settings = replace(settings, covariance=replace(settings.covariance, level=level))
-    strips = tuple(adjust(strip, settings) for strip in screened)
+    if whole is None:
+        strips = tuple(adjust(strip, settings) for strip in screened)
+    else:
+        strips = tuple(
+            adjust_without(before, strip, settings) for before, strip in zip(whole.strips, screened, strict=True)
+        )
     # 6 back to the map, with standard deviations
     return join_strips(
         strips, screened, observations, inputs.control, ground.output, settings, of_checks=whole is not None

@@ -52,10 +52,13 @@ def test_a_fold_is_the_run_without_its_point(adjustment: str) -> None:
         (given,) = (row for row in alone["control"] if row["id"] == name)
         (tested,) = alone["precision"]["check"]["points"]
         keys = ("dx", "dy", "dz", "plan", "height", "plan_um", "height_um")
-        assert {key: rows[name][key] for key in keys} == {key: given[key] for key in keys}
-        assert (rows[name]["z_plan"], rows[name]["z_height"]) == (tested["plan"], tested["height"])
         (point,) = (row for row in alone["points"] if row["id"] == name)
-        assert [rows[name][f"sigma_{axis}"] for axis in "xyz"] == [point[f"sigma_{axis}"] for axis in "xyz"]
+        expected = {key: given[key] for key in keys}
+        expected |= {"z_plan": tested["plan"], "z_height": tested["height"]}
+        expected |= {f"sigma_{axis}": point[f"sigma_{axis}"] for axis in "xyz"}
+        found = {key: rows[name][key] for key in expected}
+        # the system of the covariance is not made again: its derivatives stand at another solution
+        assert found == (pytest.approx(expected, rel=2e-3) if adjustment == "covariance" else expected)
 
 
 @pytest.mark.slow
@@ -159,7 +162,7 @@ def test_without_standard_deviations_nothing_is_predicted_but_differences_are_th
 def test_control_that_the_whole_rejected_is_not_searched_for_again(
     adjustment: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A fifth of the control 30 m off: after the whole, each fold needs one round of tests, not one for each point."""
+    """A fifth of the control 30 m off: after the whole, each fold is one adjustment."""
     inputs = without_checks(bands=5)
     enu, rng = inputs.control.enu.copy(), np.random.default_rng(2)
     wrong = rng.choice(len(enu), len(enu) // 5, replace=False)
@@ -185,4 +188,4 @@ def test_control_that_the_whole_rejected_is_not_searched_for_again(
     assert rejected >= {given.control.ids[row] for row in wrong}
     assert not rejected & {row["id"] for row in nonempty(again["cross_validation"]["points"])}
     assert len(searched) == 2 * alone[0]  # nothing more than in the whole of the second run
-    assert len(adjusted) <= 2 * alone[1] + 3 * FOLDS
+    assert len(adjusted) == 2 * alone[1] + (FOLDS if adjustment == "bundle" else 0)

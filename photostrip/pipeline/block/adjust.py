@@ -52,38 +52,30 @@ def adjust_block(
     """
     known = known_of(inputs, control, ground)
 
-    def screened_from(start: BlockStart) -> tuple[BlockProblem, ScreenedBundle]:
-        block = block_problem.build(inputs, settings, observations, control, ground, start)
-        if before is not None:
-            block = _begin_from(before, block, len(observations))
-        try:
-            block = _refilled(block, control, ground.control)
-            return block, snooping.screen_bundle(block.problem, block.begin, settings.bundle, block.kept)
-        except GeometryError as error:
-            _name_undetermined(block, error)
-            raise
-
     def formed(adjustment: str) -> BlockStart:
         return block_start.start(inputs, replace(settings, adjustment=adjustment), stages, observations, known)
 
-    start = _start_from(before, observations, known.control) if before is not None else formed(POLYNOMIAL)
-    try:
-        block, screened = screened_from(start)
-    except GeometryError as error:
-        if error.code != "bundle-diverged" or before is not None:
-            raise
-        # between bands of control 2000 models apart polynomials leave a strip 80 km off, its own covariance 44 m
-        start = formed(COVARIANCE)
-        block, screened = screened_from(start)
-    asked = block.problem.common_names()
-    for shared in screened.common:
-        block = replace(block, problem=taken_up(block.problem, shared))
-    sigma0 = reliability.sigma0_test(screened.solution)
-    estimated = _Estimated(block, screened)
-    if settings.bundle.variance_components:
-        estimated = _with_components(block, screened, settings)
-    bundle = _bundle(inputs, settings, start, estimated, sigma0)
-    _refuse_inseparable(bundle.correlations, set(asked))
+    def searched_from(start: BlockStart) -> _Estimated:
+        block = block_problem.build(inputs, settings, observations, control, ground, start)
+        return _searched(block, control, ground.control, settings)
+
+    if before is not None:
+        start = _start_from(before, observations, known.control)
+        block = block_problem.build(inputs, settings, observations, control, ground, start)
+        block = _refilled(_begin_from(before, block, len(observations)), control, ground.control)
+        estimated = _as_before(before, block, settings)
+    else:
+        start = formed(POLYNOMIAL)
+        try:
+            estimated = searched_from(start)
+        except GeometryError as error:
+            if error.code != "bundle-diverged":
+                raise
+            # between bands of control 2000 models apart polynomials leave a strip 80 km off, its own covariance 44 m
+            start = formed(COVARIANCE)
+            estimated = searched_from(start)
+    bundle = _bundle(inputs, settings, start, estimated)
+    _refuse_inseparable(bundle.correlations, set(estimated.asked))
     adjusted = block_result.adjusted_strips(inputs, observations, ground.output, bundle)
     if adjusted.precision is None or not settings.precision:
         return replace(adjusted, precision=None)
@@ -101,17 +93,15 @@ def _start_from(before: Bundle, observations: PhotoPoints, control: ControlPoint
 
 
 def _begin_from(before: Bundle, block: BlockProblem, measured: int) -> BlockProblem:
-    """Begin without what an adjustment with more control rejected, but for rays of points that have none now."""
+    """Begin without what an adjustment with more control rejected."""
     held, whole = before.screened.selection, before.block.problem
     inside = np.zeros(measured, bool)
     inside[before.block.rows[held.images]] = True
     used = np.ones((whole.points, 3), bool)
     used[whole.control.point] = held.control
-    lost = np.setdiff1d(before.block.problem.control.point, block.problem.control.point)
-    left, again = inside[block.rows], np.isin(block.problem.images.point, lost)
-    rows = left | again
+    rows = inside[block.rows]
     begin = Selection(
-        images=np.where(again, block.begin.images, left)[rows],
+        images=np.ones(rows.sum(), bool),
         control=block.begin.control & used[block.problem.control.point],
         positions=held.positions,
         attitudes=held.attitudes,
@@ -173,14 +163,45 @@ class _Estimated(NamedTuple):
 
     block: BlockProblem
     screened: ScreenedBundle
+    sigma0: reliability.Sigma0Test  # with the stated standard deviations
+    asked: Sequence[str]  # names of the unknowns that the project asks for
     components: tuple[variance_components.Component, ...] = ()
 
 
-def _with_components(block: BlockProblem, screened: ScreenedBundle, settings: Settings) -> _Estimated:
+def _searched(
+    block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> _Estimated:
+    """Adjust, and search for gross errors, for what groups of observations share, and for variance components."""
+    asked = block.problem.common_names()
+    try:
+        block = _refilled(block, control, frames)
+        screened = snooping.screen_bundle(block.problem, block.begin, settings.bundle, block.kept)
+    except GeometryError as error:
+        _name_undetermined(block, error)
+        raise
+    for shared in screened.common:
+        block = replace(block, problem=taken_up(block.problem, shared))
+    found = _Estimated(block, screened, reliability.sigma0_test(screened.solution), asked)
+    return _with_components(found, settings) if settings.bundle.variance_components else found
+
+
+def _as_before(before: Bundle, block: BlockProblem, settings: Settings) -> _Estimated:
+    """Adjust once, with what the search in an adjustment with more control has found."""
+    asked, problem = block.problem.common_names(), block.problem
+    for shared in before.screened.common:
+        problem = taken_up(problem, shared)
+    problem = variance_components.scaled(problem, before.components, block.level)
+    screened = ScreenedBundle.of(problem, supported(problem, block.begin), settings.bundle)
+    screened = replace(screened, common=before.screened.common)
+    sigma0 = reliability.sigma0_test(screened.solution)
+    return _Estimated(replace(block, problem=problem), screened, sigma0, asked, before.components)
+
+
+def _with_components(before: _Estimated, settings: Settings) -> _Estimated:
     """Estimate variance components, then search for gross errors once more with the standard deviations found."""
     found: tuple[variance_components.Component, ...] = ()
-    problem, level = block.problem, block.level
-    done = screened
+    block, screened = before.block, before.screened
+    problem, level, done = block.problem, block.level, screened
     quiet = replace(settings.bundle, screening="none")
     for _ in range(variance_components.ITERATIONS):
         step = variance_components.components(done.problem, done.solution, done.precision, level)
@@ -192,16 +213,15 @@ def _with_components(block: BlockProblem, screened: ScreenedBundle, settings: Se
         done = snooping.screen_bundle(chosen, screened.selection, quiet)
     block = replace(block, problem=problem)
     final = snooping.screen_bundle(problem, screened.selection, settings.bundle, block.kept)
-    before = {(each.kind, each.row) for each in screened.rejections}
-    again = (each for each in final.rejections if (each.kind, each.row) not in before)
-    return _Estimated(block, replace(final, rejections=(*screened.rejections, *again), common=screened.common), found)
+    known = {(each.kind, each.row) for each in screened.rejections}
+    again = (each for each in final.rejections if (each.kind, each.row) not in known)
+    final = replace(final, rejections=(*screened.rejections, *again), common=screened.common)
+    return before._replace(block=block, screened=final, components=found)
 
 
-def _bundle(
-    inputs: Inputs, settings: Settings, start: BlockStart, estimated: _Estimated, sigma0: reliability.Sigma0Test
-) -> Bundle:
+def _bundle(inputs: Inputs, settings: Settings, start: BlockStart, estimated: _Estimated) -> Bundle:
     """Collect the results of the adjustment."""
-    block, screened, components = estimated
+    block, screened = estimated.block, estimated.screened
     problem, solution, precision = screened.problem, screened.solution, screened.precision
     parameters = self_calibration.parameters_of(problem, solution, precision)
     correlations = _correlations(solution, precision)
@@ -213,8 +233,8 @@ def _bundle(
         block=block,
         screened=screened,
         groups=reliability.groups_of(problem, solution, precision),
-        sigma0=sigma0,
-        components=components,
+        sigma0=estimated.sigma0,
+        components=estimated.components,
         parameters=parameters,
         correlations=correlations,
         singles=tuple(

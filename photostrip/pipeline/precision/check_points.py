@@ -99,9 +99,7 @@ def by_fit(
 
 def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> CheckErrors:
     """Return the errors at the check points of a strip that was adjusted with its own covariance."""
-    from photostrip.triangulation.covariance_adjustment import prediction  # no other adjustment needs it
-
-    return _errors(compared, prediction.joint_covariance(adjusted.system, compared.coordinates.rows), adjusted.factor)
+    return _errors(compared, adjusted.joint_covariance(compared.coordinates.rows), 1.0)
 
 
 def _errors(compared: CheckDifferences, covariance: Floats, factor: float) -> CheckErrors:

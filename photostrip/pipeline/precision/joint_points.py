@@ -42,8 +42,6 @@ def _of_bundle(result: Result, rows: Numbers, axes: Floats) -> Floats:
 
 
 def _of_strip(result: Result, rows: Numbers, axes: Floats) -> Floats:
-    from photostrip.triangulation.covariance_adjustment import prediction
-
     strip, places = _strip_of(result, result.points.number[rows])
     stages = strip.photo_stages
     if stages is None or stages.covariance is None:
@@ -51,7 +49,7 @@ def _of_strip(result: Result, rows: Numbers, axes: Floats) -> Floats:
     adjusted = stages.covariance
     directions = (axes @ strip.intermediate.axes).reshape(-1, 3)
     wanted = adjusted.system.errors.points.take(np.repeat(places, 3)).along(directions)
-    joint = prediction.joint_covariance(adjusted.system, wanted) * adjusted.factor
+    joint = adjusted.joint_covariance(wanted)
     return joint.reshape(len(rows), 3, len(rows), 3)
 
 

@@ -173,10 +173,21 @@ def orient_on_control(
 
 
 def on_control(
-    stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+    stage: StripStage[Errors],
+    control: ControlPoints,
+    frames: Sequence[GroundFrame],
+    settings: Settings,
+    *,
+    searched: bool = False,
 ) -> ScreenedStrip[Errors]:
-    """Lay a strip on that of its control which nothing contradicts."""
-    return reject_wrong_control(orient_on_control(stage, control, frames, settings.absolute), settings)
+    """Lay a strip on that of its control which nothing contradicts.
+
+    searched: whether the control was searched already; then all of it is kept.
+    """
+    oriented = orient_on_control(stage, control, frames, settings.absolute)
+    if searched:
+        return ScreenedStrip(oriented, control_screening.not_screened(oriented.control))
+    return reject_wrong_control(oriented, settings)
 
 
 def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) -> ScreenedStrip[Errors]:

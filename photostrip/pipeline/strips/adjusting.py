@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from photostrip.frozen import replace
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.choice import COVARIANCE, POLYNOMIAL, Deformation
 from photostrip.pipeline.inputs import AUTO, Settings
@@ -20,6 +23,28 @@ def adjust(screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:
     """Correct the deformation of a strip and orient its photos on the corrected points."""
     oriented = screened.oriented
     return oriented.stage.adjusted(screened, _deformation(oriented, settings), settings)
+
+
+def adjust_without(whole: StripResult, screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:
+    """Adjust a strip as ``whole`` was, on the part of its control that ``screened`` holds.
+
+    Raises numpy.linalg.LinAlgError where this part does not determine the rest.
+    """
+    covariance = None if whole.photo_stages is None else whole.photo_stages.covariance
+    if whole.photo_stages is None or covariance is None:
+        asked = POLYNOMIAL if settings.adjustment == AUTO else settings.adjustment
+        return adjust(screened, replace(settings, adjustment=asked))
+    held = np.isin(whole.control.ids, screened.oriented.control.ids)
+    gone = np.flatnonzero(~held[covariance.control.point])
+    if not len(gone):
+        return whole
+    left = covariance.without(gone)
+    return replace(
+        whole,
+        xyz=left.xyz,
+        cartesian=whole.intermediate.cartesian_from_intermediate(left.xyz),
+        photo_stages=replace(whole.photo_stages, covariance=left),
+    )
 
 
 def adjust_formed(

@@ -16,9 +16,11 @@ from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, T
 from photostrip.triangulation.covariance_adjustment import conditions as strip_conditions
 from photostrip.triangulation.covariance_adjustment import prediction, relinearisation
 from photostrip.triangulation.covariance_adjustment import system as strip_system
+from photostrip.triangulation.covariance_adjustment.left_out import Without
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
 from photostrip.triangulation.error_propagation import control_errors, strip_errors
 from photostrip.triangulation.error_propagation.covariances import image_variance
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
@@ -41,6 +43,7 @@ class CovarianceAdjustment:
     sigma: float  # standard deviation of an image coordinate of weight one, mm
     system: strip_system.System  # the solved system, with the rows of the strip and the conditions
     formations: int  # how often the strip was formed
+    left_out: Without | None = None  # control of the system that takes no part, when it was left out afterwards
 
     @cached_property
     def points(self) -> Floats:
@@ -49,7 +52,20 @@ class CovarianceAdjustment:
 
     def of_points(self, points: Numbers) -> Floats:
         """Covariances (n, 3, 3) of some of the points, metres^2."""
-        return prediction.covariances(self.system, self.system.errors.points.take(points)) * self.factor
+        rows = self.system.errors.points.take(points)
+        covariances = prediction.covariances(self.system, rows)
+        if self.left_out is not None:
+            explained = self.left_out.explained(rows)
+            covariances += explained @ explained.transpose(0, 2, 1)
+        return covariances * self.factor
+
+    def joint_covariance(self, rows: ErrorRows) -> Floats:
+        """Covariances (n, n) of rows with d = 1, metres^2."""
+        covariance = prediction.joint_covariance(self.system, rows)
+        if self.left_out is not None:
+            explained = self.left_out.explained(rows)[:, 0]
+            covariance += explained @ explained.T
+        return covariance * self.factor
 
     @cached_property
     def photos(self) -> Floats:
@@ -63,8 +79,28 @@ class CovarianceAdjustment:
         coordinates: (c,), rows of ``control``.
         Returns (n, 3, c), derivatives, intermediate frame.
         """
-        rows = self.system.errors.points.take(points)
-        return prediction.influence(self.system, rows, self.system.conditions.of_control(coordinates))
+        rows, conditions = self.system.errors.points.take(points), self.system.conditions.of_control(coordinates)
+        by_all = prediction.influence(self.system, rows, conditions)
+        return by_all if self.left_out is None else by_all - self.left_out.influence(rows, conditions)
+
+    def without(self, coordinates: Numbers) -> CovarianceAdjustment:
+        """Leave out control coordinates, given by their rows in ``control``: points and covariances follow.
+
+        Raises numpy.linalg.LinAlgError where the others do not determine them.
+        """
+        left_out = Without.of(self.system, coordinates)
+        errors, change = self.system.errors, left_out.change
+        known = np.zeros((len(errors.images.row), 2))
+        points, photos = (
+            prediction.errors(change, rows, known) for rows in (errors.points, prediction.photo_rows(errors))
+        )
+        return replace(
+            self,
+            xyz=self.xyz - points,
+            centers=self.centers - photos[:, :3],
+            rotations=from_vector(-photos[:, 3:]) @ self.rotations,
+            left_out=left_out,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,19 +1,23 @@
-"""Errors at control that takes no part, without adjusting again: all of it from the one eliminated system.
+"""Control that takes no part, without eliminating again: all of it from the one system that was solved with it.
 
 Source: derived. With Pi the part of K^-1 (docs/precision.md, eq. 7) that belongs to a group of conditions and lambda
-their correlates, everything else predicts the group with the error Pi^-1 lambda, whose covariance is Pi^-1.
+their correlates, everything else predicts the group with the error Pi^-1 lambda, whose covariance is Pi^-1. With E the
+unit vectors of the group, K^-1 - K^-1 E Pi^-1 E^T K^-1 takes the place of K^-1 where the group is left out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import NamedTuple
+from photostrip.frozen import NamedTuple, dataclass, replace
+from photostrip.triangulation.covariance_adjustment.prediction import influence
 from photostrip.triangulation.covariance_adjustment.system import System
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
 UNCHECKED = 1e-9  # smallest eigenvalue of the scaled Pi of a group that the others determine
 
@@ -27,17 +31,62 @@ class LeftOut(NamedTuple):
 
 def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[LeftOut]:
     """Predict groups of control coordinates (rows of the misclosures), each from all the others."""
-    layout = found.layout
     rows = found.conditions.of_control(np.concatenate(groups))
-    block, position = layout.block[rows], layout.position[rows]
-    right = np.zeros((layout.blocks, layout.height, len(rows)))
-    right[block, position, np.arange(len(rows))] = 1.0
-    inverse = found.factors.solve(right)[block, position]
+    inverse = _columns(found, rows)[found.layout.block[rows], found.layout.position[rows]]
     ends = np.cumsum([0, *(len(group) for group in groups)])
     return [
         _predicted(inverse[start:stop, start:stop], found.correlates[rows[start:stop]])
         for start, stop in pairwise(ends.tolist())
     ]
+
+
+def _columns(found: System, rows: Numbers) -> Floats:
+    """Columns K^-1 e of conditions, by blocks."""
+    layout = found.layout
+    right = np.zeros((layout.blocks, layout.height, len(rows)))
+    right[layout.block[rows], layout.position[rows], np.arange(len(rows))] = 1.0
+    return found.factors.solve(right)
+
+
+@dataclass(frozen=True, eq=False)
+class Without:
+    """A solved system without some of its control coordinates."""
+
+    system: System  # with them
+    rows: Numbers  # (c,): their conditions
+    columns: Floats  # (g, b, c): K^-1 E
+    inverse: Floats  # (c, c): Pi^-1
+
+    @classmethod
+    def of(cls, found: System, coordinates: Numbers) -> Self:
+        """Leave out control coordinates, given by their rows in the misclosures.
+
+        Raises numpy.linalg.LinAlgError where the others do not determine them.
+        """
+        rows = found.conditions.of_control(coordinates)
+        columns = _columns(found, rows)
+        cofactors = columns[found.layout.block[rows], found.layout.position[rows]]
+        square = np.diag(cofactors)
+        size = np.sqrt(np.where(square > 0.0, square, 1.0))
+        if (square <= 0.0).any() or np.linalg.eigvalsh(cofactors / size / size[:, None])[0] < UNCHECKED:
+            raise np.linalg.LinAlgError("the control that is left does not determine what is left out")
+        return cls(found, rows, columns, np.asarray(np.linalg.inv(cofactors), float))
+
+    @property
+    def change(self) -> System:
+        """The system with what leaving them out adds to its solution."""
+        added = -(self.columns @ (self.inverse @ self.system.correlates[self.rows]))
+        return replace(self.system, solution=added)
+
+    def influence(self, rows: ErrorRows, conditions: Numbers) -> Floats:
+        """Return the part of the influence (n, d, k) of conditions that goes through what is left out."""
+        layout = self.system.layout
+        by_them = self.columns[layout.block[conditions], layout.position[conditions]]
+        return np.asarray(influence(self.system, rows, self.rows) @ (self.inverse @ by_them.T), float)
+
+    def explained(self, rows: ErrorRows) -> Floats:
+        """Return what of rows (n, d) they alone explain, s: (n, d, c), and s s^T adds to their covariances."""
+        return np.asarray(influence(self.system, rows, self.rows) @ np.linalg.cholesky(self.inverse), float)
 
 
 def _predicted(cofactors: Floats, correlates: Floats) -> LeftOut:
