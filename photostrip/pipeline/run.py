@@ -54,8 +54,7 @@ def triangulate(
     def of_failure() -> tuple[Finding, ...]:
         find = partial(gate.of_failure, inputs, settings, directory, photo, ground, stages)
         # of several methods that fail the first is told of: another need not look again
-        asked = replace(settings, adjustment="", precision=False, cross_validation=False)
-        return stages.once("failure", find, inputs, asked, photo is None, ground is None)
+        return stages.once("failure", find, inputs, _of_any_method(settings), photo is None, ground is None)
 
     try:
         require_runnable(inputs, settings)
@@ -143,6 +142,11 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     return replace(result, folds=cross_validate(result, partial(on_the_ground, whole=result)))
 
 
+def _of_any_method(settings: Settings) -> Settings:
+    """Return settings without what a comparison of methods changes."""
+    return replace(settings, adjustment="", precision=False, cross_validation=False)
+
+
 def _as_left_by(whole: Result, formed: Sequence[StripStage[Any]]) -> Sequence[StripStage[Any]]:
     """Give strips of photos without the wrong images of control that the whole adjustment found in them."""
     if whole.bundle is not None or whole.inputs.models is not None:
@@ -175,7 +179,7 @@ def _adjusted(
         )
     # 4 intermediate frame, absolute orientation, wrong control
     frames = tuple((frame.spec, frame.origin) for frame in (*ground.control, ground.output))
-    wanted = replace(settings, adjustment="")
+    wanted = _of_any_method(settings)
     screened = [
         stages.once(
             "control",
@@ -192,7 +196,7 @@ def _adjusted(
     level = settings.covariance.level / max(len(screened), 1)  # all strips together keep it
     settings = replace(settings, covariance=replace(settings.covariance, level=level))
     if whole is None:
-        strips = tuple(adjust(strip, settings) for strip in screened)
+        strips = tuple(adjust(strip, settings, stages) for strip in screened)
     else:
         strips = tuple(
             adjust_without(before, strip, settings) for before, strip in zip(whole.strips, screened, strict=True)

@@ -6,6 +6,7 @@ Source: [001] eq. 150-152 for the polynomials.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -15,14 +16,16 @@ from photostrip.pipeline.choice import COVARIANCE, POLYNOMIAL, Deformation
 from photostrip.pipeline.inputs import AUTO, Settings
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.strips.absolute import Errors, OrientedStrip, ScreenedStrip, StripStage, on_control
+from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import ControlPoints
 from photostrip.triangulation.polynomial import correction as polynomial
 
 
-def adjust(screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:
+def adjust(screened: ScreenedStrip[Errors], settings: Settings, stages: Stages | None = None) -> StripResult:
     """Correct the deformation of a strip and orient its photos on the corrected points."""
     oriented = screened.oriented
-    return oriented.stage.adjusted(screened, _deformation(oriented, settings), settings)
+    found = _deformation(oriented, settings, stages or Stages())
+    return oriented.stage.adjusted(screened, found, settings)
 
 
 def adjust_without(whole: StripResult, screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:
@@ -53,11 +56,14 @@ def adjust_formed(
     return adjust(on_control(stage, control, frames, settings), settings)
 
 
-def _deformation(oriented: OrientedStrip[Errors], settings: Settings) -> Deformation:
+def _deformation(oriented: OrientedStrip[Errors], settings: Settings, stages: Stages) -> Deformation:
     """Find what the settings ask for; with `auto` both, and which of them is better."""
     asked = settings.adjustment
     fitted = _polynomial(oriented, settings) if asked in {POLYNOMIAL, AUTO} else None
-    covariance = oriented.stage.by_covariance(oriented, settings) if asked in {COVARIANCE, AUTO} else None
+    covariance = None
+    if asked in {COVARIANCE, AUTO}:
+        by_covariance = partial(oriented.stage.by_covariance, oriented, settings)
+        covariance = stages.once("covariance", by_covariance, oriented, settings.covariance)
     if fitted is None or covariance is None:
         return Deformation(fitted, covariance)
     from photostrip.pipeline.strips.choosing import choose

@@ -11,8 +11,9 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 
 T = TypeVar("T")
-Stage = Literal["pairs", "strip", "control", "failure"]
-"""Pairs searched, a strip formed, a strip on its control without what is wrong, what speaks for a failure."""
+Stage = Literal["pairs", "strip", "control", "covariance", "failure"]
+"""Pairs searched, a strip formed, on its control without what is wrong, adjusted with its covariance, what speaks for a
+failure."""
 
 
 class Stages:
