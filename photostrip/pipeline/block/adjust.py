@@ -181,7 +181,8 @@ def _searched(
         raise
     for shared in screened.common:
         block = replace(block, problem=taken_up(block.problem, shared))
-    found = _Estimated(block, screened, reliability.sigma0_test(screened.solution), asked)
+    sigma0 = reliability.sigma0_test(screened.solution)
+    found = _Estimated(block=block, screened=screened, sigma0=sigma0, asked=asked)
     return _with_components(found, settings) if settings.bundle.variance_components else found
 
 
@@ -194,7 +195,13 @@ def _as_before(before: Bundle, block: BlockProblem, settings: Settings) -> _Esti
     screened = ScreenedBundle.of(problem, supported(problem, block.begin), settings.bundle)
     screened = replace(screened, common=before.screened.common)
     sigma0 = reliability.sigma0_test(screened.solution)
-    return _Estimated(replace(block, problem=problem), screened, sigma0, asked, before.components)
+    return _Estimated(
+        block=replace(block, problem=problem),
+        screened=screened,
+        sigma0=sigma0,
+        asked=asked,
+        components=before.components,
+    )
 
 
 def _with_components(before: _Estimated, settings: Settings) -> _Estimated:

@@ -70,7 +70,8 @@ class Without:
         size = np.sqrt(np.where(square > 0.0, square, 1.0))
         if (square <= 0.0).any() or np.linalg.eigvalsh(cofactors / size / size[:, None])[0] < UNCHECKED:
             raise np.linalg.LinAlgError("the control that is left does not determine what is left out")
-        return cls(found, rows, columns, np.asarray(np.linalg.inv(cofactors), float))
+        inverse = np.asarray(np.linalg.inv(cofactors), float)
+        return cls(system=found, rows=rows, columns=columns, inverse=inverse)
 
     @property
     def change(self) -> System:
