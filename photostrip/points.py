@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import field, fields
 from functools import cached_property
-from itertools import chain
+from itertools import chain, count, repeat
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 import numpy as np
@@ -46,8 +46,8 @@ def take_rows(table: T, rows: Sequence[int] | Numbers | Flags, columns: Iterable
 
 def locate(wanted: Iterable[str], ids: Iterable[str]) -> Numbers:
     """Place of each wanted id among ids; -1 for those that are not there."""
-    place = {name: number for number, name in enumerate(ids)}
-    return np.array([place.get(name, -1) for name in wanted], np.intp)
+    place = dict(zip(ids, count(), strict=False))
+    return np.fromiter(map(place.get, wanted, repeat(-1)), np.intp)
 
 
 @dataclass(frozen=True, eq=False)

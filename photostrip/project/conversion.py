@@ -166,11 +166,12 @@ def _scaled(values: Floats, scale: Floats) -> Floats:
 
 def _renumbered(ids: Sequence[str], codes: Numbers) -> tuple[tuple[str, ...], Numbers]:
     """Return the ids that are left new numbers, in order of first appearance."""
-    kept, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty(len(kept), np.intp)
-    rank[order] = np.arange(len(kept))
-    return tuple(ids[code] for code in kept[order]), rank[inverse]
+    first = np.full(len(ids), len(codes))
+    first[codes[::-1]] = np.arange(len(codes))[::-1]  # of the rows of an id the first is assigned last, and stays
+    order = np.argsort(first, kind="stable")[: np.count_nonzero(first < len(codes))]
+    rank = np.empty(len(ids), np.intp)
+    rank[order] = np.arange(len(order))
+    return tuple(ids[code] for code in order.tolist()), rank[codes]
 
 
 def frame_spec(given: GivenList) -> FrameSpec:

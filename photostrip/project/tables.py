@@ -215,7 +215,7 @@ def rays(read: Measurements, photos: set[str]) -> dict[str, int]:
     """Count the photos of strips on which each point is measured; points on none are left out."""
     kept = np.array([name in photos for name in read.photo_ids], bool)[read.photo]
     count = np.bincount(read.target[kept], minlength=len(read.target_ids))
-    return {name: int(number) for name, number in zip(read.target_ids, count, strict=True) if number}
+    return {name: number for name, number in zip(read.target_ids, count.tolist(), strict=True) if number}
 
 
 def in_one_zone(

@@ -10,7 +10,6 @@ import csv
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
-from operator import itemgetter
 
 import numpy as np
 
@@ -251,7 +250,8 @@ class _Reader:
         if not rows:
             return
         numbered = [column for column in self.columns if column.number]
-        fields = {column: tuple(map(itemgetter(self.source.where[column.name]), rows)) for column in self.columns}
+        of_all = list(zip(*rows, strict=True))
+        fields = {column: of_all[self.source.where[column.name]] for column in self.columns}
         values = {column: _fast_floats(fields[column]) for column in numbered}
         if any(each is None for each in values.values()):
             kept = [row for row, cells in enumerate(rows) if any(map(str.strip, cells))]
@@ -314,7 +314,7 @@ class _Reader:
     def _clean(self, column: Column, codes: Numbers, lines: Numbers) -> tuple[Numbers, tuple[str, ...]]:
         """Take blanks off ids and refuse ids that cannot be."""
         written = list(self.index[column.name])
-        stripped = [name.strip() for name in written]
+        stripped = list(map(str.strip, written))
         if column.words:
             stripped = self._words(column, stripped, codes, lines)
         elif stripped != written:
@@ -322,7 +322,7 @@ class _Reader:
         index = _Codes()
         renumbered = np.fromiter(map(index.__getitem__, stripped), np.intp, len(stripped))
         names, codes = tuple(index), renumbered[codes]
-        if not column.words:
+        if not column.words and ("" in names or CONTROL_CHARACTER.search("".join(names))):  # first all of them together
             wrong = np.array([not name or bool(CONTROL_CHARACTER.search(name)) for name in names], bool)
             for row in np.flatnonzero(wrong[codes]):
                 name = names[codes[row]]

@@ -7,7 +7,7 @@ coordinate gets and from where, and what became of every row of every table.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -81,9 +81,10 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         faults += _refused(project, partial(overruling.require_named, project.settings.links, models.points))
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)
-    faults += [*_pairs(project), *_junctions(project)] if models is None else links_of_models(project, models)
+    used = observations_used(inputs) if models is None else np.zeros(0, np.intp)
+    faults += _neighbours(project) if models is None else links_of_models(project, models)
     if project.settings.adjustment != "bundle":  # strips of a block may hang on others
-        faults += _control_of_strips(project)
+        faults += _control_of_strips(project, used)
     frames = _frames(project, faults)
     if models is not None and (read := project.tables.models) is not None:
         sigma = {"model_sigma": sigma_of(project, "models", (read.points, read.centers), models.points.sigma)}
@@ -93,11 +94,11 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     document: Document = {
         "name": inputs.name,
         "angle_unit": project.settings.angle_unit,
-        "counts": _counts(project),
+        "counts": _counts(project, used),
         **sigma,
         "frames": frames,
         "control": list(_control(project)),
-        "rows": table_rows(project),
+        "rows": table_rows(project, used),
     }
     counted = Findings()  # of too many faults in one file they only count the rest
     counted.add(*dict.fromkeys(faults))
@@ -153,11 +154,16 @@ def _points_of_photos(observations: PhotoPoints) -> dict[str, set[int]]:
     return {name: set(part.tolist()) for name, part in zip(observations.photo_ids, parts, strict=True)}
 
 
-def _pairs(project: Project) -> Iterator[Fault]:
+def _neighbours(project: Project) -> list[Fault]:
+    """Refuse neighbouring photos that cannot be oriented, or whose models cannot be joined."""
+    points = _points_of_photos(project.inputs.observations)
+    return [*_pairs(project, points), *_junctions(project, points)]
+
+
+def _pairs(project: Project, points: Mapping[str, set[int]]) -> Iterator[Fault]:
     """Refuse neighbouring photos with too few common points for their relative orientation."""
     from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
-    points = _points_of_photos(project.inputs.observations)
     for i, strip in enumerate(project.inputs.strips):
         for j, (left, right) in enumerate(zip(strip.photos, strip.photos[1:], strict=False)):
             common = len(points.get(left, set()) & points.get(right, set()))
@@ -169,9 +175,8 @@ def _pairs(project: Project) -> Iterator[Fault]:
                 yield fault_at(project.tree, path, message, "too-few-common-points", expected=expected, fix=fix)
 
 
-def _junctions(project: Project) -> Iterator[Fault]:
+def _junctions(project: Project, points: Mapping[str, set[int]]) -> Iterator[Fault]:
     """Refuse three photos in a row without a common point: nothing would carry the scale on."""
-    points = _points_of_photos(project.inputs.observations)
     for i, strip in enumerate(project.inputs.strips):
         for j, names in enumerate(zip(strip.photos, strip.photos[1:], strip.photos[2:], strict=False)):
             if set.intersection(*(points.get(name, set()) for name in names)):
@@ -181,13 +186,12 @@ def _junctions(project: Project) -> Iterator[Fault]:
             yield fault_at(project.tree, ("strips", i, "photos", j + 1), message, "broken-joint", fix=fix)
 
 
-def _control_of_strips(project: Project) -> Iterator[Fault]:
+def _control_of_strips(project: Project, used: Numbers) -> Iterator[Fault]:
     """Refuse strips with too little measured control for seven parameters."""
     inputs = project.inputs
     given = locate(inputs.control.ids, inputs.observations.point_ids)
-    usable = observations_used(inputs) if inputs.models is None else np.zeros(0, np.intp)
     for i, strip in enumerate(inputs.flights):
-        points = inputs.observations.point[usable == i] if inputs.models is None else points_of_strip(inputs.models, i)
+        points = inputs.observations.point[used == i] if inputs.models is None else points_of_strip(inputs.models, i)
         rows = np.isin(given, points) & ~inputs.control.check
         plan, height = (int(inputs.control.use[rows, axis].sum()) for axis in (0, 2))
         if plan >= LEAST_PLAN and height >= LEAST_HEIGHT:
@@ -200,10 +204,9 @@ def _control_of_strips(project: Project) -> Iterator[Fault]:
         yield fault_at(project.tree, path, message, "too-little-control", expected=expected, fix=fix)
 
 
-def _counts(project: Project) -> Document:
-    inputs = project.inputs
-    given, measured = inputs.control, set(inputs.observations.point_ids)
-    shown = np.array([name in measured for name in given.ids], bool)
+def _counts(project: Project, used: Numbers) -> Document:
+    inputs, measured = project.inputs, project.inputs.observations.point_ids
+    given, shown = inputs.control, locate(inputs.control.ids, measured) >= 0
     return {
         "files": len(project.files),
         "strips": len(inputs.flights),
@@ -211,12 +214,12 @@ def _counts(project: Project) -> Document:
         **({} if inputs.models is None else counts_of_models(inputs.models)),
         "image_points": len(inputs.observations),
         "points": len(measured),
-        "new": len(measured - set(given.ids)),
+        "new": len(measured) - int(shown.sum()),
         "control_plan": int((given.use[:, 0] & ~given.check & shown).sum()),
         "control_height": int((given.use[:, 2] & ~given.check & shown).sum()),
         "check_plan": int((given.use[:, 0] & given.check & shown).sum()),
         "check_height": int((given.use[:, 2] & given.check & shown).sum()),
-        "without_neighbour": len(gaps_of(inputs)) if inputs.models is None else 0,
+        "without_neighbour": len(gaps_of(inputs, used)) if inputs.models is None else 0,
     }
 
 
@@ -303,10 +306,7 @@ def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str
     columns = (read.check, read.table.lines, read.use, read.sigma, ~np.isnan(read.sigma))
     for name, check, line, use, sigma, stated in zip(read.ids, *(each.tolist() for each in columns), strict=True):
         here = {"source": "row", "file": read.table.file, "line": line, "key": ""}
-        found = [
-            (value, here) if its else (usual, source) for value, its, usual in zip(sigma, stated, default, strict=True)
-        ]
-        used = [each if counts else (None, None) for each, counts in zip(found, use, strict=True)]
+        of_axes = list(zip(sigma, stated, default, use, strict=True))
         yield {
             "id": name,
             "role": "check" if check else "control",
@@ -314,7 +314,7 @@ def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str
             "line": line,
             "axes": list(frame.axes),
             "counts": use,
-            "sigma": [value for value, _ in used],
-            "sigma_from": [place for _, place in used],
+            "sigma": [(own if its else usual) if counts else None for own, its, usual, counts in of_axes],
+            "sigma_from": [(here if its else source) if counts else None for _, its, _, counts in of_axes],
             "photos": photos.get(name, 0),
         }

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photostrip.arrays import Flags, Numbers
 from photostrip.formats.measured.control import ControlTable
@@ -33,7 +32,8 @@ class Reason(NamedTuple):
 
     why: str
     rows: Flags
-    ids: NDArray[np.object_]
+    ids: Sequence[str]
+    of_rows: Numbers  # which of the ids each row has
 
 
 def observations_used(inputs: Inputs) -> Numbers:
@@ -57,16 +57,19 @@ def observations_used(inputs: Inputs) -> Numbers:
     return np.where(shown(key - 1) | shown(key + 1), strip, -1)
 
 
-def gaps_of(inputs: Inputs) -> list[str]:
-    """Name the points measured on two photos or more, of which no two are neighbours in a strip."""
+def gaps_of(inputs: Inputs, used: Numbers) -> list[str]:
+    """Name the points measured on two photos or more, of which no two are neighbours in a strip.
+
+    used: what ``observations_used`` returns.
+    """
     observations = inputs.observations
     paired = np.zeros(len(observations.point_ids), bool)
-    paired[observations.point[observations_used(inputs) >= 0]] = True
+    paired[observations.point[used >= 0]] = True
     count = np.bincount(observations.point, minlength=len(observations.point_ids))
     return [observations.point_ids[code] for code in np.flatnonzero(~paired & (count > 1))]
 
 
-def table_rows(project: Project) -> list[Document]:
+def table_rows(project: Project, used: Numbers) -> list[Document]:
     """Count what became of the rows of each table; used and unused rows add up to all rows.
 
     The keys are ``file``, ``rows``, ``used`` and ``unused``: reason, number of rows, ids, first line.
@@ -77,7 +80,7 @@ def table_rows(project: Project) -> list[Document]:
         return model_rows(tables, inputs.models)
     found = []
     bundle = project.settings.adjustment == "bundle"
-    apart = set() if bundle else set(gaps_of(inputs))  # a bundle takes points of any two photos
+    apart = set() if bundle else set(gaps_of(inputs, used))  # a bundle takes points of any two photos
     control = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if use.all()}
     count: dict[str, int] = {}
     if tables.observations is not None:
@@ -106,15 +109,17 @@ def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
     for control in tables.control:
         if control is not None:
             missing = _outside(NO_MODEL, control.ids, points)
-            off = Reason(OFF, ~control.used, missing.ids)
+            off = missing._replace(why=OFF, rows=~control.used)
             reasons = [off, missing._replace(rows=control.used & missing.rows)]
             found.append(_block(control.table, reasons))
     return found
 
 
-def _outside(why: str, ids: Sequence[str], known: set[str], codes: Numbers | slice = slice(None)) -> Reason:
-    """Rows whose id, the one of a number each, is not known."""
-    return Reason(why, np.array([name not in known for name in ids], bool)[codes], np.array(ids, object)[codes])
+def _outside(why: str, ids: Sequence[str], known: set[str], of_rows: Numbers | None = None) -> Reason:
+    """Rows whose id is not known; without `of_rows` each row has an id of its own."""
+    of_rows = np.arange(len(ids)) if of_rows is None else of_rows
+    rows = np.array([name not in known for name in ids], bool)[of_rows]
+    return Reason(why=why, rows=rows, ids=ids, of_rows=of_rows)
 
 
 def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: bool) -> Document:  # noqa: FBT001
@@ -122,8 +127,8 @@ def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: b
     off = ~read.used if isinstance(read, PositionTable) else np.zeros(len(read.ids), bool)
     reasons = [
         outside,
-        Reason(OFF, ~outside.rows & off, outside.ids),
-        Reason(NO_BUNDLE, ~outside.rows & ~off & (not bundle), outside.ids),
+        outside._replace(why=OFF, rows=~outside.rows & off),
+        outside._replace(why=NO_BUNDLE, rows=~outside.rows & ~off & (not bundle)),
     ]
     return _block(read.table, reasons)
 
@@ -133,11 +138,11 @@ def _measured(read: Measurements, photos: set[str], count: dict[str, int], gaps:
     outside = _outside(IN_NO_STRIP, read.photo_ids, photos, read.photo)
     once = np.array([count.get(name) == 1 and name not in whole for name in read.target_ids], bool)[read.target]
     apart = np.array([name in gaps for name in read.target_ids], bool)[read.target]
-    names = np.array(read.target_ids, object)[read.target]
+    ids: Document = {"ids": read.target_ids, "of_rows": read.target}
     reasons = [
         outside,
-        Reason(ONCE, ~outside.rows & once, names),
-        Reason(NO_NEIGHBOUR, ~outside.rows & ~once & apart, names),
+        Reason(why=ONCE, rows=~outside.rows & once, **ids),
+        Reason(why=NO_NEIGHBOUR, rows=~outside.rows & ~once & apart, **ids),
     ]
     return _block(read.table, reasons, read.times)
 
@@ -145,12 +150,12 @@ def _measured(read: Measurements, photos: set[str], count: dict[str, int], gaps:
 def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
     number = np.array([count.get(name, 0) for name in read.ids], np.intp)
     apart = np.array([name in gaps for name in read.ids], bool)
-    names = np.array(read.ids, object)
+    ids: Document = {"ids": read.ids, "of_rows": np.arange(len(read.ids))}
     reasons = [
-        Reason(OFF, ~read.used, names),
-        Reason(NOT_MEASURED, read.used & (number == 0), names),
-        Reason(ONCE, read.used & (number == 1), names),
-        Reason(NO_NEIGHBOUR, read.used & (number > 1) & apart, names),
+        Reason(why=OFF, rows=~read.used, **ids),
+        Reason(why=NOT_MEASURED, rows=read.used & (number == 0), **ids),
+        Reason(why=ONCE, rows=read.used & (number == 1), **ids),
+        Reason(why=NO_NEIGHBOUR, rows=read.used & (number > 1) & apart, **ids),
     ]
     return _block(read.table, reasons)
 
@@ -162,7 +167,8 @@ def _block(table: Table, reasons: list[Reason], times: Numbers | None = None) ->
     for reason in reasons:
         at = np.flatnonzero(reason.rows)
         if len(at):
-            ids, line = list(dict.fromkeys(reason.ids[at].tolist())), int(table.lines[at[0]])
+            ids = list(dict.fromkeys(reason.ids[code] for code in reason.of_rows[at].tolist()))
+            line = int(table.lines[at[0]])
             unused.append({"why": reason.why, "rows": int(times[at].sum()), "ids": ids, "first_line": line})
     rows = int(times.sum())
     return {"file": table.file, "rows": rows, "used": rows - sum(each["rows"] for each in unused), "unused": unused}

@@ -31,7 +31,7 @@ def listed_photos(root: Node) -> Iterator[ListedPhoto]:
         camera = strip.word("camera")
         for j, photo in enumerate(strip.list_at("photos")):
             if photo.text:
-                yield ListedPhoto(photo.text, ("strips", i, "photos", j), camera)
+                yield ListedPhoto(id=photo.text, path=("strips", i, "photos", j), camera=camera)
 
 
 def check_references(root: Node) -> Iterator[Fault]:

@@ -132,9 +132,9 @@ def _sigmas(control: Sequence[Document], *, everything: bool) -> Section:
 
 def _kinds(control: Sequence[Document]) -> tuple[list[list[Document]], str]:
     """Put points together that have the same role and standard deviations from the same place, the most first."""
-    found: dict[tuple[str, ...], list[Document]] = {}
+    found: dict[tuple[object, ...], list[Document]] = {}
     for each in control:
-        found.setdefault((_role(each), str(each["sigma"]), _sources(each, line=False)), []).append(each)
+        found.setdefault((_role(each), *each["sigma"], _sources(each, line=False)), []).append(each)
     kinds = sorted(found.values(), key=len, reverse=True)
     rest = sum(map(len, kinds[KINDS_SHOWN:]))
     return kinds[:KINDS_SHOWN], f"{f'{rest} more points; ' if rest else ''}--verbose prints every point"
@@ -150,7 +150,8 @@ def _photos(kind: Sequence[Document]) -> str:
 
 
 def _sources(each: Document, *, line: bool) -> str:
-    return "; ".join(dict.fromkeys(_source(source, line=line) for source in each["sigma_from"] if source)) or DASH
+    sources = {id(source): source for source in each["sigma_from"] if source}.values()  # most often one for all axes
+    return "; ".join(dict.fromkeys(_source(source, line=line) for source in sources)) or DASH
 
 
 def _source(place: Document, *, line: bool = True) -> str:
