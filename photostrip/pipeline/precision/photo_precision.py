@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
 
-AT_ONCE = 4096  # points, for the sake of memory
-
-
 def of_photos(
     strip: StripResult,
     oriented: OrientedStrip[StripErrors],
@@ -47,16 +44,14 @@ def of_photos(
     stated = strip.of_photos.sigma
     factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
-    points, wanted = np.full((len(xyz), 3, 3), np.nan), np.arange(len(xyz))
-    table, place = errors.points, xyz
-    if of_checks:
-        wanted, table, place = checks.rows, errors.points.take(checks.rows), xyz[checks.rows]
-    for start in range(0, len(wanted), AT_ONCE):
-        part, influence = table.part(start, start + AT_ONCE), fit.influence(place[start : start + AT_ONCE])
-        points[wanted[start : start + AT_ONCE]] = covariances.covariances(errors, part, parameters, influence) * factor
+    points, wanted = np.full((len(xyz), 3, 3), np.nan), checks.rows if of_checks else np.arange(len(xyz))
+    table = errors.points.take(wanted) if of_checks else errors.points
+    of_points = covariances.covariances(errors, table, parameters, lambda rows: fit.influence(xyz[wanted[rows]]))
+    points[wanted] = of_points * factor
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
     for some in () if of_checks else found.photos():
-        photos[some.photos] = covariances.covariances(errors, some.rows, parameters, some.influence) * factor
+        of_some = covariances.covariances(errors, some.rows, parameters, some.influence.__getitem__)
+        photos[some.photos] = of_some * factor
     compared = check_points.compare_with_checks(strip, errors, checks, oriented.frames)
     axes = strip.intermediate.axes
     return StripPrecision(

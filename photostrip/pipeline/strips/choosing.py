@@ -60,7 +60,8 @@ def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: Covarianc
     points = _spread(new if len(new) else np.arange(len(oriented.xyz)), MOST_POINTS)
     fit = _fit(oriented, polynomial, np.arange(len(found.point)))
     parameters = covariances.of_parameters(errors, found, fit.operator, covariance.factor)
-    after = covariances.covariances(errors, errors.points.take(points), parameters, fit.influence(oriented.xyz[points]))
+    influence = fit.influence(oriented.xyz[points]).__getitem__
+    after = covariances.covariances(errors, errors.points.take(points), parameters, influence)
     both = [
         np.diagonal(each, axis1=1, axis2=2).mean(axis=0)
         for each in (after * covariance.factor, covariance.of_points(points))

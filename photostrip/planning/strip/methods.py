@@ -134,7 +134,7 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     fit = control_errors.fit_operator(found, weight, xyz[numbers], terms, shift)
     parameters = covariances.of_parameters(strip.errors, found, fit.operator)
     influence = fit.influence(xyz)
-    covariance = covariances.covariances(strip.errors, strip.errors.points, parameters, influence)
+    covariance = covariances.covariances(strip.errors, strip.errors.points, parameters, influence.__getitem__)
     share = np.einsum("wi,wit,tw->w", found.direction, influence[numbers[found.point]], fit.operator)
     variance = np.diagonal(covariance, axis1=1, axis2=2)[numbers[found.point], found.axis]
     residual = variance + found.variance * (1 - 2 * share)

@@ -64,7 +64,9 @@ class FitOperator:
 
     def polynomial_columns(self, xyz: Floats) -> list[Floats]:
         """Terms of the three polynomials at points, scaled to about one."""
-        return [columns(xyz[:, :2] / (self.reach, self.breadth), terms) for terms in self.terms]
+        plan = xyz[:, :2] / (self.reach, self.breadth)
+        found = {terms: columns(plan, terms) for terms in set(self.terms)}
+        return [found[terms] for terms in self.terms]
 
 
 def misclosures(points: ErrorRows, control: ControlPoints, control_rows: Numbers, axes: Floats) -> Misclosures:

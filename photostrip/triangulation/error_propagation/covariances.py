@@ -9,6 +9,7 @@ Source: derived; see docs/precision.md, eq. 4-6.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Self
 
@@ -26,7 +27,7 @@ from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
 SIGMA_LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
-ENTRIES = 9000  # coefficients of image points worked on at a time: what fits into the processor's cache
+COEFFICIENTS = 200_000  # of rows worked on at a time: what fits into the processor's cache
 
 
 def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
@@ -189,31 +190,36 @@ def _times_covariances(errors: StripErrors, by_component: Floats) -> Floats:
     return result
 
 
-def covariances(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, influence: Floats) -> Floats:
+def covariances(
+    errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, influence: Callable[[Numbers], Floats]
+) -> Floats:
     """Covariances (n, d, d) of corrected points or photos, for a variance factor of 1 of the image coordinates.
 
-    ``influence`` (n, d, t) is Phi, what each fitted parameter subtracts (eq. 6): Cov = S - C Phi^T - Phi C^T +
-    Phi Sigma Phi^T with S of the formed strip, C with the parameters.
+    ``influence`` gives Phi (k, d, t) of some rows, what each fitted parameter subtracts (eq. 6): Cov = S - C Phi^T -
+    Phi C^T + Phi Sigma Phi^T with S of the formed strip, C with the parameters.
     """
-    size = rows.by_similarity.shape[1]
+    _, slots, size, _ = rows.by_component.shape
     result = np.empty((len(rows.first), size, size))
-    order = np.argsort(rows.first, kind="stable")
-    for start, stop in _slices(rows):
-        part, phi = rows.take(order[start:stop]), influence[order[start:stop]]
-        near = NearImages.of(errors, part)
-        by, half = _halves(errors, part, near, fit.along)
-        mixed = phi @ (fit.parameters / 2) - with_parameters(part, near, fit)
-        found = np.concatenate([half, mixed], axis=2) @ np.concatenate([by, phi], axis=2).transpose(0, 2, 1)
+    order, own = np.argsort(rows.first, kind="stable"), SIMILARITY_PARAMETERS + slots * COMPONENTS
+    for some in _slices(rows):
+        part, phi = rows.take(order[some]), influence(order[some])
+        near, models = NearImages.of(errors, part), distinct(part.first)
+        by = _coefficients(part, near)
+        matrices = [_halves(errors, fit.along, models, slots), _with_parameters(fit, models, slots)]
+        found = _by_model(by, part.first, np.concatenate(matrices, axis=2))
+        _add_same_images(found[:, :, own:], part, fit.sums)
+        found[:, :, own:] -= (phi.reshape(-1, len(fit.parameters)) @ (fit.parameters / 2)).reshape(phi.shape)
+        found = found @ np.concatenate([by[:, :, :own], -phi], axis=2).transpose(0, 2, 1)
         found += near.by_image @ near.by_image.transpose(0, 2, 1) / 2
-        result[order[start:stop]] = found + found.transpose(0, 2, 1)
+        result[order[some]] = found + found.transpose(0, 2, 1)
     return result
 
 
-def _slices(rows: ErrorRows) -> list[tuple[int, int]]:
+def _slices(rows: ErrorRows) -> list[slice]:
     """Cut many rows into parts of bounded memory."""
-    count = len(rows.first)
-    size = max(1, int(ENTRIES * 3 / rows.by_similarity.shape[1] * count / max(len(rows.item), 1)))
-    return [(start, min(start + size, count)) for start in range(0, count, size)]
+    count, slots, size, components = rows.by_component.shape
+    size *= SIMILARITY_PARAMETERS + 2 * (slots + SHARING) * components  # of ``_coefficients``
+    return [slice(start, start + COEFFICIENTS // size) for start in range(0, count, COEFFICIENTS // size)]
 
 
 class NearImages(NamedTuple):
@@ -250,34 +256,36 @@ class NearImages(NamedTuple):
 
 def local_covariances(errors: StripErrors, rows: ErrorRows, near: NearImages) -> Floats:
     """Covariances (n, d, d) of rows, ordered by their first models, without the similarities of these."""
-    by, half = _halves(errors, rows.without_similarity(), near, none_along(errors))
-    found = half @ by.transpose(0, 2, 1) + near.by_image @ near.by_image.transpose(0, 2, 1) / 2
+    by, slots = _coefficients(rows.without_similarity(), near), rows.by_component.shape[1]
+    half = _by_model(by, rows.first, _halves(errors, none_along(errors), distinct(rows.first), slots))
+    found = half @ by[:, :, : half.shape[2]].transpose(0, 2, 1)
+    found += near.by_image @ near.by_image.transpose(0, 2, 1) / 2
     return np.asarray(found + found.transpose(0, 2, 1), float)
 
 
-def _halves(
-    errors: StripErrors, rows: ErrorRows, near: NearImages, along: SimilarityCovariances
-) -> tuple[Floats, Floats]:
-    """Write S of rows that are ordered by their first models as G H^T + H G^T, products of image points left out.
+def _halves(errors: StripErrors, along: SimilarityCovariances, models: Numbers, slots: int) -> Floats:
+    """Matrices (m, k, 7 + 6 s) that write S of rows as G H^T + H G^T, products of image points left out.
 
     G (n, d, 7 + 6 s) are the coefficients of y(first) and of the components from there on, H = G K / 2 + X with K the
-    covariances of these, and X those of the image points with them.
+    covariances of these, and X those of the image points with them: what ``_coefficients`` gives, times the matrices.
     """
-    n, slots, size, _ = rows.by_component.shape
-    models = distinct(rows.first)
-    by = by_model(rows)
-    half = _by_model(by, rows.first, covariances_of_models(errors, along, models, slots) / 2)
-    before = near.with_components[:, :, :SHARING].reshape(n, size, -1)
-    half[:, :, :SIMILARITY_PARAMETERS] += _by_model(before, rows.first, _stacked(steps_before(errors, models)))
-    half[:, :, SIMILARITY_PARAMETERS:] += near.with_components[:, :, SHARING : SHARING + slots].reshape(n, size, -1)
-    return by, half
+    own = SIMILARITY_PARAMETERS + slots * COMPONENTS
+    before = own + SHARING * COMPONENTS
+    result = np.zeros((len(models), before + (slots + SHARING) * COMPONENTS, own))
+    result[:, :own] = covariances_of_models(errors, along, models, slots) / 2
+    result[:, own:before, :SIMILARITY_PARAMETERS] = _stacked(steps_before(errors, models))
+    result[:, before : before + slots * COMPONENTS, SIMILARITY_PARAMETERS:] = np.eye(slots * COMPONENTS)
+    return result
 
 
 def by_model(rows: ErrorRows) -> Floats:
     """Put the coefficients of y(first) and of the components from there on side by side, (n, d, 7 + 6 s)."""
-    n, slots, size, _ = rows.by_component.shape
-    by_component = rows.by_component.transpose(0, 2, 1, 3).reshape(n, size, slots * COMPONENTS)
-    return np.concatenate([rows.by_similarity, by_component], axis=2)
+    return np.concatenate([rows.by_similarity, *rows.by_component.transpose(1, 0, 2, 3)], axis=2)
+
+
+def _coefficients(rows: ErrorRows, near: NearImages) -> Floats:
+    """Put these and the covariances of the image points with components side by side, (n, d, k)."""
+    return np.concatenate([by_model(rows), near.with_components.reshape(*rows.by_similarity.shape[:2], -1)], axis=2)
 
 
 def covariances_of_models(
@@ -319,18 +327,24 @@ def around_models(of_models: Floats, models: Numbers, before: int, after: int) -
 
 def with_parameters(rows: ErrorRows, near: NearImages, fit: ParameterCovariances) -> Floats:
     """C: covariances (n, d, t) of rows that are ordered by their first models with the fitted parameters."""
-    n, slots, size, _ = rows.by_component.shape
-    models, sums = distinct(rows.first), fit.sums
-    matrices = np.concatenate(
-        [fit.similarities[models], _stacked(around_models(sums.with_components, models, 0, slots))], axis=1
-    )
-    result = _by_model(by_model(rows), rows.first, matrices)
-    around = _stacked(around_models(sums.by_component, models, SHARING, slots + SHARING))
-    result += _by_model(near.with_components.reshape(n, size, -1), rows.first, around)
+    matrices = _with_parameters(fit, distinct(rows.first), rows.by_component.shape[1])
+    result = _by_model(_coefficients(rows, near), rows.first, matrices)
+    _add_same_images(result, rows, fit.sums)
+    return result
+
+
+def _with_parameters(fit: ParameterCovariances, models: Numbers, slots: int) -> Floats:
+    """Matrices (m, k, t) that give C of rows but for the image points that the fit has directly, too."""
+    with_components = _stacked(around_models(fit.sums.with_components, models, 0, slots))
+    by_component = _stacked(around_models(fit.sums.by_component, models, SHARING, slots + SHARING))
+    return np.concatenate([fit.similarities[models], with_components, by_component], axis=1)
+
+
+def _add_same_images(result: Floats, rows: ErrorRows, sums: Sums) -> None:
+    """Add to C the products of the image points that enter rows and the fit directly."""
     of_fit = np.searchsorted(sums.image, rows.image)
     entry = np.flatnonzero(sums.image[np.minimum(of_fit, len(sums.image) - 1)] == rows.image)
     add_rows(result, rows.item[entry], rows.by_image[entry] @ sums.by_image[of_fit[entry]])
-    return result
 
 
 def _stacked(around: Floats) -> Floats:

@@ -108,7 +108,7 @@ def test_sums_along_the_strip_equal_the_whole_matrices(photos: int, lap: float, 
         by_image = written_out(rows, found.errors) - by_control @ misclosures
         expected = by_image @ by_image.transpose(0, 2, 1)
         expected += (by_control * found.control.variance / factor) @ by_control.transpose(0, 2, 1)
-        covariances = precision.covariances(found.errors, rows, fit, influence)
+        covariances = precision.covariances(found.errors, rows, fit, influence.__getitem__)
         size = np.sqrt(np.einsum("nii,njj->nij", expected, expected))
         assert np.abs(covariances - expected).max() < 1e-9 * size.max()
         for part in (slice(0, 3), slice(3, 6)):
