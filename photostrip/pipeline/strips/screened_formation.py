@@ -24,7 +24,7 @@ from photostrip.triangulation.strip_formation.strip import (
 )
 
 
-class ScreenedStrip(NamedTuple):
+class ScreenedFormation(NamedTuple):
     """A strip without what its rays contradict."""
 
     orientation: Orientation
@@ -42,7 +42,7 @@ def form_screened(
     readmit: bool,
     first: FirstPhoto = NOTHING_GIVEN,
     point_weight: Floats | None = None,
-) -> ScreenedStrip:
+) -> ScreenedFormation:
     """Form a strip, leave out what its rays contradict, take back what they confirm, and form it again.
 
     Where pairs and junctions had nothing to reject, nothing is looked for.
@@ -52,12 +52,12 @@ def form_screened(
     """
     formed = form_from_pairs(of_pairs, settings, photos, rays.sigma, first=first, point_weight=point_weight)
     if of_pairs.used.all() and formed.junctions.used.all():
-        return ScreenedStrip(of_pairs, formed, ())
+        return ScreenedFormation(of_pairs, formed, ())
     from photostrip.triangulation.gross_errors.rays.strip_network import wrong_rays  # needs the bundle adjustment
 
     found = wrong_rays(of_pairs, formed, rays)
     if found is None:
-        return ScreenedStrip(of_pairs, formed, (), tested=False)
+        return ScreenedFormation(of_pairs, formed, (), tested=False)
     used, aside = _uses(of_pairs, found, readmit=readmit)
     changed = distinct(of_pairs.pairs.pair[used != of_pairs.used])
     oriented = orient_again(of_pairs, np.where(used, rays.weight, 0.0), changed) if len(changed) else of_pairs
@@ -68,7 +68,7 @@ def form_screened(
     except GeometryError:
         oriented = of_pairs  # nothing would join two models: what joined them before stays
     formed = without_rows(formed, oriented, aside)
-    return ScreenedStrip(oriented, _bridged(formed, oriented, rays, photos, found), found)
+    return ScreenedFormation(oriented, _bridged(formed, oriented, rays, photos, found), found)
 
 
 def _bridged(
