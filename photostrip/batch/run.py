@@ -57,8 +57,6 @@ def on_signals(stop: Stop) -> Iterator[Stop]:
 
 @dataclass
 class Batch:
-    """What became of a batch."""
-
     # the line of the summary of each project, in the order in which the user named them
     outcomes: list[Document] = field(default_factory=list)
     unchanged: int = 0

@@ -18,7 +18,6 @@ Command = Callable[..., None]
 
 
 def command_group(text: str) -> typer.Typer:
-    """Make a command that has commands, with its help."""
     return typer.Typer(add_completion=False, rich_markup_mode=None, context_settings=HELP_NAMES, help=text)
 
 

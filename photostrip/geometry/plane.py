@@ -40,7 +40,6 @@ class PlaneTransform:
         object.__setattr__(self, "coefficients", frozen(self.coefficients))
 
     def __call__(self, points: ArrayLike) -> Floats:
-        """Transform points (..., n, 2)."""
         values = _terms(np.asarray(points, float)) @ self.coefficients.swapaxes(-1, -2)
         return values[..., :2] / values[..., 2:]
 

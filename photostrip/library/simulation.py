@@ -71,7 +71,6 @@ def simulate(
 
 
 def simulated(path: Path, assignments: Sequence[str]) -> Simulation:
-    """Read a specification and simulate it."""
     from photostrip.formats.output.simulation import project_files, summary
     from photostrip.project.simulation import load_specification
 

@@ -22,8 +22,6 @@ GRID = 41  # points along and across a model in which a distortion is tried
 
 
 class ComparedCamera(NamedTuple):
-    """A camera to compare."""
-
     name: str
     focal: float  # principal distance f, mm
     sigma: float  # standard deviation m_p of an x parallax, mm
@@ -112,7 +110,6 @@ class Survey:
     terrain: Terrain = Terrain()
 
     def flown(self, camera: ComparedCamera) -> FlownCamera:
-        """Fly a camera so."""
         if self.height_sigma is not None:
             return FlownCamera(camera, scale_of(camera, self.height_sigma))
         if self.flying_height is not None:

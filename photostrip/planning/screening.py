@@ -145,8 +145,6 @@ class ErrorEffect(NamedTuple):
 
 
 class ScreeningOutcome(NamedTuple):
-    """An experiment and its outcome."""
-
     spec: ScreeningSpec
     methods: tuple[MethodOutcome, ...]
     effects: tuple[ErrorEffect, ...]

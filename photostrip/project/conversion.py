@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photostrip import camera
 from photostrip.arrays import Floats, Numbers
@@ -21,7 +20,7 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geometry.rotation import from_angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Settings, Strip
-from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.points import ControlPoints, PhotoPoints, concatenated
 from photostrip.project.schema.cameras import Camera, Distortion, FirstPhoto
 from photostrip.project.schema.ground import CameraPositions as PositionsBlock
 from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
@@ -186,7 +185,6 @@ def frame_spec(given: GivenList) -> FrameSpec:
 
 
 def semi_axes(given: Ellipsoid | None) -> tuple[float, float] | None:
-    """Return a and b of an ellipsoid."""
     return None if given is None else (given.a, given.b)
 
 
@@ -227,19 +225,8 @@ def output_spec(output: Output, first: FrameSpec) -> FrameSpec | None:
 def control_points(tables: Sequence[ControlTable], lists: Sequence[Control]) -> ControlPoints:
     """Put the used points of all control lists into one table; ``frame`` counts in `lists`."""
     parts = [_control_points(*each, number) for number, each in enumerate(zip(tables, lists, strict=True))]
-    nothing = np.zeros((0, 3))
-
-    def joined(name: str, empty: NDArray[Any]) -> NDArray[Any]:
-        return np.concatenate([getattr(part, name) for part in parts]) if parts else empty
-
-    return ControlPoints(
-        ids=tuple(name for part in parts for name in part.ids),
-        enu=joined("enu", nothing),
-        use=joined("use", nothing.astype(bool)),
-        check=joined("check", np.zeros(0, bool)),
-        sigma=joined("sigma", nothing),
-        frame=joined("frame", np.zeros(0, np.intp)),
-    )
+    nothing, none = np.zeros((0, 3)), np.zeros((0, 3), bool)
+    return concatenated(parts or [ControlPoints(ids=(), enu=nothing, use=none, check=none[:, 0], sigma=nothing)])
 
 
 def _control_points(read: ControlTable, given: Control, number: int) -> ControlPoints:

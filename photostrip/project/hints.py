@@ -140,7 +140,6 @@ def _solved_marks(name: str, camera: Camera, solved: Certificate, root: Node) ->
 
 
 def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
-    """Name measured photos that no strip lists."""
     others = [name for name in read.photo_ids if name not in photos]
     if not others:
         return

@@ -68,7 +68,6 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 (what JSON does not know)
 
 
 def _text(name: str, table: Any) -> str:  # noqa: ANN401 (data frames of any library)
-    """Return a table as CSV."""
     try:
         names = _names(table)
         columns = [_values(table[each]) for each in names]

@@ -215,8 +215,6 @@ class SimulationFile(Section):
 
 @dataclass(frozen=True, eq=False)
 class Specification:
-    """A specification and where its values stand."""
-
     spec: simulation.Spec
     reading: Reading
 

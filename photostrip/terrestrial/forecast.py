@@ -25,8 +25,6 @@ PLACES = ("middle", "side", "top")
 
 @dataclass(frozen=True)
 class DisplacementSpec:
-    """A survey of displacements."""
-
     camera: Phototheodolite  # with its format
     distances: tuple[float, ...]  # of the object ahead of the base, metres
     sigma: float  # standard deviation of a measured change of an image coordinate, mm

@@ -23,8 +23,6 @@ ACROSS, COMPLETE = 2, 3  # components of a displacement
 
 @dataclass(frozen=True, eq=False)
 class OneStation:
-    """Measurements from one station."""
-
     points: tuple[str, ...]
     first: Floats  # (n, 2): x, z of the first epoch, mm, reduced to the principal point
     change: Floats  # (n, 2): pseudo-parallaxes: second minus first

@@ -59,8 +59,6 @@ class Sightings:
 
 @dataclass(frozen=True)
 class OrientationSettings:
-    """How a photo is oriented."""
-
     free: tuple[str, ...] = ()  # what is determined besides the angles: keys of `FREE`
     # ``"deletion"`` tests each point against the scatter of the others, ``"stated"`` against the stated standard
     # deviations, ``"none"`` tests nothing
@@ -73,8 +71,6 @@ class OrientationSettings:
 
 @dataclass(frozen=True, eq=False)
 class PhotoOrientation:
-    """A photo oriented by directions."""
-
     names: tuple[str, ...]  # unknowns: alpha, omega, kappa, then what else was determined: f, x0, z0, k
     values: Floats  # (u,): radians and mm; k is a ratio
     cofactors: Floats  # (u, u): their covariance for the stated standard deviations

@@ -73,7 +73,6 @@ def _lines(records: Records | list[Document], encode: Encoder) -> str:
 
 
 def _text(value: Plain, encode: Encoder) -> str:
-    """Write a value on one line."""
     if isinstance(value, dict):
         return f"{{{', '.join(f'{encode.text(key)}: {_text(each, encode)}' for key, each in value.items())}}}"
     return encode.value(value)

@@ -43,7 +43,6 @@ def _fixed(values: Floats, decimals: int | list[int]) -> list[list[str]]:
 
 
 def _decimals(step: float) -> int:
-    """Decimals that show a step."""
     return max(0, math.ceil(-math.log10(step) - 1e-9))  # 1e-9: the logarithm of 1e-4 is not exactly -4
 
 

@@ -47,7 +47,6 @@ def as_fixed(values: Floats, decimals: int, missing: str) -> Cells:
 
 
 def as_whole(values: NDArray[np.int64]) -> Cells:
-    """Write whole numbers."""
     return _written(values < 0, np.abs(values).astype(np.uint64), 0, short=False)
 
 

@@ -39,7 +39,6 @@ def number(text: str) -> float:
 
 
 def _reason(word: str) -> NotANumber:
-    """Say what a word is that is no number."""
     plain = "".join(map(_ascii, unicodedata.normalize("NFKC", word)))
     unit = _WITH_UNIT.fullmatch(word)
     what, fix = "is not a number", ""

@@ -76,7 +76,6 @@ class Table:
     def note(
         self, row: int, code: str, message: str, severity: str = "warning", *, key: str, points: Sequence[str] = ()
     ) -> Note:
-        """Make a note with the line of a row."""
         line = int(self.lines[row])
         return Note(code, message, severity, points=tuple(points), file=self.file, line=line, key=key)
 

@@ -75,7 +75,6 @@ def _encoded(content: Content) -> Iterator[bytes]:
 
 
 def _make(folder: Path) -> None:
-    """Make the folder, or say what is in its way."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):

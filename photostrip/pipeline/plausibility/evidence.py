@@ -208,7 +208,6 @@ def stretches(
 
 
 def _nearest(points: Floats, centers: Floats) -> Numbers:
-    """Find the nearest centre of each point."""
     middle = centers.mean(axis=0)
     squares, found = ((centers - middle) ** 2).sum(axis=1), np.empty(len(points), np.intp)
     for start in range(0, len(points), AT_A_TIME):

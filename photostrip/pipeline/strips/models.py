@@ -83,11 +83,9 @@ class LinkedModels:
         return lambda some: model_misclosures.covariance(oriented.errors, oriented.misclosures.take(some), rows, factor)
 
     def control_rays(self, _: Oriented) -> tuple[()]:
-        """Models have no rays."""
         return ()
 
     def without_images(self, _: Mapping[str, Rejection]) -> LinkedModels:
-        """Models have no images."""
         return self
 
     def screens_control(self, settings: Settings) -> bool:

@@ -20,8 +20,6 @@ from photostrip.planning.model.single_model import PARAMETERS, ModelControl, par
 
 @dataclass(frozen=True, eq=False)
 class AdjustedModel:
-    """An oriented model."""
-
     control: ModelControl
     base: float
     parameters: Floats  # (7,): absolute orientation, in the order of `PARAMETERS`

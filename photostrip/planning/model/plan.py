@@ -55,8 +55,6 @@ class NamedPoint:
 
 @dataclass(frozen=True)
 class ControlPoint(NamedPoint):
-    """A control point of a model."""
-
     use: str = "xyz"  # ``xyz``, ``xy`` or ``z``
     misclosure: Three | None = None  # model minus given, metres, where the model has been measured
     given_error: Three = NO_ERROR
@@ -64,8 +62,6 @@ class ControlPoint(NamedPoint):
 
 @dataclass(frozen=True)
 class ModelSpec:
-    """One model."""
-
     focal: float  # principal distance, mm
     base: float  # photo base b, mm
     width: float  # distance a of the side points from the flight line, mm

@@ -32,8 +32,6 @@ CLOSEST = 1e-12  # of control in plan: B against the square of the size of its c
 
 @dataclass(frozen=True, eq=False)
 class ModelControl:
-    """Control points of a model."""
-
     points: Floats  # (n, 3): x, y and depth
     # plan, height: (n,): whether the point is given in plan, in height
     plan: Flags
@@ -44,8 +42,6 @@ class ModelControl:
 
 @dataclass(frozen=True, eq=False)
 class ExpectedErrors:
-    """Expected errors of points."""
-
     covariance: Floats  # (q, 3, 3): covariance of x, y and height
     # (q, 3, 3): what each source contributes: ``measuring`` of the point itself (for a control point with what its own
     # measurement does through the orientation), ``orientation`` relative, ``control measured``, ``control given``. They

@@ -21,8 +21,6 @@ POLYNOMIAL = "polynomial"
 
 @dataclass(frozen=True)
 class Design:
-    """What is to be designed."""
-
     geometry: StripGeometry
     layouts: tuple[ControlLayout, ...]
     methods: tuple[str, ...] = METHODS

@@ -50,8 +50,6 @@ class Placement:
 
 @dataclass(frozen=True)
 class BestPlaces:
-    """The best places found."""
-
     placement: Placement
     spots: tuple[Spot, ...]  # where the further points go
     # before, equal, found: worst standard deviations in plan and height, metres: of the layout alone, with the points

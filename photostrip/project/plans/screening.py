@@ -84,8 +84,6 @@ class ScreeningPlanFile(Section):
 
 
 class ScreeningPlan(NamedTuple):
-    """A plan of an experiment."""
-
     name: str
     spec: ScreeningSpec
     files: Sequence[str]

@@ -49,7 +49,6 @@ class WrongValueError(ValueError):
 
 
 def wrong(message: str, *, code: str = "value", expected: str = "", fix: str = "", at: str = "") -> WrongValueError:
-    """Make the error of one value."""
     return WrongValueError(message, code=code, expected=expected, fix=fix, at=at)
 
 
@@ -97,8 +96,6 @@ class Rule(NamedTuple):
 
 
 class Key(NamedTuple):
-    """A key of a section."""
-
     description: str = ""
     default: Any = ...  # none: the key is required
     unit: str = ""
@@ -129,16 +126,13 @@ class Section:
         self.__dict__.update({**usual, **values}, given=frozenset(values))
 
     def __setattr__(self, name: str, value: object) -> Never:
-        """Refuse."""
         message = f"{name} of a section does not change"
         raise AttributeError(message)
 
     def values(self) -> dict[str, Any]:
-        """Values by key."""
         return {name: getattr(self, name) for name in self.keys}
 
     def changed(self, **values: Any) -> Self:  # noqa: ANN401 (values of any type)
-        """Return the section with other values."""
         return type(self)(**{**self.values(), **values})
 
 

@@ -44,7 +44,6 @@ def read_tree(file: str, findings: Findings, files: list[str]) -> Node | None:
 
 
 def _parent(root: Node, child: Node, chain: list[str], findings: Findings, files: list[str]) -> Node | None:
-    """Read the file that `child` extends."""
     node = child.entries["extends"]
     if not node.text:
         what = "no value is given" if node.value == "" else "only one file can be extended"

@@ -69,7 +69,6 @@ def headline(document: Document) -> str:
 
 
 def allowed_words(kind: Document) -> str:
-    """Say what is allowed for a kind of quantity."""
     if kind["ignored"]:
         return "not compared"
     allowed, name = kind["allowed"], unit(kind["unit"])

@@ -39,7 +39,6 @@ class Words:
 
 
 def numbered(*texts: str) -> tuple[Words, ...]:
-    """Return paragraphs with numbers, from 1."""
     return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
 
 

@@ -50,7 +50,6 @@ class Differences:
 
     @property
     def height(self) -> Floats:
-        """Differences in height, metres."""
         return self.parts[:, 2]
 
 

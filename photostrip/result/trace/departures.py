@@ -8,8 +8,6 @@ from photostrip.pipeline.inputs import Settings
 
 
 class Choice(NamedTuple):
-    """A choice of the method."""
-
     subject: str
     source: str  # where the textbook decides
     key: str  # of ``processing``

@@ -67,7 +67,6 @@ def _some_photos(
     influence: Callable[[Numbers], Floats],
     distance: float,
 ) -> PhotoErrors:
-    """Differentiate the resections of the photos that have sightings."""
     photos, starts, item = np.unique(sightings.photo, return_index=True, return_inverse=True)
     place = np.arange(len(item)) - starts[item]  # among the sightings of the photo
     by = _resected(sightings, resection, item, place, distance)

@@ -76,7 +76,6 @@ class StripAtControl:
 
     @cached_property
     def laid(self) -> StripAtControl:
-        """The strip laid on all its control."""
         return self.laid_on(self.control.use)
 
     def laid_on(self, kept: Flags) -> StripAtControl:

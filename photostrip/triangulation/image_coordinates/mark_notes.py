@@ -130,7 +130,6 @@ def marks_without_camera(
 
 
 def marks_of_no_strip(fiducials: PhotoPoints, cameras: Mapping[str, Camera]) -> list[Note]:
-    """Note the photos with marks that stand in no strip."""
     unused = tuple(photo for photo in fiducials.photo_ids if photo not in cameras)
     if not unused:
         return []

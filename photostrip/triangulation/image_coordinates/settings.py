@@ -21,8 +21,6 @@ class InteriorSettings:
 
 @dataclass(frozen=True)
 class ImageCorrectionSettings:
-    """Which corrections are applied."""
-
     # principal_point, distortion: reduce to the principal point of the camera; take out its lens distortion
     principal_point: bool = True
     distortion: bool = True

@@ -30,8 +30,6 @@ class Before(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """What is drawn of one strip."""
-
     id: str
     after: list[tuple[Spot, float, tuple[float | None, ...]]]  # point, place along the strip, adjusted minus given
     before: list[Before]
@@ -112,7 +110,6 @@ def _misclosed(plan: Plan, course: Course, row: Document) -> tuple[float | None,
 
 
 def polynomial_at(block: Document, axis: str, x: float) -> float:
-    """Return a polynomial on the axis of the strip."""
     total = 0.0
     for term, coefficient in zip(block["terms"][axis], block["coefficients"][axis], strict=True):
         found = re.fullmatch(r"(?:1|X(?:\^(\d))?)", term)

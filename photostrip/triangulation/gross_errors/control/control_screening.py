@@ -65,7 +65,6 @@ def screen_control(strip: StripAtControl) -> ScreenedControl:
 
 
 def not_screened(control: ControlPoints) -> ScreenedControl:
-    """Keep all control."""
     unknown = np.full(control.use.shape, np.nan)
     return ScreenedControl(kept=control, rejections=(), redundancy=unknown, detectable=unknown)
 
