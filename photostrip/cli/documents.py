@@ -54,13 +54,6 @@ def say(notes: Iterable[Note], *, quiet: bool) -> None:
             typer.echo(f"{note.severity}: {note.message}", err=True)
 
 
-def require_target(depfile: Path | None, output: Path | None) -> None:
-    """Refuse a rule for make without a file to make."""
-    if depfile is not None and output is None:
-        message = "a rule for make needs a target: give --output as well"
-        raise typer.BadParameter(message, param_hint="--depfile")
-
-
 def write_rule(depfile: Path | None, target: Path | None, files: Iterable[str]) -> None:
     """Write the rule for make, if one is asked for."""
     if depfile is not None and target is not None:

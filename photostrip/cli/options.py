@@ -25,6 +25,12 @@ def _page(width: int | None) -> int | None:
     return width
 
 
+Saved = Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")]
+Target = Annotated[
+    Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; its ending gives the format.")
+]
+Rule = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make.")]
+RuleOfOutput = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make; needs -o.")]
 Assignments = Annotated[
     list[str] | None,
     typer.Option(
@@ -57,3 +63,10 @@ Verbose = Annotated[
         "--verbose", "-v", envvar="PHOTOSTRIP_VERBOSE", help="Print whole tables, and say what is being done."
     ),
 ]
+
+
+def require_target(depfile: Path | None, output: Path | None) -> None:
+    """Refuse a rule for make without a file to make."""
+    if depfile is not None and output is None:
+        message = "a rule for make needs a target: give --output as well"
+        raise typer.BadParameter(message, param_hint="--depfile")

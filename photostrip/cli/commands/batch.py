@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Assignments, Quiet, Strict, Verbose, Width
+from photostrip.cli.options import Assignments, Quiet, Rule, Strict, Verbose, Width, require_target
 from photostrip.cli.stdout import BatchFormat
 
 
@@ -41,7 +41,7 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
         BatchFormat, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the summary is printed.")
     ] = BatchFormat.TEXT,
     width: Width = None,
-    depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make.")] = None,
+    depfile: Rule = None,
     html: Annotated[
         bool, typer.Option("--html", help="Write summary.html into DIR, and report.html for each project.")
     ] = False,
@@ -61,8 +61,7 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.cli.jobs.batch import BatchOptions, run_batch
     from photostrip.errors import Fault, InputError
 
-    if depfile is not None and output is None:
-        raise typer.BadParameter("a rule for make needs a target: give --output as well", param_hint="--depfile")
+    require_target(depfile, output)
     if html:
         if output is None:
             raise typer.BadParameter("summary.html needs a folder: give --output as well", param_hint="--html")

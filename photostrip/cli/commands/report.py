@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Plots, Quiet, Strict, Width
+from photostrip.cli.options import Plots, Quiet, Saved, Strict, Target, Width
 from photostrip.cli.section_option import Sections, Verbose, refuse_sections
 from photostrip.cli.stdout import Format, Parts, form_of, print_result, report_text
 
@@ -15,10 +14,8 @@ HTML = ".html"
 
 
 def report(  # noqa: PLR0913, PLR0917 (an argument for each option)
-    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; its ending gives the format.")
-    ] = None,
+    result: Saved,
+    output: Target = None,
     form: Annotated[
         Format | None, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the report is printed.")
     ] = None,

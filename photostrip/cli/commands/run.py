@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Assignments, Plots, Quiet, Shape, Strict, Width
+from photostrip.cli.options import Assignments, Plots, Quiet, Rule, Shape, Strict, Width, require_target
 from photostrip.cli.section_option import Sections, Verbose, refuse_sections
 from photostrip.cli.stdout import Format, Parts, form_of, print_result
 
@@ -21,7 +21,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     assignments: Assignments = None,
     form: Shape = Format.TEXT,
     width: Width = None,
-    depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make.")] = None,
+    depfile: Rule = None,
     trace: Annotated[
         Path | None,
         typer.Option(
@@ -102,8 +102,7 @@ def _refuse_contradictions(
 ) -> None:
     """Refuse options that make no sense together, before anything is computed."""
     trace = alone["--trace"]
-    if output is None and alone["--depfile"] is not None:
-        raise typer.BadParameter("a rule for make needs a target: give --output as well", param_hint="--depfile")
+    require_target(alone["--depfile"], output)
     if output is None and html:
         raise typer.BadParameter("report.html needs a folder: give --output as well", param_hint="--html")
     if trace is not None:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from photostrip.cli.options import Rule
+
 
 def simulate(
     spec: Annotated[Path, typer.Argument(metavar="SPEC", help="Specification of the simulation (YAML).")],
@@ -15,7 +17,7 @@ def simulate(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Override a key, as in flight.photos=20; may be repeated."),
     ] = None,
-    depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make.")] = None,
+    depfile: Rule = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")] = False,
 ) -> None:
     """Write a synthetic project with known truth, ready to run.

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from photostrip.cli.documents import FORMS, Form, Rendering, require_target
+from photostrip.cli.documents import FORMS, Form, Rendering
 from photostrip.cli.option_groups import command_group, subcommand
-from photostrip.cli.options import Silent
+from photostrip.cli.options import Silent, require_target
 from photostrip.cli.stdout import Document
 from photostrip.frozen import dataclass
 

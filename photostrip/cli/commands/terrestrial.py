@@ -14,9 +14,9 @@ from photostrip.cli.commands.terrestrial_directions import (
     Unit,
     directions,
 )
-from photostrip.cli.documents import Rendering, require_target, say, write_rule
+from photostrip.cli.documents import Rendering, say, write_rule
 from photostrip.cli.option_groups import command_group, subcommand
-from photostrip.cli.options import Silent
+from photostrip.cli.options import RuleOfOutput, Silent, require_target
 from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def displacement(  # noqa: PLR0913 (an argument for each option)
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE.svg", help="Draw the displacements, too.")
     ] = None,
-    depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make; needs -o.")] = None,
+    depfile: RuleOfOutput = None,
     quiet: Silent = False,
     base: Base = None,
     camera: CameraByPoint,

@@ -13,26 +13,21 @@ from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 from photostrip.triangulation.error_propagation.control_errors import FitOperator
-from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, SIGMA_LEVEL
+from photostrip.triangulation.error_propagation.covariances import variance_factor
 from photostrip.triangulation.independent_models import model_errors, model_misclosures, perspective_centers
 from photostrip.triangulation.independent_models.formation import FormedModels
 from photostrip.triangulation.independent_models.model_errors import ModelErrors
 from photostrip.triangulation.polynomial.terms import POWERS
 
 
-def variance_factor(formed: FormedModels) -> tuple[float, str]:
+def variance_of_models(formed: FormedModels) -> tuple[float, str]:
     """Variance of the model coordinates found over that stated, 1 unless the links contradict it; and which it is."""
     solved = formed.links.solved
-    redundancy, squares = int(solved.redundancy.sum()), float(solved.squares.sum())
-    if redundancy < 1:
-        return 1.0, A_PRIORI
-    low, high = (chi2_quantile(p, redundancy) for p in (SIGMA_LEVEL / 2, 1 - SIGMA_LEVEL / 2))
-    return (1.0, A_PRIORI) if low <= squares <= high else (squares / redundancy, A_POSTERIORI)
+    return variance_factor(float(solved.squares.sum()), int(solved.redundancy.sum()))
 
 
 def of_models(
@@ -44,7 +39,7 @@ def of_models(
     """
     formed, axes = strip.of_models.formed, strip.intermediate.axes
     found, control, fit = oriented.errors, oriented.misclosures, _fit_to_control(strip, oriented)
-    factor, basis = variance_factor(formed)
+    factor, basis = variance_of_models(formed)
     influence = _influence(strip, fit)
     by_parameters = model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, fit.operator))
     spread = model_errors.covariance_of_sums(found, by_parameters)

@@ -172,13 +172,19 @@ def _points(file: str | None, at: Sequence[str], layout: Sequence[Column], limit
         for each in values.ravel():
             ranges.within("--at", each, limits)
         return Points(ids=tuple(map(str, range(1, len(at) + 1))), values=values, notes=(), table=None)
+    read, findings = _read(file, layout)
+    ranges.refuse_outside(read, names, limits, findings)
+    findings.stop()
+    return Points(ids=tuple(read.cells("point")), values=read.columns(*names), notes=tuple(findings.notes), table=read)
+
+
+def _read(file: str, layout: Sequence[Column]) -> tuple[Table, Findings]:
+    """Read a table, or raise why it is none."""
     findings = Findings()
     read = read_points(file, layout, findings)
     if read is None:
         raise InputError(findings.faults)
-    ranges.refuse_outside(read, names, limits, findings)
-    findings.stop()
-    return Points(ids=tuple(read.cells("point")), values=read.columns(*names), notes=tuple(findings.notes), table=read)
+    return read, findings
 
 
 class SightingOptions(NamedTuple):
@@ -196,10 +202,7 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
     Standard deviations are in the unit of the coordinates and in seconds of arc, distances in metres. One of lambda and
     beta may be empty.
     """
-    findings = Findings()
-    read = read_points(file, SIGHTINGS, findings)
-    if read is None:
-        raise InputError(findings.faults)
+    read, findings = _read(file, SIGHTINGS)
     scale, ids = ranges.MILLIMETRES[options.unit], tuple(read.cells("point"))
     ranges.refuse_outside(read, ("x", "z"), ranges.COORDINATE, findings, scale=scale, unit=options.unit)
     ranges.refuse_outside(read, ("sx", "sz"), ranges.IMAGE_SIGMA, findings, scale=scale, unit=options.unit)
@@ -236,10 +239,7 @@ def read_one_station(
 
     sigmas: standard deviations of coordinates and of pseudo-parallaxes, mm, and of distances, metres, of rows without.
     """
-    findings = Findings()
-    read = read_points(file, ONE_STATION, findings)
-    if read is None:
-        raise InputError(findings.faults)
+    read, findings = _read(file, ONE_STATION)
     scale, ids = ranges.MILLIMETRES[unit], tuple(read.cells("point"))
     ranges.refuse_outside(read, ("x", "z", "dx", "dz"), ranges.COORDINATE, findings, scale=scale, unit=unit)
     ranges.refuse_outside(read, ("sigma", "sigma_d"), ranges.IMAGE_SIGMA, findings, scale=scale, unit=unit)

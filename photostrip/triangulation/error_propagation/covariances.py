@@ -38,6 +38,11 @@ def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
     """
     redundancy = int((orientation.points_used - MINIMUM_POINTS).sum())
     squares = float((orientation.pairs.weight * orientation.parallax**2)[orientation.used].sum()) / (2 * sigma**2)
+    return variance_factor(squares, redundancy)
+
+
+def variance_factor(squares: float, redundancy: int) -> tuple[float, str]:
+    """Variance found over that stated, and its basis: 1 unless the weighted sum of squares contradicts it."""
     if redundancy < 1:
         return 1.0, A_PRIORI
     low, high = (chi2_quantile(p, redundancy) for p in (SIGMA_LEVEL / 2, 1 - SIGMA_LEVEL / 2))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from photostrip.pipeline.precision.model_precision import variance_factor
+from photostrip.pipeline.precision.model_precision import variance_of_models
 from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, SIGMA_LEVEL
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def test_the_stated_precision_counts_until_chi_square_contradicts_it(redundancy:
     ):
         solved = SimpleNamespace(redundancy=np.array([redundancy, 0]), squares=np.array([squares, 0.0]))
         formed = cast("FormedModels", SimpleNamespace(links=SimpleNamespace(solved=solved)))
-        found = variance_factor(formed)
+        found = variance_of_models(formed)
         assert found[0] == pytest.approx(factor)
         assert found[1] == basis
 
@@ -33,4 +33,4 @@ def test_the_stated_precision_counts_until_chi_square_contradicts_it(redundancy:
 def test_without_redundancy_nothing_contradicts_it() -> None:
     solved = SimpleNamespace(redundancy=np.array([0]), squares=np.array([0.0]))
     formed = cast("FormedModels", SimpleNamespace(links=SimpleNamespace(solved=solved)))
-    assert variance_factor(formed) == (1.0, A_PRIORI)
+    assert variance_of_models(formed) == (1.0, A_PRIORI)

@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from photostrip.cli.commands.plan.options import Options
-from photostrip.cli.documents import FORMS, Form, Rendering, require_target, write_rule
-from photostrip.cli.options import Silent
+from photostrip.cli.documents import FORMS, Form, Rendering, write_rule
+from photostrip.cli.options import RuleOfOutput, Silent, require_target
 from photostrip.cli.stdout import Document
 from photostrip.errors import Fault, InputError
 from photostrip.frozen import dataclass, replace
@@ -34,7 +34,7 @@ class Delivery:
             "--output", "-o", metavar="FILE", help="Write .svg or .png (a picture), .json, .csv, .md or .txt."
         ),
     ] = None
-    depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make; needs -o.")] = None
+    depfile: RuleOfOutput = None
     quiet: Silent = False
 
     def require_output(self) -> bool:

@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Quiet, Width
+from photostrip.cli.options import Quiet, Saved, Target, Width
 from photostrip.cli.stdout import Document, Format, StatementFormat, form_of, print_json, print_sections
 
 HTML = ".html"
 
 
 def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
-    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")],
+    result: Saved,
     class_plan: Annotated[
         float | None,
         typer.Option("--class-plan", metavar="CM", min=0.1, max=1e6, help="Class in plan that is asked for, cm."),
@@ -29,9 +29,7 @@ def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
     require: Annotated[
         str, typer.Option("--require", metavar="CLASS", help="Class of the profile that must be kept.")
     ] = "",
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; its ending gives the format.")
-    ] = None,
+    output: Target = None,
     form: Annotated[
         StatementFormat | None, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How it is printed.")
     ] = None,

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Quiet, Width
+from photostrip.cli.options import Quiet, Saved, Width
 from photostrip.cli.stdout import Format, StatementFormat, print_json, print_sections
 
 
 def verify(
-    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")],
+    result: Saved,
     project: Annotated[
         Path | None,
         typer.Option("--project", metavar="FILE", help="Its project file; default: found beside it by its hash."),
