@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.refusals import refuse_curvature_twice
-from photostrip.pipeline.results import StripResult
+
+if TYPE_CHECKING:
+    from photostrip.pipeline.results import StripResult
 
 LEFT_BY_A_LEVEL_FIT = 2.0 / (3.0 * 5.0**0.5)  # rms of what a parabola leaves about its mean, of its height at the ends
 EPOCH_UNKNOWN = 10.0  # years by which an epoch that is not given may differ from that of an operation

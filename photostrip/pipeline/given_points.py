@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.pipeline.results import Adjusted, Result
 from photostrip.points import ControlPoints, PhotoPoints, locate
+
+if TYPE_CHECKING:
+    from photostrip.pipeline.results import Adjusted, Result
 
 
 def measured_control(control: ControlPoints, observations: PhotoPoints) -> ControlPoints:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +12,12 @@ from photostrip.errors import Fault, InputError
 from photostrip.frozen import replace
 from photostrip.notes import Note
 from photostrip.points import ModelPoints, PhotoPoints
-from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
 from photostrip.triangulation.independent_models.settings import LinkSettings
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_again
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+
+if TYPE_CHECKING:
+    from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
 
 CENTER = "center of photo "  # before the name of a perspective centre in model coordinates
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,6 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.frames import TiedFrames
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings
-from photostrip.pipeline.results import Result
 from photostrip.points import PhotoPoints
 from photostrip.project import conversion
 from photostrip.project.hints import hints
@@ -40,6 +40,7 @@ from photostrip.project.yaml.tree import NO_FILES, Node, at_own_key
 from photostrip.project.yaml.validation import valid_section
 
 if TYPE_CHECKING:
+    from photostrip.pipeline.results import Result
     from photostrip.pipeline.strips.stages import Stages
 
 OF_IMAGES = ("photostrip", "cameras", "strips", "observations", "fiducial_measurements", "accept")
@@ -54,7 +55,7 @@ class Project:
     settings: Settings
     path: Path
     files: tuple[Path, ...]  # every file that was read, the project file first, grid files beside it last
-    resolved: str  # the project as YAML with all defaults filled in, without absolute paths
+    completed: ProjectFile  # the project with all defaults filled in, without absolute paths
     hints: tuple[Note, ...]  # what was passed over or not used, and why
     tree: Node  # the project file with everything merged into it: it knows where each value stands
     tables: Tables
@@ -63,6 +64,11 @@ class Project:
     grids: tuple[str, ...]
     grid_folder: Path
     tied: TiedFrames | None  # the ground frames, tied; None where there are none
+
+    @cached_property
+    def resolved(self) -> str:
+        """The completed project as YAML."""
+        return text_of(self.completed)
 
     @property
     def directory(self) -> Path:
@@ -148,7 +154,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
         settings=conversion.settings(project),
         path=path,
         files=(*map(Path, reading.files), *(path.parent / grid for grid in grids if (grid_folder / grid).is_file())),
-        resolved=text_of(project),
+        completed=project,
         hints=(*findings.notes, *hints(project, tables, root), *notes),
         tree=root,
         tables=tables,

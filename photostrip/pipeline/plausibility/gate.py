@@ -26,24 +26,22 @@ from photostrip.pipeline.plausibility import (
     evidence,
     given_cameras,
     given_control,
-    shared_control,
-    slips,
 )
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import ImageEvidence, of_images
-from photostrip.pipeline.results import Result
 from photostrip.points import PhotoPoints, locate
 from photostrip.triangulation.plausibility import accepted
-from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
-from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, tied_strips, units
+from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, units
 
 if TYPE_CHECKING:
+    from photostrip.pipeline.results import Result
     from photostrip.pipeline.strips.stages import Stages
     from photostrip.triangulation.independent_models.formation import FormedModels
 
 STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give
 OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
+OF_SLIPS = "P406"  # findings on single digits of given coordinates
 OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
 
 
@@ -64,6 +62,9 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
 def of_result(result: Result, directory: Path | None = None, made: Stages | None = None) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment being done; made: what strips formed anew may share."""
     from photostrip.pipeline.common_points import compared_strips  # a check has no adjusted strips
+    from photostrip.pipeline.plausibility import shared_control, slips
+    from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
+    from photostrip.triangulation.plausibility.photos import tied_strips
 
     inputs, settings = result.inputs, result.settings
     if inputs.models is not None:
@@ -189,7 +190,7 @@ def _of_control(
     named = {name for each in copied for name in each.names}
     of_strips = given_control.by_strip(control, images, strips, formed, tried)
     # a point with the coordinates of another looks like a slip of the pen
-    of_strips = [each for each in of_strips if each.code != slips.CODE or named.isdisjoint(each.points)]
+    of_strips = [each for each in of_strips if each.code != OF_SLIPS or named.isdisjoint(each.points)]
     return [*control.findings, *copied, *of_strips]
 
 
@@ -207,13 +208,15 @@ def _of_unadjusted_models(
 
 def _of_adjusted_models(result: Result, models: MeasuredModels, directory: Path | None) -> tuple[Finding, ...]:
     """Look at strips of models as they were adjusted."""
+    from photostrip.pipeline.plausibility import shared_control, slips  # a check has no adjusted strips
+
     control = _given_control(result.inputs, directory)
     if control is None:
         return ()
     strips = [(each.of_models.strip, each.of_models.formed) for each in result.strips]
     findings = _of_models(strips, models, control)
     if result.precision is not None:
-        findings = [each for each in findings if each.code != slips.CODE]
+        findings = [each for each in findings if each.code != OF_SLIPS]
         findings += slips.of_models(result, models, slips.predict(result), control)
         if not any(each.is_error for each in findings):
             findings += shared_control.find_shifted_checks(result)

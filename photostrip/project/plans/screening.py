@@ -22,7 +22,7 @@ from photostrip.project.schema.values import (
     choice,
     one_of,
 )
-from photostrip.triangulation.gross_errors.pairs.screening import METHODS
+from photostrip.triangulation.relative_orientation.orientation import SCREENINGS
 
 MICROMETRES = 1000.0  # in a millimetre
 USUAL = ScreeningSpec()
@@ -66,7 +66,7 @@ class ScreeningPlanFile(Section):
     error_sizes_um: Annotated[list[Positive], Length(1, 20)] = key(
         "Sizes of the errors, each as often as any other", [MICROMETRES * size for size in USUAL.sizes], unit="um"
     )
-    methods: Annotated[list[Annotated[str, choice(METHODS)]], Length(1)] = key(
+    methods: Annotated[list[Annotated[str, choice(SCREENINGS)]], Length(1)] = key(
         "Methods, of `processing.relative.screening`", list(USUAL.methods)
     )
     grubbs_alpha: Fraction = key("Probability of rejecting a good point of a pair", USUAL.grubbs_alpha)

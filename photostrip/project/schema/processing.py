@@ -26,9 +26,9 @@ from photostrip.project.schema.values import (
     quoted,
 )
 from photostrip.triangulation.bundle.settings import ASKED, SCREENINGS, TESTS
-from photostrip.triangulation.gross_errors.pairs.screening import METHODS
 from photostrip.triangulation.independent_models.settings import METHODS as LINK_METHODS
 from photostrip.triangulation.polynomial.correction import DEGREES
+from photostrip.triangulation.relative_orientation.orientation import SCREENINGS as RELATIVE_SCREENINGS
 from photostrip.triangulation.strip_formation.scale_transfer import INTERSECTIONS, SCALE_TRANSFERS
 
 DEFAULTS = Settings()
@@ -37,8 +37,8 @@ DEFAULTS = Settings()
 class Relative(Section):
     """Relative orientation and its search for gross errors."""
 
-    screening: Annotated[str, choice(METHODS)] = key(
-        f"How gross errors are searched for: {quoted(METHODS)}", DEFAULTS.relative.screening
+    screening: Annotated[str, choice(RELATIVE_SCREENINGS)] = key(
+        f"How gross errors are searched for: {quoted(RELATIVE_SCREENINGS)}", DEFAULTS.relative.screening
     )
     grubbs_alpha: Fraction = key(
         "Probability of rejecting a good point of a pair without gross errors", DEFAULTS.relative.grubbs_alpha

@@ -25,6 +25,7 @@ CONDITION_WARNING = 100.0  # of the column-normalised Jacobian: a band much narr
 CONDITION_LIMIT = 1e6
 SMALLEST_PARALLAX = 1e-3  # of the principal distance, mean over a pair: below it there is no base to speak of
 LEAST_IN_FRONT = 0.5  # share of the points of a pair
+SCREENINGS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")  # searches for gross errors
 BY_PAIR = ("elements", "sigmas", "sigma0", "condition", "iterations", "cofactors")
 BY_ROW = ("parallax", "redundancy")
 
@@ -33,9 +34,7 @@ BY_ROW = ("parallax", "redundancy")
 class RelativeSettings:
     """How pairs are oriented and their gross errors found."""
 
-    # ``"auto"`` (robust start where needed, then deletion search), ``"parallax+grubbs"``, ``"tau"``, ``"deletion"``,
-    # ``"robust"`` or ``"none"``
-    screening: str = "auto"
+    screening: str = "auto"  # of ``SCREENINGS``; ``auto``: robust start where needed, then deletion search
     grubbs_alpha: float = 0.05  # probability of rejecting a point of a pair without gross errors
     # largest y parallax in mm that needs no rejection; None: four times its a-priori standard deviation
     parallax_limit: float | None = None

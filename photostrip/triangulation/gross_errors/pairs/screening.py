@@ -25,6 +25,7 @@ from photostrip.triangulation.gross_errors.pairs.global_test import ParallaxScat
 from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, rejection, search
 from photostrip.triangulation.relative_orientation.orientation import (
     LEAST_IN_FRONT,
+    SCREENINGS,
     Orientation,
     RelativeSettings,
     orient_again,
@@ -34,7 +35,6 @@ from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import base_rays, in_front_of_cameras, rays_meet_in_front
 from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT, Support, zones
 
-METHODS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")
 SEARCHES = {"auto": (True, True), "deletion": (False, True), "robust": (True, False)}  # robust start, sets of points
 NEGLIGIBLE = 1e-9  # mm; residuals of error-free data are rounding, not measurements
 LIMIT_FACTOR = 4.0  # a-priori standard deviations of a y parallax
@@ -83,8 +83,8 @@ def screen_pairs(
     With ``auto`` and ``robust`` the pairs need not make sense yet; ``converged`` (p,) says whose orientation converged,
     all by default. ``sigma`` is that of an image coordinate, mm.
     """
-    if settings.screening not in METHODS:
-        msg = f"screening method {settings.screening!r} is not available; choose one of {', '.join(METHODS)}"
+    if settings.screening not in SCREENINGS:
+        msg = f"screening method {settings.screening!r} is not available; choose one of {', '.join(SCREENINGS)}"
         raise InputError(msg)
     sound = np.ones(orientation.pairs.size, bool) if converged is None else converged
     rays = base_rays(orientation.elements, orientation.pairs)

@@ -78,11 +78,13 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
     """
     common = _common_points(observations, photos)
     order = np.argsort(common.pair, kind="stable")
-    pairs, count = np.unique(common.pair, return_counts=True)
+    pair = common.pair[order]
+    first = np.flatnonzero(np.diff(pair, prepend=-1))
+    count = np.diff(first, append=len(pair))
     enough = count >= LEAST_COMMON
     rows = order[np.repeat(enough, count)]
     z_a, z_b, near = common.z_a[rows], common.z_b[rows], common.near[rows]
-    pairs, count = pairs[enough], count[enough]
+    pairs, count = pair[first[enough]], count[enough]
     if not len(pairs):
         none, nowhere = np.zeros(0), np.zeros(0, complex)
         return PhotoLinks(
@@ -133,7 +135,7 @@ def _common_points(observations: PhotoPoints, photos: Sequence[str]) -> _CommonP
         place.setdefault(name, number)
     position = np.array([place.get(name, -1) for name in observations.photo_ids], np.intp)[observations.photo]
     inside = np.flatnonzero(position >= 0)
-    order = inside[np.lexsort((position[inside], observations.point[inside]))]
+    order = inside[np.argsort(observations.point[inside] * len(photos) + position[inside], kind="stable")]
     point, position = observations.point[order], position[order]
     z = observations.xy[order, 0] + 1j * observations.xy[order, 1]
     near = _near(np.abs(z), position)
