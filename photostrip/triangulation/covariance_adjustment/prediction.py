@@ -158,50 +158,54 @@ class _Columns:
         models = len(layout.start)
         some = range(low * layout.width, min(high * layout.width, models))
         ends = np.searchsorted(self.rows.first, [*some, some.stop])
-        bounds = ends[np.minimum(np.arange(high - low + 1) * layout.width, len(some))].tolist()
-        columns = [np.zeros((3, layout.height, (stop - start) * size)) for start, stop in pairwise(bounds)]
+        bounds = ends[np.minimum(np.arange(high - low + 1) * layout.width, len(some))]
+        counts = np.diff(bounds)
+        offsets = np.concatenate([[0], np.cumsum(3 * layout.height * counts * size)])
+        whole = np.zeros(offsets[-1])
+        columns = [
+            whole[start:stop].reshape(3, layout.height, count * size)
+            for (start, stop), count in zip(pairwise(offsets.tolist()), counts.tolist(), strict=True)
+        ]
         begin, end = ends[[0, -1]].tolist()
         part, near = self.rows.part(begin, end), self.near.with_components[begin:end]
         slots = self.found.padded.by_component.shape[1]
         padded = system.PaddedRows.of(self.found.errors, part, near, slots, some)
         starts, unknowns, reached = layout.start.tolist(), layout.unknown.tolist(), ends.tolist()
         # the place of each model's rows: its block, and its columns there
-        places = [
-            (place // layout.width, slice((start - first) * size, (stop - first) * size))
+        places = {
+            place: (place // layout.width, slice((start - first) * size, (stop - first) * size))
             for place, (start, stop) in enumerate(pairwise(reached))
-            for first in [bounds[place // layout.width]]
-        ]
+            for first in [int(bounds[place // layout.width])]
+            if stop > start
+        }
         for apart in range(-layout.width, layout.width + 1):
             others = range(max(some.start + apart, 0), min(some.stop + apart, models))
             if not others:
                 continue
             values = system.products(self.found.padded, padded, others, -apart)
-            for other, value in zip(others, values, strict=True):
-                block, across = places[other - apart - some.start]
+            for number, (block, across) in places.items():
+                other = some.start + number + apart
+                if other not in others:
+                    continue
                 beside = other // layout.width - (low + block) + 1
                 top, height = starts[other], unknowns[other]
+                value = values[other - others.start]
                 columns[block][beside, top:height, across] = value[: height - top, : across.stop - across.start]
-        for number, (block, across) in enumerate(places):
+        for number, (block, across) in places.items():
             unknown = unknowns[number + some.start]
             by_unknowns = self.by_unknowns[reached[number] : reached[number + 1]].reshape(-1, SIMILARITY_PARAMETERS)
             columns[block][1, unknown : unknown + SIMILARITY_PARAMETERS, across] = by_unknowns.T
-        made = [
-            BlockColumns(number, slice(start, stop), values)
-            for number, (start, stop), values in zip(range(low, high), pairwise(bounds), columns, strict=True)
-        ]
-        for each in made:
-            self._add_shared(each)
-        return made
-
-    def _add_shared(self, made: BlockColumns) -> None:
-        """Add the products of image points that rows of a block have in common with conditions."""
-        layout, size = self.found.layout, self.rows.by_similarity.shape[1]
-        inside = slice(*np.searchsorted(self.shared.first, [made.rows.start, made.rows.stop]).tolist())
+        # products of image points that rows have in common with conditions
+        inside = slice(*np.searchsorted(self.shared.first, [begin, end]).tolist())
         row, condition, value = self.shared.first[inside], self.shared.second[inside], self.shared.value[inside]
-        place = (layout.block[condition] - made.number + 1) * layout.height + layout.position[condition]
-        across = (row - made.rows.start)[:, None] * size + np.arange(size)
-        # flat places: three indices take ten times as long
-        np.add.at(made.values.reshape(-1), place[:, None] * made.values.shape[2] + across, value)
+        own = self.rows.first[row] // layout.width - low
+        place = (layout.block[condition] - (low + own) + 1) * layout.height + layout.position[condition]
+        first = offsets[own] + (place * counts[own] + row - bounds[own]) * size
+        np.add.at(whole, first[:, None] + np.arange(size), value)  # flat: three indices take ten times as long
+        return [
+            BlockColumns(number, slice(start, stop), values)
+            for number, (start, stop), values in zip(range(low, high), pairwise(bounds.tolist()), columns, strict=True)
+        ]
 
 
 def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:

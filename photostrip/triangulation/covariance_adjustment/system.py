@@ -264,11 +264,11 @@ def _add_covariances(matrix: BlockMatrix, padded: PaddedRows, rows: ErrorRows) -
 def _add_design(matrix: BlockMatrix, wanted: Conditions) -> None:
     """Add A: the unknowns of each condition's own model, and of the next one."""
     layout, rows = matrix.layout, wanted.rows
-    models = len(layout.start)
-    ends = np.searchsorted(rows.first, np.arange(models + 1)).tolist()
-    unknowns = [slice(place, place + SIMILARITY_PARAMETERS) for place in layout.unknown.tolist()]
-    for model, (start, unknown) in enumerate(zip(layout.start.tolist(), unknowns, strict=True)):
-        inside, conditions = slice(start, unknown.start), slice(ends[model], ends[model + 1])
-        matrix.add(model, inside, model, unknown, rows.by_similarity[conditions, 0])
-        if model + 1 < models:
-            matrix.add(model, inside, model + 1, unknowns[model + 1], wanted.following[conditions])
+    for model, values in ((rows.first, rows.by_similarity[:, 0]), (rows.first + 1, wanted.following)):
+        known = model < len(layout.unknown)  # none follows the last
+        columns = layout.unknown[model[known]][:, None] + np.arange(SIMILARITY_PARAMETERS)
+        apart = model[known] // layout.width > layout.block[known]
+        block, position = layout.block[known, None], layout.position[known, None]
+        matrix.beside[block[apart], position[apart], columns[apart]] = values[known][apart]
+        own = block[~apart], position[~apart], columns[~apart]
+        matrix.diagonal[own] = matrix.diagonal[own[0], own[2], own[1]] = values[known][~apart]
