@@ -43,7 +43,9 @@ def add_command(monkeypatch: pytest.MonkeyPatch, function: Callable[..., int | N
     module = ModuleType("probe_module")
     module.__dict__["probe"] = function
     monkeypatch.setitem(sys.modules, "probe_module", module)
-    monkeypatch.setitem(table.COMMANDS, "probe", table.Entry("probe_module", "Try the wrapper.", "photostrip probe"))
+    monkeypatch.setitem(
+        table.COMMANDS, "probe", table.CommandEntry("probe_module", "Try the wrapper.", "photostrip probe")
+    )
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:

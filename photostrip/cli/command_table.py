@@ -10,7 +10,7 @@ from typing import NamedTuple
 HELP_NAMES = {"help_option_names": ["--help", "-h"]}
 
 
-class Entry(NamedTuple):
+class CommandEntry(NamedTuple):
     """Where a command stands and what ``--help`` says of it.
 
     ``module`` holds a function, or a ``typer.Typer`` with subcommands, of the command's own name.
@@ -85,7 +85,8 @@ _MODULES = {
     "verify": "statements.verify",
 }  # where it is not that of the command's name
 COMMANDS = {
-    name: Entry(f"photostrip.cli.commands.{_MODULES.get(name, name)}", text, example) for name, text, example in _TEXTS
+    name: CommandEntry(f"photostrip.cli.commands.{_MODULES.get(name, name)}", text, example)
+    for name, text, example in _TEXTS
 }
 COMPLETION = "_PHOTOSTRIP_COMPLETE"  # the variable in which the script of a shell asks what can stand at the cursor
 

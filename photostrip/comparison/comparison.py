@@ -13,7 +13,7 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.comparison.ground import difference_in_plan_and_height, plan_and_height
 from photostrip.comparison.members import members_of, missing_and_new
-from photostrip.comparison.quantities import Quantity, quantities_of
+from photostrip.comparison.quantities import ComparedNumber, quantities_of
 from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError, incomplete
 from photostrip.frozen import NamedTuple
@@ -135,11 +135,11 @@ Key = tuple[str, str, str]  # block, id, name
 class _Numbers(NamedTuple):
     """The single numbers of two results by their place."""
 
-    now: dict[Key, Quantity]
-    before: dict[Key, Quantity]
+    now: dict[Key, ComparedNumber]
+    before: dict[Key, ComparedNumber]
 
 
-def _by_place(document: Document) -> dict[Key, Quantity]:
+def _by_place(document: Document) -> dict[Key, ComparedNumber]:
     return {(q.block, q.id, q.name): q for q in quantities_of(document)}
 
 
@@ -162,7 +162,7 @@ def _compared(numbers: _Numbers, tolerances: Tolerances) -> Iterator[Document]:
             yield _row(then._replace(value=None), then.value, math.inf, 0.0, tolerances)
 
 
-def _is_empty(key: Key, other: dict[Key, Quantity]) -> bool:
+def _is_empty(key: Key, other: dict[Key, ComparedNumber]) -> bool:
     """Whether the other result has nothing at the place of a number, or at a place that would hold it."""
     block, name, path = key
     places = [path, *(path[: found.start()] for found in re.finditer(r"[.\[]", path))]
@@ -195,11 +195,11 @@ def _located(document: Document, baseline: Document, tolerances: Tolerances) -> 
         *_control(document, baseline),
         *_rotations(document, baseline),
     ):
-        quantity = Quantity(kind=kind, block=block, id=name, name=kind, unit=UNITS[kind], value=None)
+        quantity = ComparedNumber(kind=kind, block=block, id=name, name=kind, unit=UNITS[kind], value=None)
         yield _row(quantity, None, size, tolerances.of(kind).absolute, tolerances)
 
 
-def _row(now: Quantity, before: float | None, size: float, allowed: float, tolerances: Tolerances) -> Document:
+def _row(now: ComparedNumber, before: float | None, size: float, allowed: float, tolerances: Tolerances) -> Document:
     """Return a number with the size of its difference, None where there is a number in one only."""
     return {
         "kind": now.kind,

@@ -42,7 +42,7 @@ KEPT = {
 }
 
 
-class Quantity(NamedTuple):
+class ComparedNumber(NamedTuple):
     """One number of a result."""
 
     kind: str
@@ -53,7 +53,7 @@ class Quantity(NamedTuple):
     value: Number  # the number; None where the result has none
 
 
-def quantities_of(document: Document) -> Iterator[Quantity]:
+def quantities_of(document: Document) -> Iterator[ComparedNumber]:
     """Return all single numbers of a result that are compared; coordinates and rotations are not among them.
 
     The combination of block, id and name stands once.
@@ -71,7 +71,7 @@ def quantities_of(document: Document) -> Iterator[Quantity]:
                 yield from _precisions(name, "sigma", row["sigma"])
             elif block == "points":
                 for key in ("sigma_x", "sigma_y", "sigma_z"):
-                    yield Quantity(kind="precision", block="points", id=name, name=key, unit="m", value=row[key])
+                    yield ComparedNumber(kind="precision", block="points", id=name, name=key, unit="m", value=row[key])
 
 
 def name_of(block: str, row: Document) -> str:
@@ -79,14 +79,14 @@ def name_of(block: str, row: Document) -> str:
     return " – ".join(row[key] for key in NAMES.get(block, ("id",)))
 
 
-def _numbers(block: str, name: str, value: object, path: str = "") -> Iterator[Quantity]:
+def _numbers(block: str, name: str, value: object, path: str = "") -> Iterator[ComparedNumber]:
     """Return every number below a value, by its path; texts are left to others."""
     if isinstance(value, dict):
         for key, each in value.items():
             yield from _numbers(block, name, each, f"{path}.{key}" if path else key)
     elif _is_number(value):
         kind, unit = _kind_and_unit(block, path, value)
-        yield Quantity(kind=kind, block=block, id=name, name=path, unit=unit, value=value)
+        yield ComparedNumber(kind=kind, block=block, id=name, name=path, unit=unit, value=value)
 
 
 def _is_number(value: object) -> TypeGuard[Number]:
@@ -106,21 +106,21 @@ def _kind_and_unit(block: str, path: str, value: object) -> tuple[str, str]:
     return "rotation" if unit == "deg" else "statistics", unit
 
 
-def _effects(name: str, block: Document) -> Iterator[Quantity]:
+def _effects(name: str, block: Document) -> Iterator[ComparedNumber]:
     """Return the size of each term at the end of the control's range, in metres, rather than its coefficient."""
     for axis, effects in block["effects"].items():
         for term, effect in zip(block["terms"][axis], effects, strict=True):
-            yield Quantity(
+            yield ComparedNumber(
                 kind="statistics", block="polynomials", id=name, name=f"effect {axis} {term}", unit="m", value=effect
             )
 
 
-def _elements(name: str, model: Document) -> Iterator[Quantity]:
+def _elements(name: str, model: Document) -> Iterator[ComparedNumber]:
     """Return the elements of relative orientation in degrees; none where a model was measured as such."""
     elements = model["elements"]
     for element in ELEMENTS if elements is not None else ():
         value, unit = elements[element], DEGREES[elements["unit"]]
-        yield Quantity(
+        yield ComparedNumber(
             kind="rotation",
             block="models",
             id=name,
@@ -130,13 +130,13 @@ def _elements(name: str, model: Document) -> Iterator[Quantity]:
         )
 
 
-def _precisions(name: str, path: str, value: object) -> Iterator[Quantity]:
+def _precisions(name: str, path: str, value: object) -> Iterator[ComparedNumber]:
     """Return the standard deviations of a photo, whatever they are called."""
     if isinstance(value, dict | list):
         for key, each in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _precisions(name, f"{path}.{key}" if isinstance(value, dict) else f"{path}[{key}]", each)
     elif _is_number(value):
-        yield Quantity(kind="precision", block="photos", id=name, name=path, unit="", value=value)
+        yield ComparedNumber(kind="precision", block="photos", id=name, name=path, unit="", value=value)
 
 
 SPECIAL = {"polynomials": _effects, "models": _elements}

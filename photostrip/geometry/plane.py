@@ -133,7 +133,7 @@ def projective_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayL
     raise GeometryError("the projective fit did not converge", code="projective")
 
 
-class Kind(NamedTuple):
+class TransformKind(NamedTuple):
     """One kind of transformation: its fit, how many unknowns it has and how many points it needs."""
 
     fit: Callable[..., PlaneTransform]
@@ -142,10 +142,10 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "conformal": Kind(conformal_from_points, 4, 2),
-    "affine": Kind(affine_from_points, 6, 3),
-    "bilinear": Kind(bilinear_from_points, 8, 4),
-    "projective": Kind(projective_from_points, 8, 4),
+    "conformal": TransformKind(conformal_from_points, 4, 2),
+    "affine": TransformKind(affine_from_points, 6, 3),
+    "bilinear": TransformKind(bilinear_from_points, 8, 4),
+    "projective": TransformKind(projective_from_points, 8, 4),
 }
 
 

@@ -77,14 +77,14 @@ def _precision_of(
     return model_precision.of_models(strip, oriented, observations, given)
 
 
-class MeanPoints(NamedTuple):
+class StripMeans(NamedTuple):
     """Points of several strips."""
 
     number: Numbers  # (n,): as numbered in the observations, ascending
     xyz: Floats  # (n, 3): mean over the strips that hold them, Cartesian frame, metres
 
 
-def mean_points(strips: Sequence[StripResult], strangers: Mapping[str, AbstractSet[int]] | None = None) -> MeanPoints:
+def mean_points(strips: Sequence[StripResult], strangers: Mapping[str, AbstractSet[int]] | None = None) -> StripMeans:
     """Mean of every point over the strips that hold it.
 
     strangers: points by strip that do not count there.
@@ -95,7 +95,7 @@ def mean_points(strips: Sequence[StripResult], strangers: Mapping[str, AbstractS
     cartesian = np.concatenate([strip.cartesian[rows] for strip, rows in zip(strips, held, strict=True)])
     number, inverse = np.unique(point, return_inverse=True)
     sums = np.column_stack([np.bincount(inverse, column) for column in cartesian.T])
-    return MeanPoints(number, np.asarray(sums / np.bincount(inverse)[:, None], float))
+    return StripMeans(number, np.asarray(sums / np.bincount(inverse)[:, None], float))
 
 
 def compared_strips(strips: Sequence[StripResult], point_ids: Sequence[str]) -> Iterator[TiesOfStrips]:

@@ -93,7 +93,7 @@ def scale_of(camera: ComparedCamera, height_sigma: float) -> float:
 
 
 @dataclass(frozen=True)
-class Terrain:
+class HighGround:
     """Ground that is no plane."""
 
     relief: float = 0.0  # difference between the highest and the lowest ground, metres; half of it is above the mean
@@ -101,13 +101,13 @@ class Terrain:
 
 
 @dataclass(frozen=True)
-class Survey:
+class FlownSurvey:
     """What is flown with every camera: one of scale, flying height or standard deviation of heights; and over what."""
 
     scale: float | None = None  # denominator
     flying_height: float | None = None  # metres
     height_sigma: float | None = None  # metres
-    terrain: Terrain = Terrain()
+    terrain: HighGround = HighGround()
 
     def flown(self, camera: ComparedCamera) -> FlownCamera:
         if self.height_sigma is not None:
@@ -131,7 +131,7 @@ class Suitability(NamedTuple):
     least_focal: float
 
 
-def suitability(camera: ComparedCamera, survey: Survey) -> Suitability:
+def suitability(camera: ComparedCamera, survey: FlownSurvey) -> Suitability:
     """Compare a camera with the terrain of a survey.
 
     A photo at the height h above the mean ground sees a base as b H / (H - h), so the overlap is more than a half, and
@@ -162,7 +162,7 @@ def suitability(camera: ComparedCamera, survey: Survey) -> Suitability:
     )
 
 
-class Comparison(NamedTuple):
+class Compared(NamedTuple):
     """A camera beside another, both flown for the same standard deviation of heights, unless said otherwise."""
 
     scale: float  # ratio of the denominators of photo scale, m1 / m2
@@ -173,7 +173,7 @@ class Comparison(NamedTuple):
     photos: float  # how many times as many photos are needed for an area: the inverse of `area`
 
 
-def compare(first: ComparedCamera, second: ComparedCamera) -> Comparison:
+def compare(first: ComparedCamera, second: ComparedCamera) -> Compared:
     """Compare two cameras: ratios, first to second.
 
     Formats and bases may differ; with equal ones the printed and the true ratio of areas are the scale ratio and its
@@ -185,7 +185,7 @@ def compare(first: ComparedCamera, second: ComparedCamera) -> Comparison:
     area = base * width * scale**2
     # at equal area the scales are as 1 / sqrt(b l)
     height_error = coefficient / base / (base * width) ** 0.5
-    return Comparison(
+    return Compared(
         scale=scale, height_error=height_error, printed_area=base * width * scale, area=area, photos=1 / area
     )
 

@@ -111,7 +111,7 @@ class ScreeningSpec:
         return RelativeSettings(screening=method, grubbs_alpha=self.grubbs_alpha, parallax_limit=limit)
 
 
-class Found(NamedTuple):
+class FoundRates(NamedTuple):
     """Errors of one zone and size, and how many of them were found."""
 
     zone: int
@@ -129,7 +129,7 @@ class MethodOutcome(NamedTuple):
     later: float
     missed: float
     lost: float  # good points lost for each error
-    detection: tuple[Found, ...]
+    detection: tuple[FoundRates, ...]
     # change of the elements in pairs that kept an error, against the same pairs without errors: the largest of the
     # five, radians; mean over those pairs, and the worst; NaN where no error was missed
     mean_change: float
@@ -200,7 +200,7 @@ def _outcome(
         for each in sorted(set(spec.sizes)):
             those = (zone == number) & (size == each)
             found = int((those & out).sum())
-            detection.append(Found(zone=number, size=each, errors=int(those.sum()), found=found))
+            detection.append(FoundRates(zone=number, size=each, errors=int(those.sum()), found=found))
     turned = np.concatenate([result.orientation.elements for result in results]) - elements
     change = np.abs((turned + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
     change = change[missed.reshape(-1, spec.layout.points).any(axis=1)]

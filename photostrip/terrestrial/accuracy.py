@@ -21,7 +21,7 @@ LEVEL_CAMERA = 1e-12  # difference of a rotation from that of a level camera
 
 
 @dataclass(frozen=True, eq=False)
-class Required:
+class RequiredAccuracy:
     """Standard errors with which correction directions must be known."""
 
     angle: Floats  # (...): m_lambda', of the angle between a point and the optical axis as the photo gives it, radians
@@ -29,7 +29,7 @@ class Required:
     vertical: Floats  # (...): m_beta, of a vertical direction, radians
 
 
-def required(xz: ArrayLike, principal_distance: float, sigma: float, rotation: ArrayLike) -> Required:
+def required(xz: ArrayLike, principal_distance: float, sigma: float, rotation: ArrayLike) -> RequiredAccuracy:
     """Accuracy of directions that corresponds to a standard error `sigma` of x, of z and of the principal distance, mm.
 
     For a level camera m_lambda' = m / sqrt(f^2 + x^2) and m_beta = m / sqrt(f^2 + x^2 + z^2).
@@ -38,7 +38,7 @@ def required(xz: ArrayLike, principal_distance: float, sigma: float, rotation: A
     """
     by = partials(xz, principal_distance, rotation)
     errors = sigma * np.sqrt((by.by_xz**2).sum(axis=-1) + by.by_f**2)
-    return Required(errors[..., 0], errors[..., 0] / np.sqrt(2.0), errors[..., 1])
+    return RequiredAccuracy(errors[..., 0], errors[..., 0] / np.sqrt(2.0), errors[..., 1])
 
 
 @dataclass(frozen=True, eq=False)

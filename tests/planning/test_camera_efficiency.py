@@ -13,8 +13,8 @@ from photostrip.planning.camera_efficiency import (
     PRINTED_BASE,
     PRINTED_TABLE,
     ComparedCamera,
-    Survey,
-    Terrain,
+    FlownSurvey,
+    HighGround,
     by_efficiency,
     compare,
     sigma_from_distortion,
@@ -147,8 +147,10 @@ def test_a_parallax_with_a_known_distortion_is_its_scatter_over_the_model() -> N
         sigma_from_distortion(0.0, short, base, length, width)
 
 
-@pytest.mark.parametrize("survey", [Survey(scale=8000), Survey(flying_height=1224), Survey(height_sigma=0.0931304)])
-def test_what_a_height_and_an_area_cost(survey: Survey) -> None:
+@pytest.mark.parametrize(
+    "survey", [FlownSurvey(scale=8000), FlownSurvey(flying_height=1224), FlownSurvey(height_sigma=0.0931304)]
+)
+def test_what_a_height_and_an_area_cost(survey: FlownSurvey) -> None:
     flown = survey.flown(FILM)
     # m_h = H m_p / b: a height at the distance H from a base of b m, of which a parallax is known to m_p m
     assert flown.scale == pytest.approx(8000, rel=1e-5)
@@ -166,21 +168,21 @@ def photos_of(place: float, height: float, flying_height: float, camera: Compare
 
 
 def test_the_largest_relief_is_where_no_point_is_left_on_three_photos() -> None:
-    survey = Survey(flying_height=1500.0)
+    survey = FlownSurvey(flying_height=1500.0)
     highest = suitability(FILM, survey).relief / 2
     assert highest == pytest.approx(300.0)  # H (1 - 2 b / L), a fifth of H at 60 % overlap
     places = np.linspace(0.0, 2000.0, 4001)
     most = [max(photos_of(x, h, 1500.0, FILM) for x in places.tolist()) for h in (highest - 5, highest + 5)]
     assert most == [3, 2]
-    found = suitability(FILM, Survey(flying_height=1500.0, terrain=Terrain(relief=400.0)))
+    found = suitability(FILM, FlownSurvey(flying_height=1500.0, terrain=HighGround(relief=400.0)))
     overlap = (230.0 - 92.0 * 1500 / 1300) / 230.0
     assert found.lap == pytest.approx(overlap)
     assert found.suits
-    assert not suitability(FILM, Survey(flying_height=1500.0, terrain=Terrain(relief=700.0))).suits
+    assert not suitability(FILM, FlownSurvey(flying_height=1500.0, terrain=HighGround(relief=700.0))).suits
 
 
 def test_the_steepest_slope_is_that_which_the_outermost_ray_grazes() -> None:
-    steepest = suitability(FILM, Survey(scale=8000)).slope
+    steepest = suitability(FILM, FlownSurvey(scale=8000)).slope
     ray = np.array([92.0, 80.5, -153.0])  # from the left photo to the corner of the model beside the right nadir
     away = np.append(ray[:2] / np.hypot(*ray[:2]), 0.0)
     for change, seen in ((-1e-3, True), (1e-3, False)):
@@ -191,14 +193,14 @@ def test_the_steepest_slope_is_that_which_the_outermost_ray_grazes() -> None:
 
 def test_the_least_principal_distance_just_takes_the_terrain() -> None:
     for terrain in (
-        Terrain(relief=500.0),
-        Terrain(slope=np.radians(55.0)),
-        Terrain(relief=300.0, slope=np.radians(40)),
+        HighGround(relief=500.0),
+        HighGround(slope=np.radians(55.0)),
+        HighGround(relief=300.0, slope=np.radians(40)),
     ):
-        survey = Survey(scale=8000.0, terrain=terrain)
+        survey = FlownSurvey(scale=8000.0, terrain=terrain)
         least = suitability(FILM, survey).least_focal
         assert suitability(FILM._replace(focal=least * 1.0001), survey).suits
         assert not suitability(FILM._replace(focal=least * 0.9999), survey).suits
     # at a given flying height the principal distance does not change what relief asks for
-    too_much = Survey(flying_height=1500.0, terrain=Terrain(relief=700.0))
+    too_much = FlownSurvey(flying_height=1500.0, terrain=HighGround(relief=700.0))
     assert suitability(FILM, too_much).least_focal == np.inf

@@ -19,7 +19,7 @@ from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.covariances import ParameterCovariances
 from photostrip.triangulation.error_propagation.joint_covariances import after_fit
-from photostrip.triangulation.error_propagation.photo_errors import PhotoErrors, Sightings, differentiate_photos
+from photostrip.triangulation.error_propagation.photo_errors import PhotoErrors, UsedRays, differentiate_photos
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.resection.resection import Resection
 
@@ -37,7 +37,7 @@ class Propagation:
     control: control_errors.Misclosures  # control coordinates that count
     fit: control_errors.FitOperator
     xyz: Floats  # (q, 3): points after the similarity, where the fit takes away its influence
-    sightings: Sightings  # of the points on the photos
+    sightings: UsedRays  # of the points on the photos
     resection: Resection
 
     def photos(self) -> Iterator[PhotoErrors]:

@@ -109,7 +109,7 @@ def propagation(strip: StripResult, oriented: OrientedStrip[StripErrors], observ
     fit = control_errors.fit_operator(found, oriented.weights, oriented.at_control, terms, errors.origin)
     rows, flown = strip.of_photos.rows, strip.of_photos.strip
     point = np.searchsorted(strip.formed.point, observations.point[rows])
-    sightings = photo_errors.Sightings(
+    sightings = photo_errors.UsedRays(
         photo=flown.positions(observations)[rows],
         point=point,
         image=rows,

@@ -12,19 +12,19 @@ from photostrip.frozen import dataclass, replace
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, spots_of
 from photostrip.planning.strip.ideal_strip import IdealStrip, StripGeometry, ideal_strip
 from photostrip.planning.strip.methods import BUNDLE, COVARIANCE, DEGREES, METHODS, SIMILARITY, Accuracy, accuracy
-from photostrip.planning.strip.placement import BestPlaces, Placement, Required, best_places, worst
+from photostrip.planning.strip.placement import BestPlaces, Demand, Placement, best_places, worst
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
 
-ANYTHING = Required()
+ANYTHING = Demand()
 POLYNOMIAL = "polynomial"
 
 
 @dataclass(frozen=True)
-class Design:
+class DesignTask:
     geometry: StripGeometry
     layouts: tuple[ControlLayout, ...]
     methods: tuple[str, ...] = METHODS
-    required: Required = ANYTHING  # accuracy that is needed
+    required: Demand = ANYTHING  # accuracy that is needed
     placement: Placement | None = None
 
 
@@ -64,7 +64,7 @@ class Chosen:
 class DesignReport:
     """Everything about a design."""
 
-    design: Design
+    design: DesignTask
     strip: IdealStrip
     outcomes: tuple[Outcome, ...]
     needed: tuple[Needed, ...]  # bands that the required accuracy needs, by method; empty when none is required
@@ -86,7 +86,7 @@ def _rms(found: Accuracy) -> Floats:
     return np.asarray(np.sqrt((found.plan_and_height[found.new] ** 2).mean(axis=0)), float)
 
 
-def plan_strip(design: Design) -> DesignReport:
+def plan_strip(design: DesignTask) -> DesignReport:
     """Work out a design: expected precision of every layout and method, bands needed and best places.
 
     Raises InputError, GeometryError when there can be no such strip, or a layout does not fit it.
@@ -106,7 +106,7 @@ def plan_strip(design: Design) -> DesignReport:
     return DesignReport(design=design, strip=strip, outcomes=outcomes, needed=needed, placed=placed)
 
 
-def _require_places(design: Design) -> None:
+def _require_places(design: DesignTask) -> None:
     """Refuse all layouts that do not fit the strip."""
     faults: list[Fault] = []
     # the same layout may stand here twice, without and with perspective centres
@@ -119,7 +119,7 @@ def _require_places(design: Design) -> None:
         raise InputError(reversed(faults))
 
 
-def methods_of(design: Design, layout: ControlLayout) -> tuple[str, ...]:
+def methods_of(design: DesignTask, layout: ControlLayout) -> tuple[str, ...]:
     """Return the methods that a layout is adjusted by: with perspective centres the bundle, which alone uses them."""
     return (BUNDLE,) if layout.gnss is not None and BUNDLE in design.methods else design.methods
 
@@ -143,7 +143,7 @@ def along_the_strip(strip: IdealStrip, expected: Accuracy) -> Floats:
     return np.array([sigmas[nearest == photo].max(axis=0) for photo in range(len(strip.centers))])
 
 
-def bands_needed(strip: IdealStrip, layout: ControlLayout, method: str, required: Required) -> Needed:
+def bands_needed(strip: IdealStrip, layout: ControlLayout, method: str, required: Demand) -> Needed:
     """Find the least number of evenly spread bands that reaches an accuracy.
 
     Up to 20 bands are tried one more at a time, more in steps of a tenth, to a band at every photo; when a step meets

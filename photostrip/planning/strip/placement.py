@@ -25,7 +25,7 @@ MOST_PHOTOS_MOVED = 3  # photos that a point is moved by in one step
 
 
 @dataclass(frozen=True)
-class Required:
+class Demand:
     """Standard deviations that every point must reach."""
 
     # plan, height: both coordinates of the plan together, and height, metres; None: anything will do
@@ -100,7 +100,7 @@ class _Search:
         return len(self.tried) >= MOST_TRIED
 
 
-def best_places(strip: IdealStrip, layout: ControlLayout, placement: Placement, required: Required) -> BestPlaces:
+def best_places(strip: IdealStrip, layout: ControlLayout, placement: Placement, required: Demand) -> BestPlaces:
     """Search the best places for further control points.
 
     Places are the pass points at the nadirs, in long strips those at the edges and in the middle. The search starts

@@ -109,7 +109,7 @@ class CameraPlan(NamedTuple):
     name: str
     cameras: tuple[camera_efficiency.ComparedCamera, ...]
     reference: camera_efficiency.ComparedCamera
-    survey: camera_efficiency.Survey | None  # nothing where only the cameras are compared
+    survey: camera_efficiency.FlownSurvey | None  # nothing where only the cameras are compared
     files: Sequence[str]
 
 
@@ -127,14 +127,14 @@ def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
     )
 
 
-def _survey(given: CameraPlanFile) -> camera_efficiency.Survey | None:
+def _survey(given: CameraPlanFile) -> camera_efficiency.FlownSurvey | None:
     if all(getattr(given, name) is None for name in FLOWN):
         return None
-    return camera_efficiency.Survey(
+    return camera_efficiency.FlownSurvey(
         scale=given.scale,
         flying_height=given.flying_height,
         height_sigma=given.height_sigma,
-        terrain=camera_efficiency.Terrain(given.relief, float(np.radians(given.slope_deg))),
+        terrain=camera_efficiency.HighGround(given.relief, float(np.radians(given.slope_deg))),
     )
 
 

@@ -9,10 +9,10 @@ from typing import Annotated
 from photostrip.formats.text.findings import suggestion
 from photostrip.frozen import dataclass, replace
 from photostrip.planning.strip.control_layout import LAYOUTS, USES, ControlLayout, Spot
-from photostrip.planning.strip.design import Design, DesignReport, plan_strip
+from photostrip.planning.strip.design import DesignReport, DesignTask, plan_strip
 from photostrip.planning.strip.ideal_strip import LEAST_PHOTOS, StripGeometry
 from photostrip.planning.strip.methods import BUNDLE, METHODS
-from photostrip.planning.strip.placement import Placement, Required
+from photostrip.planning.strip.placement import Demand, Placement
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema.sections import After, Before, Length, Rule, Section, key, read_section, wrong
 from photostrip.project.schema.values import Flag, Id, Positive, Range, Whole, Words, bounded, one_of
@@ -152,7 +152,7 @@ class StripPlanFile(Flown):
 @dataclass(frozen=True, eq=False)
 class StripPlan:
     name: str
-    design: Design
+    design: DesignTask
     reading: Reading
 
     def computed(self) -> DesignReport:
@@ -191,10 +191,10 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
             points=given.place.points, into=into, method=str(given.place.method), use=str(given.place.use)
         )
     methods = tuple(dict.fromkeys(str(method) for method in given.methods))
-    required = Required(given.required.plan, given.required.height)
+    required = Demand(given.required.plan, given.required.height)
     return StripPlan(
         str(given.name),
-        Design(geometry=geometry, layouts=layouts, methods=methods, required=required, placement=placement),
+        DesignTask(geometry=geometry, layouts=layouts, methods=methods, required=required, placement=placement),
         reading,
     )
 

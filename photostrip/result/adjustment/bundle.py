@@ -31,7 +31,7 @@ SHOWN = 10  # observations named as the weakest and as the worst
 RELIABILITY = ("redundancy_x", "redundancy_y", "test_x", "test_y", "detectable_x_um", "detectable_y_um")
 
 
-class Kind(NamedTuple):
+class GroupKind(NamedTuple):
     """How observations of a kind are written."""
 
     axes: tuple[str, ...]
@@ -39,13 +39,13 @@ class Kind(NamedTuple):
     factor: float  # of the unit in the unit of the adjustment
 
 
-def kinds(angle_unit: str) -> dict[str, Kind]:
+def kinds(angle_unit: str) -> dict[str, GroupKind]:
     """Return how observations are written, with angles in the unit of the output."""
     return {
-        reliability.IMAGE: Kind(("x", "y"), "um", MICROMETRES),
-        reliability.CONTROL: Kind(GROUND_AXES, "m", 1.0),
-        reliability.POSITION: Kind(GROUND_AXES, "m", 1.0),
-        reliability.ATTITUDE: Kind(("1", "2", "3"), angle_unit, PER_RADIAN[angle_unit]),
+        reliability.IMAGE: GroupKind(("x", "y"), "um", MICROMETRES),
+        reliability.CONTROL: GroupKind(GROUND_AXES, "m", 1.0),
+        reliability.POSITION: GroupKind(GROUND_AXES, "m", 1.0),
+        reliability.ATTITUDE: GroupKind(("1", "2", "3"), angle_unit, PER_RADIAN[angle_unit]),
     }
 
 
@@ -191,7 +191,7 @@ def image_fit(found: Bundle) -> Document:
     }
 
 
-def _group(group: reliability.Group, shift: float, kind: Kind) -> Document:
+def _group(group: reliability.Group, shift: float, kind: GroupKind) -> Document:
     """Sum up the redundancy of one kind of observations; effects of errors of those that others check."""
     given = np.isfinite(group.sigma)
     controlled = group.redundancy[given] >= UNCONTROLLED
@@ -235,7 +235,7 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     return [each | more for each, more in zip(residuals, added, strict=True)]
 
 
-def _foremost(found: Bundle, shift: float, written: Mapping[str, Kind], values: list[Floats]) -> list[Document]:
+def _foremost(found: Bundle, shift: float, written: Mapping[str, GroupKind], values: list[Floats]) -> list[Document]:
     """Return the observations with the largest of the values that are given for each group."""
     chosen = []
     for number, (group, value) in enumerate(zip(found.groups, values, strict=True)):
@@ -251,7 +251,7 @@ def _foremost(found: Bundle, shift: float, written: Mapping[str, Kind], values: 
     return rows
 
 
-def _observed(found: Bundle, group: reliability.Group, at: Numbers, shift: float, kind: Kind) -> dict[str, Any]:
+def _observed(found: Bundle, group: reliability.Group, at: Numbers, shift: float, kind: GroupKind) -> dict[str, Any]:
     """Return columns of everything about observed coordinates, (n, 2): row and axis."""
     count, problem, (row, axis) = len(at), found.screened.problem, at.T
     names = [names_of_observation(problem, group.kind, each) for each in row.tolist()]

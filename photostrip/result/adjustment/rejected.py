@@ -9,7 +9,7 @@ from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result, StripResult
 from photostrip.points import PhotoPoints
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY, Rejection
-from photostrip.result.adjustment.bundle import Kind, kinds, names_of_observation
+from photostrip.result.adjustment.bundle import GroupKind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
 from photostrip.result.numbers import natural, rounded
@@ -276,7 +276,7 @@ def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
     return rows
 
 
-def _from_bundle(found: Bundle, each: Rejection, kind: Kind) -> Document:
+def _from_bundle(found: Bundle, each: Rejection, kind: GroupKind) -> Document:
     photo, point = names_of_observation(found.block.problem, each.kind, each.row)
     size = rounded(each.worst * kind.factor, DECIMALS_BY_UNIT[kind.unit])
     if each.readmitted:

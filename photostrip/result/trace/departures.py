@@ -7,7 +7,7 @@ from photostrip.notes import Document
 from photostrip.pipeline.inputs import Settings
 
 
-class Choice(NamedTuple):
+class Departure(NamedTuple):
     subject: str
     source: str  # where the textbook decides
     key: str  # of ``processing``
@@ -17,7 +17,7 @@ class Choice(NamedTuple):
 
 
 CHOICES = (
-    Choice(
+    Departure(
         subject="gross errors in pairs",
         source="[004a]",
         key="relative.screening",
@@ -31,7 +31,7 @@ CHOICES = (
             "none": "not searched for",
         },
     ),
-    Choice(
+    Departure(
         subject="intersection",
         source="eq. 138",
         key="intersection",
@@ -39,7 +39,7 @@ CHOICES = (
         words="point on the left ray",
         here={"mean": "Y is the mean of both rays, in the base frame"},
     ),
-    Choice(
+    Departure(
         subject="scale transfer",
         source="eq. 139-141",
         key="scale_transfer",
@@ -47,7 +47,7 @@ CHOICES = (
         words="mean of the ratios of distances, weights as chosen",
         here={"least_squares": "ratios weighted by their precision"},
     ),
-    Choice(
+    Departure(
         subject="control",
         source="eq. 149",
         key="control_weights",
@@ -55,7 +55,7 @@ CHOICES = (
         words="equal weights",
         here={"stated": "weighted by their standard deviations and those of the strip's points"},
     ),
-    Choice(
+    Departure(
         subject="adjustment",
         source="eq. 150",
         key="adjustment",
@@ -68,7 +68,7 @@ CHOICES = (
             "bundle": "bundle adjustment, which the strip only starts",
         },
     ),
-    Choice(
+    Departure(
         subject="degree",
         source="eq. 150",
         key="polynomial.degree",

@@ -10,7 +10,7 @@ from photostrip.triangulation.bundle.observations import calibration
 from photostrip.triangulation.bundle.observations.calibration import Calibrated
 from photostrip.triangulation.bundle.observations.collinearity import Rays, view
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
-from photostrip.triangulation.bundle.observations.ray_batches import Batch
+from photostrip.triangulation.bundle.observations.ray_batches import RayBatch
 from photostrip.triangulation.bundle.structure import BandStructure, band_structure
 
 
@@ -40,7 +40,7 @@ class PreparedProblem:
         turn = state.rotations[order].transpose(2, 1, 0).reshape(9, -1)
         return np.concatenate([turn, state.centers[order].T, focal[cameras.of_photo[order]][None]])
 
-    def rays(self, batch: Batch, xyz: Floats, table: Floats, common: Floats) -> tuple[Rays, Floats | None]:
+    def rays(self, batch: RayBatch, xyz: Floats, table: Floats, common: Floats) -> tuple[Rays, Floats | None]:
         """View a batch; its partials by calibration parameters in units of sigma, or None."""
         rays = view(batch, xyz, table)
         if not len(self.calibrated):

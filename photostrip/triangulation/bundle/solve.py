@@ -24,7 +24,7 @@ from photostrip.triangulation.bundle.normal_equations.reduced import (
 )
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
-from photostrip.triangulation.bundle.observations.ray_batches import Batch
+from photostrip.triangulation.bundle.observations.ray_batches import RayBatch
 from photostrip.triangulation.bundle.parameters import (
     Parameters,
     ParameterStep,
@@ -156,7 +156,7 @@ def _move(
     return datum.centred(prepared, state, move) if free else move
 
 
-def _shift(batch: Batch, eliminated: Eliminated, photos: Floats, common: Floats) -> Floats:
+def _shift(batch: RayBatch, eliminated: Eliminated, photos: Floats, common: Floats) -> Floats:
     """Find the steps (3, S) of the points of a batch from those of the photos: L^-T (L^-1 A'l - T' dx)."""
     k, n = len(batch.photo), PHOTO * len(batch.photo)
     rows = eliminated.rows

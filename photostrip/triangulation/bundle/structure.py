@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.triangulation.bundle.observations.problem import BundleProblem, ControlObservations
-from photostrip.triangulation.bundle.observations.ray_batches import Batch, SortedRays, arrange, sort_rays
+from photostrip.triangulation.bundle.observations.ray_batches import RayBatch, SortedRays, arrange, sort_rays
 
 NARROW = 12  # photos: a band as narrow as this is not worth another order
 TABLE = 3_000  # photos: up to here pairs are marked in a square table, which is faster than sorting them
@@ -44,7 +44,7 @@ class BandStructure:
     columns: Numbers
     diagonal: Numbers  # (m,): which of the pairs is each photo with itself
     width: int
-    batches: tuple[Batch, ...]
+    batches: tuple[RayBatch, ...]
     # pairs, singles: for each batch: of its blocks to the pairs (by pair within the set of photos, then group), and of
     # its rays to photos (by ray, then group)
     pairs: tuple[BlockSums, ...]
@@ -155,7 +155,7 @@ class ControlNormals(NamedTuple):
     where: Numbers  # (q,): row of each point in these; -1: no control
 
 
-def _with_control(batch: Batch, control: ControlNormals) -> Batch:
+def _with_control(batch: RayBatch, control: ControlNormals) -> RayBatch:
     if not len(control.normal):
         return batch
     slots = batch.real[control.where[batch.point[batch.real]] >= 0]

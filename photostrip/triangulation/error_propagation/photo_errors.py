@@ -21,7 +21,7 @@ SIGHTINGS = 2048  # gone through at a time; 3000 photos of 30 points take 160 MB
 
 
 @dataclass(frozen=True, eq=False)
-class Sightings:
+class UsedRays:
     """Image points on which photos were oriented, ordered by photo."""
 
     photo: Numbers  # (e,): place of the photo in the strip, ascending
@@ -30,7 +30,7 @@ class Sightings:
     xyz: Floats  # (e, 3): adjusted point, metres
     focal: float  # principal distance, mm
 
-    def take(self, rows: Numbers | Flags) -> Sightings:
+    def take(self, rows: Numbers | Flags) -> UsedRays:
         return take_rows(self, rows, ("photo", "point", "image", "xyz"))
 
 
@@ -44,7 +44,7 @@ class PhotoErrors:
 
 
 def differentiate_photos(
-    errors: StripErrors, sightings: Sightings, resection: Resection, influence: Callable[[Numbers], Floats]
+    errors: StripErrors, sightings: UsedRays, resection: Resection, influence: Callable[[Numbers], Floats]
 ) -> Iterator[PhotoErrors]:
     """Differentiate the resections, some photos at a time: all their rows together are the largest table of a run.
 
@@ -62,7 +62,7 @@ def differentiate_photos(
 
 def _some_photos(
     errors: StripErrors,
-    sightings: Sightings,
+    sightings: UsedRays,
     resection: Resection,
     influence: Callable[[Numbers], Floats],
     distance: float,
@@ -113,7 +113,7 @@ class _Resected(NamedTuple):
     point: Floats  # (e, 6, 3)
 
 
-def _resected(sightings: Sightings, resection: Resection, item: Numbers, place: Numbers, distance: float) -> _Resected:
+def _resected(sightings: UsedRays, resection: Resection, item: Numbers, place: Numbers, distance: float) -> _Resected:
     """Orientation by image coordinates and by points: do = N^-1 A^T (dl + A_S dX), N = A^T A of one photo."""
     rotations = resection.rotations[sightings.photo]
     arm = sightings.xyz - resection.centers[sightings.photo]

@@ -19,13 +19,13 @@ FLAT = 0.01  # ratio of the extents of the marks below which they stand on one l
 
 
 @dataclass(frozen=True, eq=False)
-class Deformation:
+class FilmDeformation:
     # (m, 2): transformed coordinates of the marks of each photo, mm; none where they do not show a deformation
     nodes: tuple[Floats, ...]
     shifts: tuple[Floats, ...]  # (m, 2): corrections there, calibrated minus transformed, mm
 
     @classmethod
-    def from_residuals(cls, calibrated: Sequence[Floats], residuals: Sequence[Floats]) -> Deformation:
+    def from_residuals(cls, calibrated: Sequence[Floats], residuals: Sequence[Floats]) -> FilmDeformation:
         """Interpret the residuals of the marks of each photo, transformed minus calibrated (m, 2), as deformation."""
         usable = [_spread(each) for each in calibrated]
         none = np.zeros((0, 2))

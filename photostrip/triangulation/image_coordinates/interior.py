@@ -15,7 +15,7 @@ from photostrip.frozen import replace
 from photostrip.notes import Note, named
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates.fiducial_marks import enough, fault, gather, right_pattern
-from photostrip.triangulation.image_coordinates.film_deformation import Deformation
+from photostrip.triangulation.image_coordinates.film_deformation import FilmDeformation
 from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation, fit_marks, joined_cameras
 from photostrip.triangulation.image_coordinates.mark_notes import (
     SHOWN,
@@ -91,7 +91,7 @@ def _with_film(joined: InteriorOrientation, cameras: Mapping[str, Camera]) -> In
         np.array([cameras[photo].fiducials[name] for name in names], float).reshape(-1, 2)
         for photo, names in zip(joined.photo_ids, joined.marks, strict=True)
     ]
-    film = Deformation.from_residuals(marks, joined.residuals)
+    film = FilmDeformation.from_residuals(marks, joined.residuals)
     unseen = film.unseen()
     if not len(unseen):
         return replace(joined, film=film)

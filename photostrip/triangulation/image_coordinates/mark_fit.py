@@ -15,7 +15,7 @@ from photostrip.geometry import plane
 from photostrip.notes import Note
 from photostrip.points import frozen
 from photostrip.triangulation.image_coordinates.fiducial_marks import Marks, fault
-from photostrip.triangulation.image_coordinates.film_deformation import Deformation
+from photostrip.triangulation.image_coordinates.film_deformation import FilmDeformation
 
 SHAPE = ("scale_x", "scale_y", "rotation", "shear")
 BY_PHOTO = ("photo_ids", "transforms", "marks", "residuals", "sigma0", "redundancy", *SHAPE, "mirrored")
@@ -46,7 +46,7 @@ class InteriorOrientation:
     # photos of cameras without fiducial marks: their coordinates are taken as they are
     without_marks: tuple[str, ...] = ()
     notes: tuple[Note, ...] = ()  # what the marks show beside the numbers
-    film: Deformation | None = None  # deformation beyond the transformations, when it is interpolated
+    film: FilmDeformation | None = None  # deformation beyond the transformations, when it is interpolated
 
     def __post_init__(self) -> None:
         for name in ("sigma0", *SHAPE):

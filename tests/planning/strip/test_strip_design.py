@@ -12,10 +12,10 @@ import pytest
 from benchmarks.planning import Task, repetitions
 from photostrip.errors import GeometryError, InputError
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, across, spots_of
-from photostrip.planning.strip.design import Design, along_the_strip, bands_needed, outcome, plan_strip
+from photostrip.planning.strip.design import DesignTask, along_the_strip, bands_needed, outcome, plan_strip
 from photostrip.planning.strip.ideal_strip import StripGeometry, ideal_strip
 from photostrip.planning.strip.methods import BUNDLE, COVARIANCE, METHODS, SIMILARITY, accuracy
-from photostrip.planning.strip.placement import Placement, Required, best_places, equal_ways, worst
+from photostrip.planning.strip.placement import Demand, Placement, best_places, equal_ways, worst
 from photostrip.simulation import FILM, Points
 from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
 from tests.loops import nonempty
@@ -237,7 +237,7 @@ def test_what_nothing_checks_is_never_found() -> None:
 @pytest.mark.parametrize("method", [SIMILARITY, "degree 2", BUNDLE])
 def test_the_number_of_bands_is_the_least(method: str) -> None:
     strip = strip_of(12)
-    required = Required(0.3, 0.4)
+    required = Demand(0.3, 0.4)
     needed = bands_needed(strip, ControlLayout("", per_band=2), method, required)
     if needed.bands is None:
         assert not required.met(needed.worst)
@@ -252,7 +252,7 @@ def test_the_number_of_bands_is_the_least(method: str) -> None:
 @pytest.mark.slow
 def test_steps_over_many_bands_leave_none_out() -> None:
     strip = strip_of(40)
-    required = Required(0.0945)
+    required = Demand(0.0945)
     needed = bands_needed(strip, ControlLayout("", per_band=2), COVARIANCE, required)
     assert needed.bands is not None
     assert needed.bands > 21
@@ -262,10 +262,10 @@ def test_steps_over_many_bands_leave_none_out() -> None:
 
 
 def test_an_accuracy_that_no_control_gives() -> None:
-    needed = bands_needed(strip_of(6), ControlLayout(""), BUNDLE, Required(height=0.001))
+    needed = bands_needed(strip_of(6), ControlLayout(""), BUNDLE, Demand(height=0.001))
     assert needed.bands is None
     assert needed.worst[1] > 0.001
-    assert Required().met((1e9, 1e9))
+    assert Demand().met((1e9, 1e9))
 
 
 @pytest.mark.slow
@@ -273,7 +273,7 @@ def test_an_accuracy_that_no_control_gives() -> None:
 def test_the_search_finds_the_very_best_places_of_a_small_strip(method: str, count: int) -> None:
     strip = strip_of(5)
     base = ControlLayout("corners", kind="corners")
-    placed = best_places(strip, base, Placement(count, "corners", method), Required(1.0, 1.0))
+    placed = best_places(strip, base, Placement(count, "corners", method), Demand(1.0, 1.0))
     fixed = spots_of(base, 5, 3)
     free = [Spot(p, r) for p in range(1, 6) for r in range(1, 4) if Spot(p, r) not in fixed]
     every = []
@@ -291,7 +291,7 @@ def test_the_search_beats_equal_spacing_or_says_that_it_cannot() -> None:
     strip = strip_of(7)
     gains = []
     for count, method in ((1, "degree 2"), (3, "degree 2"), (4, SIMILARITY)):
-        placed = best_places(strip, ControlLayout("c", kind="corners"), Placement(count, "c", method), Required())
+        placed = best_places(strip, ControlLayout("c", kind="corners"), Placement(count, "c", method), Demand())
         assert len(placed.spots) == len(placed.equal_spots) == count
         assert not set(placed.spots) & set(spots_of(ControlLayout("c", kind="corners"), 7, 3))
         assert (placed.gain > 0) == (placed.spots != placed.equal_spots)
@@ -312,8 +312,8 @@ def test_ways_of_equal_spacing() -> None:
 @pytest.mark.slow
 def test_a_whole_design() -> None:
     layouts = (ControlLayout("corners", kind="corners"), ControlLayout("bands", bands=3))
-    design = Design(
-        StripGeometry(FILM, 7, points=SIMPLE), layouts, (SIMILARITY, BUNDLE), Required(0.2), Placement(1, "corners")
+    design = DesignTask(
+        StripGeometry(FILM, 7, points=SIMPLE), layouts, (SIMILARITY, BUNDLE), Demand(0.2), Placement(1, "corners")
     )
     report = plan_strip(design)
     assert [(each.layout.name, each.method) for each in report.outcomes] == [
@@ -332,7 +332,7 @@ def test_three_photos_are_the_shortest_strip() -> None:
 
 def test_what_a_run_would_choose_by_itself() -> None:
     corners = ControlLayout("corners", kind="corners")
-    report = plan_strip(Design(StripGeometry(FILM, 7, points=SIMPLE), (corners,)))
+    report = plan_strip(DesignTask(StripGeometry(FILM, 7, points=SIMPLE), (corners,)))
     chosen = report.chosen(corners)
     assert chosen is not None
     assert (chosen.adjustment, chosen.polynomial) == ("covariance", SIMILARITY)  # four points carry no second degree
@@ -342,5 +342,5 @@ def test_what_a_run_would_choose_by_itself() -> None:
         for name in (SIMILARITY, COVARIANCE)
     }
     assert chosen.ratio == pytest.approx(np.sqrt(rms[COVARIANCE] / rms[SIMILARITY]))
-    without = plan_strip(Design(StripGeometry(FILM, 7, points=SIMPLE), (corners,), (SIMILARITY, BUNDLE)))
+    without = plan_strip(DesignTask(StripGeometry(FILM, 7, points=SIMPLE), (corners,), (SIMILARITY, BUNDLE)))
     assert without.chosen(corners) is None

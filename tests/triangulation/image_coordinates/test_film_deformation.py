@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from photostrip.camera import Camera
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import interior
-from photostrip.triangulation.image_coordinates.film_deformation import Deformation
+from photostrip.triangulation.image_coordinates.film_deformation import FilmDeformation
 from photostrip.triangulation.image_coordinates.settings import InteriorSettings
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def test_the_marks_come_to_their_calibrated_places() -> None:
 def test_the_spline_goes_through_the_marks(seed: int) -> None:
     rng = np.random.default_rng(seed)
     marks = rng.uniform(-110, 110, (9, 2))
-    film = Deformation.from_residuals([marks], [rng.normal(0, 0.02, (9, 2))])
+    film = FilmDeformation.from_residuals([marks], [rng.normal(0, 0.02, (9, 2))])
     assert np.abs(film.corrected(np.zeros(9, np.intp), film.nodes[0]) - marks).max() < PICOMETRE
 
 

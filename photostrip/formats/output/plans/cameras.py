@@ -10,7 +10,7 @@ from photostrip.notes import Document
 from photostrip.planning.camera_efficiency import (
     PRINTED_TABLE,
     ComparedCamera,
-    Survey,
+    FlownSurvey,
     by_efficiency,
     compare,
     source_cameras,
@@ -20,7 +20,7 @@ from photostrip.result.numbers import micrometres, rounded, significant
 
 
 def camera_document(
-    name: str, cameras: Sequence[ComparedCamera], reference: ComparedCamera, survey: Survey | None = None
+    name: str, cameras: Sequence[ComparedCamera], reference: ComparedCamera, survey: FlownSurvey | None = None
 ) -> Document:
     """Return a comparison of cameras as a document, one row for each camera in the order given."""
     order = [camera.name for camera in by_efficiency(cameras)]
@@ -35,7 +35,7 @@ def camera_document(
     return document if survey is None else document | _survey(cameras, survey, order)
 
 
-def _survey(cameras: Sequence[ComparedCamera], survey: Survey, order: Sequence[str]) -> Document:
+def _survey(cameras: Sequence[ComparedCamera], survey: FlownSurvey, order: Sequence[str]) -> Document:
     """Return what each camera does in one survey, and which of them takes its terrain."""
     terrain = survey.terrain
     rows, suited = [], []

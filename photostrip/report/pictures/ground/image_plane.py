@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
-from photostrip.report.pictures.ground.plan_view import Grid, Pair
+from photostrip.report.pictures.ground.plan_view import DrawnGrid, Pair
 
 
 class Residual(NamedTuple):
@@ -52,7 +52,7 @@ def frame_of(camera: Document) -> Frame | None:
 
 def residuals_of(document: Document) -> list[Residual]:
     """Return the image residuals with their places, photo by photo."""
-    grid, cameras = Grid(document), cameras_of(document)
+    grid, cameras = DrawnGrid(document), cameras_of(document)
     photos = {photo["id"]: photo for photo in document["photos"] if photo["rotation"]}
     points = {point["id"]: point for point in document["points"]}
     found: list[Residual] = []
@@ -72,7 +72,7 @@ def residuals_of(document: Document) -> list[Residual]:
     return found
 
 
-def _image_of(grid: Grid, photo: Document, point: Document | None, distance: float) -> Pair | None:
+def _image_of(grid: DrawnGrid, photo: Document, point: Document | None, distance: float) -> Pair | None:
     """Return the image of a point; None for one that is not before the camera."""
     if point is None:
         return None

@@ -9,7 +9,7 @@ from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import short
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend
-from photostrip.report.pictures.ground.plan_view import Plan, Spot
+from photostrip.report.pictures.ground.plan_view import Dot, Plan
 from photostrip.report.pictures.ground.sheet import Sheet, bars, ids, metres, north_arrow, sheet_of
 from photostrip.report.pictures.svg import Picture
 
@@ -67,7 +67,7 @@ def plan_picture(document: Document, plan: Plan) -> Picture:
     return svg.picture("plan", (WIDTH, sheet.height), drawn, f"Plan of {document['name']}", caption, words)
 
 
-def place_of(spot: Spot, sheet: Sheet) -> svg.Point:
+def place_of(spot: Dot, sheet: Sheet) -> svg.Point:
     return sheet.place((spot.along, spot.across))
 
 
@@ -77,7 +77,7 @@ def mark_share(plan: Plan, sheet: Sheet) -> float:
     return min(1.0, length / max(1, *map(len, plan.strips)) / CROWDED)
 
 
-def roles(spots: list[Spot]) -> list[Entry]:
+def roles(spots: list[Dot]) -> list[Entry]:
     found = {spot.role for spot in spots}
     return [Entry(WORDS[role], f"mark {role}", SHAPES[role]) for role in WORDS if role in found]
 
@@ -93,7 +93,7 @@ def _named(document: Document) -> dict[str, list[str]]:
     return found
 
 
-def _ids(spots: list[Spot], sheet: Sheet, named: Container[str]) -> list[str]:
+def _ids(spots: list[Dot], sheet: Sheet, named: Container[str]) -> list[str]:
     """Write the ids of spots where there is room, those of points named by findings first, then of given points."""
     places = [place_of(spot, sheet) for spot in spots]
 
@@ -110,20 +110,20 @@ def _longest(plan: Plan) -> float:
     return max([*vectors, *(spot.ellipse[0] for spot in plan.spots if spot.ellipse is not None)], default=0.0)
 
 
-def _ellipse(spot: Spot, sheet: Sheet, factor: float) -> str:
+def _ellipse(spot: Dot, sheet: Sheet, factor: float) -> str:
     a, b, angle = spot.ellipse or (0.0, 0.0, 0.0)
     x, y = place_of(spot, sheet)
     turn = f"rotate({svg.number(-math.degrees(angle))} {svg.number(x)} {svg.number(y)})"
     return svg.element("ellipse", cx=x, cy=y, rx=a * factor, ry=b * factor, transform=turn, kind="ellipse")
 
 
-def _vector(spot: Spot, sheet: Sheet, factor: float) -> str:
+def _vector(spot: Dot, sheet: Sheet, factor: float) -> str:
     along, across = spot.shift or (0.0, 0.0)
     x, y = place_of(spot, sheet)
     return svg.line((x, y), (x + along * factor, y - across * factor), f"vector {spot.role}")
 
 
-def _spot(spot: Spot, sheet: Sheet, share: float) -> str:
+def _spot(spot: Dot, sheet: Sheet, share: float) -> str:
     """Draw the mark of a spot; its hint has its id and numbers."""
     hint = f"{WORDS[spot.role]} {spot.id}"
     if spot.shift is not None:

@@ -17,7 +17,7 @@ def middle(places: Sequence[Pair]) -> Pair:
     return math.fsum(x for x, _ in places) / len(places), math.fsum(y for _, y in places) / len(places)
 
 
-class Spot(NamedTuple):
+class Dot(NamedTuple):
     """A point or photo on the plan."""
 
     id: str
@@ -32,12 +32,12 @@ class Spot(NamedTuple):
 
 
 class Plan(NamedTuple):
-    spots: list[Spot]
-    strips: list[list[Spot]]
+    spots: list[Dot]
+    strips: list[list[Dot]]
     north: Pair
 
     @property
-    def everything(self) -> list[Spot]:
+    def everything(self) -> list[Dot]:
         return [*self.spots, *(spot for strip in self.strips for spot in strip)]
 
     def turned(self, east: float, north: float) -> Pair:
@@ -62,7 +62,7 @@ class Course(NamedTuple):
         return self.turned((place[0] - self.start[0], place[1] - self.start[1]))[0]
 
 
-def course_of(strip: list[Spot]) -> Course:
+def course_of(strip: list[Dot]) -> Course:
     first, last = strip[0], strip[-1]
     x, y = last.along - first.along, last.across - first.across
     length = math.hypot(x, y)
@@ -71,7 +71,7 @@ def course_of(strip: list[Spot]) -> Course:
 
 def plan_of(document: Document) -> Plan:
     """Return the plan of a result in metres, turned so that its first strip runs to the right."""
-    grid = Grid(document)
+    grid = DrawnGrid(document)
     # centres of independent models need not be known
     photos = [photo for photo in document["photos"] if photo["x"] is not None]
     # single photos are strips of their own, which ``strips`` does not hold: they are drawn as one
@@ -85,11 +85,11 @@ def plan_of(document: Document) -> Plan:
     def turned(east: float, north: float) -> Pair:
         return east * along[0] + north * along[1], north * along[0] - east * along[1]
 
-    def spot(row: Document, role: str, given: Document | None = None) -> Spot:
+    def spot(row: Document, role: str, given: Document | None = None) -> Dot:
         east, north = grid.place(row)
         shift, up = grid.difference(given) if given else (None, None)
         place, side = turned(east - start[0], north - start[1])
-        return Spot(
+        return Dot(
             id=row["id"],
             role=role,
             along=place,
@@ -114,7 +114,7 @@ def _ellipse(row: Document, turned: Any) -> tuple[float, float, float] | None:  
     return a, b, math.atan2(y, x)
 
 
-class Grid:
+class DrawnGrid:
     """Metres to the east, to the north and up in the frame of a result."""
 
     def __init__(self, document: Document) -> None:

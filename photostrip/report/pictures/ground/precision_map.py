@@ -8,7 +8,7 @@ from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import short
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, TOP, WIDTH
-from photostrip.report.pictures.ground.plan_view import Plan, Spot
+from photostrip.report.pictures.ground.plan_view import Dot, Plan
 from photostrip.report.pictures.ground.sheet import bars, ids, metres, north_arrow, sheet_of
 from photostrip.report.pictures.svg import Picture
 
@@ -40,7 +40,7 @@ def _sigma(document: Document, row: Document, part: str) -> float | None:
     return row.get(f"sigma_{'xyz'[axes.index('up')]}") if "up" in axes else None
 
 
-def _map(plan: Plan, part: str, title: str, known: Sequence[tuple[Spot, float]]) -> Picture:
+def _map(plan: Plan, part: str, title: str, known: Sequence[tuple[Dot, float]]) -> Picture:
     sheet = sheet_of([(spot.along, spot.across) for spot in plan.everything], MARGIN)
     limits = _limits([size for _, size in known])
     share = min(1.0, max(0.35, 30.0 / len(known) ** 0.5 / CROWDED))

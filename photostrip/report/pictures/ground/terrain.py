@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
 from photostrip.report.pictures.ground.image_plane import cameras_of, frame_of
-from photostrip.report.pictures.ground.plan_view import Grid, Pair, Plan
+from photostrip.report.pictures.ground.plan_view import DrawnGrid, Pair, Plan
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ LOWEST_RAY = 0.1  # descent towards the plane, in principal distances, from whic
 PIECES = 4  # of each side of a photo
 
 
-class Terrain(NamedTuple):
+class TerrainModel(NamedTuple):
     """The ground around a photo: along, across, up."""
 
     slope: Floats  # (2,): rise of the plane
@@ -39,7 +39,7 @@ class Terrain(NamedTuple):
     reach: float
 
     @classmethod
-    def around(cls, middle: Floats, reach: float, points: Floats) -> Terrain:
+    def around(cls, middle: Floats, reach: float, points: Floats) -> TerrainModel:
         """Take the ground from points in the order of their first coordinate."""
         first, last = np.searchsorted(points[:, 0], (middle[0] - NEAR * reach, middle[0] + NEAR * reach))
         band = points[first:last]
@@ -85,7 +85,7 @@ def footprints(document: Document, plan: Plan) -> dict[str, list[Pair]]:
 
     What looks at the sky or hardly down is cut off; a photo that shows nothing else, or has no points, has none.
     """
-    grid, cameras = Grid(document), cameras_of(document)
+    grid, cameras = DrawnGrid(document), cameras_of(document)
     heights = {row["id"]: grid.up(row) for row in document["points"]}
     places = {spot.id: (spot.along, spot.across, heights[spot.id]) for spot in plan.spots}
     spots = {spot.id: spot for strip in plan.strips for spot in strip}
@@ -99,7 +99,7 @@ def footprints(document: Document, plan: Plan) -> dict[str, list[Pair]]:
         centre = np.array((spots[photo["id"]].along, spots[photo["id"]].across, grid.up(photo)))
         # the rms distance, not that of the middle: some point always is that near to it
         reach = math.sqrt(np.mean(np.sum((np.array(own) - centre) ** 2, axis=1)))
-        terrain = Terrain.around(np.mean(own, axis=0), reach, points)
+        terrain = TerrainModel.around(np.mean(own, axis=0), reach, points)
         distance = camera["principal_distance_mm"]
         axes = _image_axes(grid, plan, photo["rotation"])
         rays = np.array([(*corner, -distance) for corner in frame.corners]) @ axes
@@ -109,13 +109,13 @@ def footprints(document: Document, plan: Plan) -> dict[str, list[Pair]]:
     return found
 
 
-def _image_axes(grid: Grid, plan: Plan, m: list[float]) -> Floats:
+def _image_axes(grid: DrawnGrid, plan: Plan, m: list[float]) -> Floats:
     """Return the axes of an image along, across and up, by rows."""
     axes = [grid.plan_direction((m[n], m[n + 3], m[n + 6])) for n in range(3)]
     return np.array([(*plan.turned(east, north), up) for east, north, up in axes])
 
 
-def _descending(terrain: Terrain, corners: Floats, least: float) -> Floats:
+def _descending(terrain: TerrainModel, corners: Floats, least: float) -> Floats:
     """Cut off what does not descend towards the plane."""
     over = terrain.descent(corners) - least
     kept: list[Floats] = []

@@ -11,7 +11,7 @@ from photostrip.report.page.numbers import short
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, Layout, framed, legend, multiples, span, steps
 from photostrip.report.pictures.ground.plan import SHAPES, WORDS
-from photostrip.report.pictures.ground.plan_view import Course, Pair, Plan, Spot, course_of
+from photostrip.report.pictures.ground.plan_view import Course, Dot, Pair, Plan, course_of
 from photostrip.report.pictures.svg import Picture
 
 MOST_STRIPS = 8  # that are drawn one below the other
@@ -21,7 +21,7 @@ MOST_HINTS = 150  # more points of a strip have none
 CURVE_STEPS = 48
 
 
-class Before(NamedTuple):
+class Uncorrected(NamedTuple):
     """A control point of a strip before its polynomial."""
 
     id: str
@@ -31,8 +31,8 @@ class Before(NamedTuple):
 
 class Strip(NamedTuple):
     id: str
-    after: list[tuple[Spot, float, tuple[float | None, ...]]]  # point, place along the strip, adjusted minus given
-    before: list[Before]
+    after: list[tuple[Dot, float, tuple[float | None, ...]]]  # point, place along the strip, adjusted minus given
+    before: list[Uncorrected]
     curve: dict[str, list[Pair]]  # what the polynomial takes out: place along the strip, size, by axis
     ends: Pair
 
@@ -89,7 +89,7 @@ def _strips(document: Document, plan: Plan) -> list[Strip]:
             if (spot.shift is not None or spot.up is not None) and (not name or name in members.get(spot.id, ()))
         ]
         before = [
-            Before(row["id"], course.along((spot.along, spot.across)), _misclosed(plan, course, row))
+            Uncorrected(row["id"], course.along((spot.along, spot.across)), _misclosed(plan, course, row))
             for row in document.get("misclosures", [])
             if row["strip"] == name and (spot := spots.get(row["id"]))
         ]
@@ -128,7 +128,7 @@ def origin_of(block: Document, places: Sequence[float]) -> float:
     return float(block["reach"][0]) - min(places)
 
 
-def _curves(block: Document | None, before: Sequence[Before], ends: Pair) -> dict[str, list[Pair]]:
+def _curves(block: Document | None, before: Sequence[Uncorrected], ends: Pair) -> dict[str, list[Pair]]:
     if block is None or not block["degree"] or not before:
         return {}
     start = origin_of(block, [each.at for each in before])

@@ -9,7 +9,7 @@ from itertools import pairwise
 from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, framed, framed_by_photos, legend, multiples, span, steps
-from photostrip.report.pictures.ground.plan_view import Grid, Pair, Plan, Spot, course_of
+from photostrip.report.pictures.ground.plan_view import Dot, DrawnGrid, Pair, Plan, course_of
 from photostrip.report.pictures.result.along import origin_of, polynomial_at, polynomial_entry
 from photostrip.report.pictures.svg import Picture
 
@@ -60,7 +60,7 @@ def scale_pictures(document: Document, plan: Plan) -> list[Picture]:
 
     A strip is formed of pairs with bases of length 1, so that scale of model and strip give the base that was formed.
     """
-    grid = Grid(document)
+    grid = DrawnGrid(document)
     up = {photo["id"]: grid.up(photo) for photo in document["photos"] if photo["x"] is not None}
     scale = {row["strip"]: row["scale"] for row in document["absolute"]}
     formed = {
@@ -77,7 +77,7 @@ def scale_pictures(document: Document, plan: Plan) -> list[Picture]:
 
 
 def _base_ratios(
-    flown: list[Spot], formed: Mapping[tuple[str, str], float | None], up: Mapping[str, float]
+    flown: list[Dot], formed: Mapping[tuple[str, str], float | None], up: Mapping[str, float]
 ) -> list[Pair]:
     """Return the places of bases, km, and adjusted over formed length, ppm from the mean of the strip."""
     course, found = course_of(flown), []

@@ -16,7 +16,7 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, Rays, by_point
-from photostrip.triangulation.bundle.observations.ray_batches import Batch
+from photostrip.triangulation.bundle.observations.ray_batches import RayBatch
 from photostrip.triangulation.bundle.structure import triangle
 
 SMALL_GROUP = 24  # points: up to here it pays to bring the numbers of a group together before they are multiplied
@@ -33,7 +33,7 @@ class Eliminated:
     strength: Floats
 
 
-def eliminate(batch: Batch, xyz: Floats, rays: Rays, common: Floats | None, damping: float = 0.0) -> Eliminated:
+def eliminate(batch: RayBatch, xyz: Floats, rays: Rays, common: Floats | None, damping: float = 0.0) -> Eliminated:
     """Eliminate the points (3, S) of a batch.
 
     ``common`` (more, 2, k, S): partials by common parameters, in units of sigma; ``damping``: part of its diagonal by
@@ -69,7 +69,7 @@ def eliminate(batch: Batch, xyz: Floats, rays: Rays, common: Floats | None, damp
     return Eliminated(root, rows, strength)
 
 
-def point_normals(batch: Batch, xyz: Floats, partials: Floats, misfit: Floats) -> tuple[list[Floats], Floats]:
+def point_normals(batch: RayBatch, xyz: Floats, partials: Floats, misfit: Floats) -> tuple[list[Floats], Floats]:
     """Sum A'A over the rays of each point, and its control: elements 11, 22, 33, 21, 31, 32, and A'l, (3, S).
 
     Partials (3, 2, k, S) and misfits (2, k, S) are in units of sigma.
@@ -147,7 +147,7 @@ class GroupSquares(NamedTuple):
     subtracted: Floats  # (groups, C, C): T T', summed over the points
 
 
-def squares(batch: Batch, partials: Floats, rows: Floats) -> GroupSquares:
+def squares(batch: RayBatch, partials: Floats, rows: Floats) -> GroupSquares:
     """Multiply the rows of each group: what is added and what is subtracted at its photos.
 
     ``partials`` as of ``by_photo``, ``rows`` as of ``eliminate``.

@@ -14,7 +14,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
-from photostrip.triangulation.bundle.observations.ray_batches import Batch
+from photostrip.triangulation.bundle.observations.ray_batches import RayBatch
 
 PHOTO = 6  # parameters of a photo
 SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0])  # of a photo's parameters, see above
@@ -31,7 +31,7 @@ class Rays:
     misfit: Floats  # (2, k, S): measured minus computed image coordinates in units of sigma
 
 
-def view(batch: Batch, xyz: Floats, photos: Floats) -> Rays:
+def view(batch: RayBatch, xyz: Floats, photos: Floats) -> Rays:
     """Project the points (3, S) of a batch.
 
     ``photos`` (13, m): nine elements of the transposed rotation by rows, perspective centre, principal distance.

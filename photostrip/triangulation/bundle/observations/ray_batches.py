@@ -25,7 +25,7 @@ _SIZES = np.array([1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 28, 32, 40, 48, 56, 
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class RayBatch:
     """Points with the same number of rays k, in S slots."""
 
     point: Numbers  # (S,): point of each slot; that of a dummy is a point of its group
@@ -62,10 +62,10 @@ def sort_rays(images: ImageObservations, points: int, rank: Numbers) -> SortedRa
     )
 
 
-def arrange(images: ImageObservations, rays: SortedRays, photos: int) -> tuple[Batch, ...]:
+def arrange(images: ImageObservations, rays: SortedRays, photos: int) -> tuple[RayBatch, ...]:
     """Arrange sorted rays of so many photos in batches, without control."""
     first = np.cumsum(rays.counts) - rays.counts
-    batches: list[Batch] = []
+    batches: list[RayBatch] = []
     for count in np.flatnonzero(np.bincount(rays.counts)).tolist():
         if count:
             members = np.flatnonzero(rays.counts == count)
@@ -74,7 +74,7 @@ def arrange(images: ImageObservations, rays: SortedRays, photos: int) -> tuple[B
     return tuple(batches)
 
 
-def _batches(images: ImageObservations, members: Numbers, photo: Numbers, row: Numbers, photos: int) -> list[Batch]:
+def _batches(images: ImageObservations, members: Numbers, photo: Numbers, row: Numbers, photos: int) -> list[RayBatch]:
     """Arrange points with the same number of rays; `photo` and `row` have shape (k, points)."""
     sets = _groups(photo, photos)
     count = sets.size
@@ -133,7 +133,7 @@ def _batch(
     row: Numbers,
     order: Numbers,
     groups: _Pieces,
-) -> Batch:
+) -> RayBatch:
     """Fill the slots of one batch with the points of its groups."""
     begin, length, slots = groups
     start = np.cumsum(slots) - slots
@@ -147,7 +147,7 @@ def _batch(
     weight[:, :, real] = 1.0 / np.moveaxis(images.sigma[shown], 2, 0)
     changes = [0, *(np.flatnonzero(np.diff(slots)) + 1).tolist(), len(slots)]
     edges = np.append(start, slots.sum())
-    return Batch(
+    return RayBatch(
         point=members[member],
         real=np.flatnonzero(real),
         dummy=np.flatnonzero(~real),

@@ -20,7 +20,7 @@ from photostrip.triangulation.bundle.normal_equations.point_elimination import E
 from photostrip.triangulation.bundle.normal_equations.reduced import given_at
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS, by_photo, by_point
 from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
-from photostrip.triangulation.bundle.observations.ray_batches import Batch
+from photostrip.triangulation.bundle.observations.ray_batches import RayBatch
 from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
@@ -82,7 +82,7 @@ class JointCofactors:
 
 
 def _batch(
-    prepared: PreparedProblem, batch: Batch, eliminated: Eliminated, inverse: Inverse, xyz: Floats, table: Floats
+    prepared: PreparedProblem, batch: RayBatch, eliminated: Eliminated, inverse: Inverse, xyz: Floats, table: Floats
 ) -> tuple[Floats, Floats]:
     """Cofactors of the points (S, 3, 3), m^2, and of the residuals (k, S, 2, 2), in units of sigma."""
     more, k, slots = len(prepared.calibrated), *batch.photo.shape
@@ -114,7 +114,7 @@ def _batch(
     return of_point.transpose(2, 0, 1), found
 
 
-def _carried(batch: Batch, of_sets: Floats, rows: Floats) -> Floats:
+def _carried(batch: RayBatch, of_sets: Floats, rows: Floats) -> Floats:
     """Multiply the rows T of a batch with the joint cofactors of their photos: Z T, shape (q, 3, S)."""
     product = np.empty_like(rows)
     q, done = len(rows), 0
@@ -126,7 +126,7 @@ def _carried(batch: Batch, of_sets: Floats, rows: Floats) -> Floats:
     return product
 
 
-def _quadratic(batch: Batch, of_sets: Floats, partials: Floats) -> Floats:
+def _quadratic(batch: RayBatch, of_sets: Floats, partials: Floats) -> Floats:
     """Give B Z B' of each ray, with the photo's and the common parameters, shape (2, 2, k, S)."""
     q, _, k, slots = partials.shape
     n = PHOTO * k
@@ -222,7 +222,7 @@ def _carried_over(moves: Floats, swept: Floats, middle: Floats) -> Floats:
     return np.asarray(moves @ middle @ moves.swapaxes(1, 2) - product - product.swapaxes(1, 2))
 
 
-def _push(batch: Batch, eliminated: Eliminated, pushed: Floats, right: Floats, corner: Floats) -> None:
+def _push(batch: RayBatch, eliminated: Eliminated, pushed: Floats, right: Floats, corner: Floats) -> None:
     """Subtract what right-hand sides (3, c, S) of points, multiplied with L^-1, leave for photos and common."""
     k, n = len(batch.photo), PHOTO * len(batch.photo)
     left = np.einsum("kpcs,cds->kspd", eliminated.rows[:n].reshape(k, PHOTO, 3, -1), pushed)

@@ -23,7 +23,7 @@ EXCHANGED, WRONG_IMAGE, EITHER = "exchanged", "image", "image or coordinates"
 POWER = 0.8  # an error is called detectable when it is found in this share of cases
 
 
-class Found(NamedTuple):
+class FoundErrors(NamedTuple):
     """What a search took out."""
 
     whole: JointAdjustment  # with all control
@@ -40,7 +40,7 @@ class Found(NamedTuple):
         return tuple(column for column in self.out if column < self.whole.coordinates)
 
 
-def kept_of(strip: StripAtControl, found: Found) -> Flags:
+def kept_of(strip: StripAtControl, found: FoundErrors) -> Flags:
     """Coordinates that stay (n, 3)."""
     kept = strip.control.use.copy()
     out = list(found.coordinates)
@@ -48,7 +48,7 @@ def kept_of(strip: StripAtControl, found: Found) -> Flags:
     return kept
 
 
-def control_rejections(strip: StripAtControl, found: Found, rows: Numbers) -> list[Rejection]:
+def control_rejections(strip: StripAtControl, found: FoundErrors, rows: Numbers) -> list[Rejection]:
     """List the points with rejected coordinates; rows: of the section's control in that of the whole strip."""
     if not found.coordinates:
         return []
@@ -82,7 +82,7 @@ def control_rejections(strip: StripAtControl, found: Found, rows: Numbers) -> li
     return rejections
 
 
-def reliability(strip: StripAtControl, found: Found) -> tuple[Floats, Floats]:
+def reliability(strip: StripAtControl, found: FoundErrors) -> tuple[Floats, Floats]:
     """Redundancy numbers M_ii / (D^-1)_ii [Schaffrin 1997], and smallest errors found in 80 % of cases, (n, 3) each."""
     redundancy, detectable = np.full((2, *strip.control.use.shape), np.nan)
     left, place = found.left, strip.coordinates
@@ -144,7 +144,7 @@ def _beside(everything: Deletion, some: Deletion) -> Deletion:
     )
 
 
-def _exchanges(strip: StripAtControl, found: Found) -> dict[int, int]:
+def _exchanges(strip: StripAtControl, found: FoundErrors) -> dict[int, int]:
     """Find pairs of rejected points that the others predict when each has the coordinates of the other."""
     control, whole, place = strip.control, found.whole, strip.coordinates
     kept = kept_of(strip, found)

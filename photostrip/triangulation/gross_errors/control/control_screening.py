@@ -20,7 +20,7 @@ from photostrip.rejection import Rejection
 from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
 from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment, adjust, projected
 from photostrip.triangulation.gross_errors.control.control_rejections import (
-    Found,
+    FoundErrors,
     control_rejections,
     kept_of,
     reliability,
@@ -69,7 +69,7 @@ def not_screened(control: ControlPoints) -> ScreenedControl:
     return ScreenedControl(kept=control, rejections=(), redundancy=unknown, detectable=unknown)
 
 
-def _searched(strip: StripAtControl) -> Found | None:
+def _searched(strip: StripAtControl) -> FoundErrors | None:
     """Search for what is wrong in a section; None where its control does not check itself."""
     count = len(strip.coordinates.point)
     if count <= strip.design.shape[1]:
@@ -87,13 +87,13 @@ def _searched(strip: StripAtControl) -> Found | None:
     best = min(
         told,
         key=lambda each: (not each.left.explained, len(each.out), len(each.coordinates), each.left.squares),
-        default=Found(found[0].whole, ()),
+        default=FoundErrors(found[0].whole, ()),
     )
     # where much is wrong, little is left to check the rest of wrong points, and to be lost
-    return Found(best.whole, best.whole.completed(best.out)) if best is found[0] else best
+    return FoundErrors(best.whole, best.whole.completed(best.out)) if best is found[0] else best
 
 
-def _laid(strip: StripAtControl, covariance: Floats, *, much: bool = False, bends: bool = False) -> Found:
+def _laid(strip: StripAtControl, covariance: Floats, *, much: bool = False, bends: bool = False) -> FoundErrors:
     """Search, lay the strip on what is kept, and search from what was found, until the same is found."""
     kept, out = strip.control.use, None
     for _ in strip.coordinates.point:
@@ -104,7 +104,7 @@ def _laid(strip: StripAtControl, covariance: Floats, *, much: bool = False, bend
         out = whole.shrunk(whole.grown(whole.shrunk(out)))
         if much:
             out = whole.shrunk(whole.grown(whole.exchanged(out)))
-        found = Found(whole, out)
+        found = FoundErrors(whole, out)
         before, kept = kept, kept_of(strip, found)
         if np.array_equal(before, kept):
             break

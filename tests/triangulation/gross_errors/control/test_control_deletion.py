@@ -27,7 +27,7 @@ from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.control_deletion import adjust
-from photostrip.triangulation.gross_errors.control.control_rejections import Found, reliability
+from photostrip.triangulation.gross_errors.control.control_rejections import FoundErrors, reliability
 from tests.loops import nonempty
 from tests.strips import MICROMETRE, control_points, fly, project
 
@@ -166,7 +166,7 @@ def test_redundancy_numbers_lie_between_0_and_1_however_much_the_points_have_in_
     strip, bend = drawn(3), bent * np.random.default_rng(4).normal(0, 1, (24, 2))
     covariance = strip.covariance(np.arange(24)) + bend @ bend.T
     for given_covariance in (covariance, np.diag(covariance.diagonal())):
-        redundancy, _ = reliability(strip, Found(adjust(strip, strip.w, given_covariance), ()))
+        redundancy, _ = reliability(strip, FoundErrors(adjust(strip, strip.w, given_covariance), ()))
         q, _ = np.linalg.qr(
             solve_triangular(root := cholesky(given_covariance, lower=True), strip.design / DESIGN, lower=True)
         )
@@ -182,7 +182,7 @@ def test_redundancy_numbers_lie_between_0_and_1_however_much_the_points_have_in_
 def test_an_error_found_in_four_of_five_cases_is_as_least_squares_says() -> None:
     strip = drawn(3)
     whole = adjusted_jointly(strip)
-    _, detectable = reliability(strip, Found(whole, ()))
+    _, detectable = reliability(strip, FoundErrors(whole, ()))
     after, _, sigma = squares(strip, (5,))
     limit = np.sqrt(f_distribution.isf(whole.level, 1, 16))
     assert detectable[1, 2] == pytest.approx((limit + norm.ppf(0.8)) * sigma[0] * max(1, after / 16) ** 0.5, rel=1e-5)
