@@ -63,6 +63,7 @@ FIRST_SEED = 100_000  # before the planted mistakes
 GROSS_SHARE = 0.2  # of the strips without a mistake have two gross errors of image coordinates, which are none of these
 THIRD, HALF, LINE = 0.3, 0.55, 0.03  # of the length of the strip; of its half breadth
 EVEN = 0.5
+SHIFT = 5.0  # mm
 PERCENTS_SEEN = 12.0  # standard deviations of the heights of the control together
 HARMLESS = np.radians(0.3)  # rms of given angles: start values need not be better
 BEYOND = 1 / 3  # of what the control spans, beyond which a sound strip does not reach at either end
@@ -340,6 +341,14 @@ def one_mirrored(case: Case) -> Planted | None:
     photo = str(case.rng.choice(case.photos))
     xy, rows = case.inputs.observations.xy.copy(), rows_of(case, photo)
     xy[rows] = (xy[rows] * [1, -1], xy[rows] * [-1, 1], xy[rows][:, ::-1])[case.rng.integers(3)]
+    return with_xy(case, xy), frozenset({photo})
+
+
+def one_shifted(case: Case) -> Planted | None:
+    """Shift all image coordinates of one photo by 5 mm, whatever that does."""
+    photo = str(case.rng.choice([photo for strip in case.inputs.strips for photo in strip.photos]))
+    way, xy = case.rng.normal(size=2), case.inputs.observations.xy.copy()
+    xy[rows_of(case, photo)] += SHIFT * way / np.linalg.norm(way)
     return with_xy(case, xy), frozenset({photo})
 
 
@@ -1075,6 +1084,9 @@ MISTAKES = (
     Mistake("negatives read as positives", negatives, ("P103", "P401")),
     Mistake("x and y of the images exchanged", x_and_y, ("P103", "P401")),
     Mistake("one photo mirrored", one_mirrored, ("P104",)),
+    Mistake("one photo shifted by 5 mm", one_shifted, ("P109",)),
+    Mistake("one photo shifted by 5 mm, block", one_shifted, ("P109",), block),
+    Mistake("one photo shifted by 5 mm, bundle", one_shifted, ("P109",), block, "bundle"),
     Mistake("fiducial marks in another unit", marks_in_micrometres, ("P106",)),
     Mistake("principal distance off by 10 or 1000", distance_by_ten, ("P105",)),
     Mistake("principal distance of another lens", distance, ("P105",)),

@@ -6,7 +6,7 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,7 +80,8 @@ def of_result(result: Result, directory: Path | None = None, made: Stages | None
     predicted = slips.predict(result)
     doubtful = [each for each in formed if slips.is_doubtful(each, result, predicted)]
     strips = tuple(each.strip for each in doubtful)  # a photo that is a strip of its own forms nothing
-    doubted = {note.strip for note in result.notes if note.code in slips.OF_DOUBTED_CONTROL}
+    doubts = [note for note in result.notes if note.code in slips.OF_DOUBTED_CONTROL]
+    doubted = {note.strip for note in doubts}
     stretched = {
         each.strip.id: isinstance(each.shared, StretchedHeights) or each.strip.id in doubted for each in stages
     }
@@ -93,6 +94,9 @@ def of_result(result: Result, directory: Path | None = None, made: Stages | None
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each in formed:
         findings += _of_formed(each, points)
+    wrong = {photo for each in findings if each.is_error for photo in each.photos}
+    names = {name for note in doubts for name in note.points}
+    findings += [each for each in _shifted_photos(result, formed, names) if wrong.isdisjoint(each.photos)]
     in_metres = not any(each.is_error for each in findings)
     if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
         checks = inputs.control.check
@@ -263,6 +267,24 @@ def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     focal = strip.camera.principal_distance
     findings += identity.find_double_ids(observations, formed, focal, strip.photos, strip.id, sigma)
     return findings
+
+
+def _shifted_photos(result: Result, formed: Sequence[EvidenceStrip], doubted: Collection[str]) -> Iterator[Finding]:
+    """Look for a photo of each strip whose image coordinates are all shifted; ``doubted`` are names of control."""
+    from photostrip.triangulation.plausibility.photos import shifted_photo  # a check forms no strips
+
+    points = result.refined.observations
+    is_doubted = np.array([name in doubted for name in points.point_ids], bool)
+    for each, strip in zip(formed, result.photo_strips, strict=True):
+        adjusted = shifted_photo.AdjustedPhotos(
+            strip=each.strip.id,
+            photos=each.strip.photos,
+            sigma=each.strip.median_sigma(points),
+            rms=strip.of_photos.resection.rms,
+            rows=strip.of_photos.rows,
+            doubted=bool(is_doubted[each.formed.point].any()),
+        )
+        yield from shifted_photo.find_shifted_photo(each.orientation, each.formed, points, adjusted)
 
 
 def _of_rotations(result: Result, formed: Sequence[EvidenceStrip], directory: Path | None) -> list[Finding]:

@@ -26,6 +26,7 @@ KINDS: dict[str, Kind] = {
     "P106": Kind("fiducial marks measured in another unit", WARNING),
     "P107": Kind("another principal distance fits better", WARNING),
     "P108": Kind("standard deviations in another unit", WARNING),
+    "P109": Kind("image coordinates of one photo shifted", WARNING),
     "P201": Kind("photos out of flight order", ERROR),
     "P202": Kind("neighbouring photos that do not overlap", ERROR),
     "P203": Kind("the same photo twice", ERROR),

@@ -693,6 +693,37 @@ def test_mistakes_of_whole_columns_and_rows_are_told(
     assert not ids or ids & named[code]
 
 
+@pytest.mark.parametrize(("make", "seed"), [(plausibility.sound, 43003), (plausibility.block, 43001)])
+def test_a_shifted_photo_is_named_with_its_shift(make: Callable[[int], plausibility.Case], seed: int) -> None:
+    case = make(seed)
+    planted = plausibility.one_shifted(case)
+    assert planted is not None
+    inputs, ids = planted
+    shift = (inputs.observations.xy - case.inputs.observations.xy)[plausibility.rows_of(case, *ids)][0]
+    (finding,) = (each for each in triangulate(inputs, case.settings).findings if each.code == "P109")
+    assert set(finding.photos) == ids
+    found = [float(finding.evidence[f"shift_{axis}_mm"]) for axis in "xy"]
+    assert found == pytest.approx(shift, abs=0.8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("plant", "seed"),
+    [
+        (plausibility.distance_by_percents, 7310013),  # a shift of one photo explains some of it
+        (plausibility.at_another_height, 7310003),  # it would agree with 6 of its 40 points only
+        (plausibility.unit, 7310003),
+    ],
+)
+def test_what_else_is_wrong_with_photos_is_no_shift(
+    plant: Callable[[plausibility.Case], plausibility.Planted | None], seed: int
+) -> None:
+    case = plausibility.sound(seed)
+    planted = plant(case)
+    assert planted is not None
+    assert "P109" not in plausibility.told(planted[0], case.settings).after
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("plant", "seed", "code", "other"),

@@ -7,6 +7,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import replace
+from photostrip.points import PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle.observations.problem import (
@@ -35,7 +36,9 @@ def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> t
     None where what is left holds the photos too badly for an adjustment.
     """
     rows = distinct(oriented.rows)
-    problem, kept = _free_network(oriented, formed, rays, rows), np.isin(rows, rays.kept)
+    sigma = rays.observations.sigma[rows] * _spread_of_photos(oriented, rays)[rays.position[rows], None]
+    problem = free_network(oriented, formed, rays.observations, rays.position, rows, sigma)
+    kept = np.isin(rows, rays.kept)
     begin = replace(Selection.everything(problem), images=~_suspected(oriented, formed, rays, rows))
     try:
         found = screen_bundle(problem, begin, BundleSettings(level=STRIP_LEVEL), kept, rough=True)
@@ -78,18 +81,27 @@ def _spread_of_photos(oriented: Orientation, rays: StripRays) -> Floats:
     return np.asarray(np.sqrt(2 * factor**2 - 1) * rays.sigma.max() / (np.sqrt(2.0) * rays.stated), float)
 
 
-def _free_network(oriented: Orientation, formed: FormedStrip, rays: StripRays, rows: Numbers) -> BundleProblem:
-    """Rays as a bundle without control, from the formed strip."""
-    o = rays.observations
-    photo = rays.position[rows]
-    point, at = np.unique(o.point[rows], return_inverse=True)
-    sigma = o.sigma[rows] * _spread_of_photos(oriented, rays)[photo, None]
+def free_network(
+    oriented: Orientation,
+    formed: FormedStrip,
+    observations: PhotoPoints,
+    position: Numbers,
+    rows: Numbers,
+    sigma: Floats,
+) -> BundleProblem:
+    """Rays (r,) as a bundle without control, from the formed strip.
+
+    position: (n,): place in the strip of the photo of every image point.
+    sigma: (r, 2): standard deviations of the rays, mm.
+    """
+    point, at = np.unique(observations.point[rows], return_inverse=True)
     xyz = np.full((len(point), 3), np.nan)
     for use in (np.isfinite(formed.model_xyz[:, 0]), oriented.used & np.isfinite(formed.model_xyz[:, 0])):
         mean = mean_points(oriented.point, formed.model_xyz, use)
         xyz[np.searchsorted(point, mean.point)] = mean.xyz
+    images = ImageObservations(photo=position[rows], point=at.astype(np.intp), xy=observations.xy[rows], sigma=sigma)
     return BundleProblem(
-        images=ImageObservations(photo=photo, point=at.astype(np.intp), xy=o.xy[rows], sigma=sigma),
+        images=images,
         cameras=BundleCameras(np.zeros(len(formed.centers), np.intp), np.array([oriented.pairs.focal])),
         start=StartValues(formed.centers, formed.rotations, xyz),
     )
