@@ -22,7 +22,7 @@ LEVEL_CAMERA = 1e-12  # difference of a rotation from that of a level camera
 
 @dataclass(frozen=True, eq=False)
 class RequiredAccuracy:
-    """Standard errors with which correction directions must be known."""
+    """Standard deviations with which correction directions must be known."""
 
     angle: Floats  # (...): m_lambda', of the angle between a point and the optical axis as the photo gives it, radians
     horizontal: Floats  # (...): m_lambda, of a horizontal direction: an angle is the difference of two of them, radians
@@ -30,7 +30,7 @@ class RequiredAccuracy:
 
 
 def required(xz: ArrayLike, principal_distance: float, sigma: float, rotation: ArrayLike) -> RequiredAccuracy:
-    """Accuracy of directions that corresponds to a standard error `sigma` of x, of z and of the principal distance, mm.
+    """Accuracy of directions that corresponds to the standard deviation `sigma` of x, z and the principal distance, mm.
 
     For a level camera m_lambda' = m / sqrt(f^2 + x^2) and m_beta = m / sqrt(f^2 + x^2 + z^2).
 
@@ -43,7 +43,7 @@ def required(xz: ArrayLike, principal_distance: float, sigma: float, rotation: A
 
 @dataclass(frozen=True, eq=False)
 class Printed:
-    """Standard errors by the formulas as they are printed, for a level camera."""
+    """Standard deviations by the formulas as they are printed, for a level camera."""
 
     horizontal: Floats  # (...): m_lambda by eq. 5 and 6, which is right, radians
     # vertical_eq5, vertical_eq6: (...): m_beta by eq. 5 and by its shorter form eq. 6, radians
@@ -52,7 +52,7 @@ class Printed:
 
 
 def as_printed(xz: ArrayLike, principal_distance: float, sigma: float) -> Printed:
-    """Accuracy of directions by the formulas of the source, for a standard error `sigma` of the image coordinates, mm.
+    """Accuracy of directions by the formulas of the source, for a standard deviation `sigma` of image coordinates, mm.
 
     Source: [002] eq. 5 and 6 as printed, see ``photostrip sources``.
     """
@@ -67,7 +67,7 @@ def as_printed(xz: ArrayLike, principal_distance: float, sigma: float) -> Printe
 def supported(
     xz: ArrayLike, principal_distance: float, horizontal: float, vertical: float, rotation: ArrayLike
 ) -> Floats:
-    """Smallest standard errors (..., 2) of image coordinates, mm, for which directions are accurate enough.
+    """Smallest standard deviations (..., 2) of image coordinates, mm, for which directions are accurate enough.
 
     Source: derived; ``required`` solved for m.
     """
@@ -76,12 +76,12 @@ def supported(
 
 
 def of_rounds(sigma: float, rounds: int) -> float:
-    """Return the standard error of the mean of several rounds, each measured in both faces."""
+    """Return the standard deviation of the mean of several rounds, each measured in both faces."""
     return float(sigma / np.sqrt(rounds))
 
 
 def rounds_for(sigma: float, wanted: float) -> int:
-    """Return the number of rounds, each in both faces with `sigma`, whose mean has the standard error wanted."""
+    """Return the number of rounds, each in both faces with `sigma`, whose mean has the standard deviation wanted."""
     return max(1, ceil((sigma / wanted) ** 2 - 1e-9))  # exactly four times is not more than four times
 
 
@@ -104,7 +104,7 @@ class Example:
     """A worked example of the source."""
 
     camera: str
-    # f, x, z, sigma: principal distance, image coordinates and their standard error, mm
+    # f, x, z, sigma: principal distance, image coordinates and their standard deviation, mm
     f: float
     x: float
     z: float
@@ -124,7 +124,7 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class WorkedExample:
-    """An example computed again, step by step; standard errors in arcseconds."""
+    """An example computed again, step by step; standard deviations in arcseconds."""
 
     example: Example
     horizontal: float  # m_lambda, exact

@@ -119,12 +119,12 @@ def one_station(  # noqa: PLR0913 (an argument for each option)
     camera: CameraByPoint,
     looking: Looking,
     unit: Unit = "mm",
-    sigma_um: Annotated[float, typer.Option("--sigma-um", metavar="UM", help="Standard error of x and z.")] = 5.0,
+    sigma_um: Annotated[float, typer.Option("--sigma-um", metavar="UM", help="Standard deviation of x and z.")] = 5.0,
     sigma_d_um: Annotated[
         float | None, typer.Option("--sigma-d-um", metavar="UM", help="That of dx and dz; default: as of x and z.")
     ] = None,
     sigma_distance: Annotated[
-        float, typer.Option("--sigma-distance", metavar="M", help="Standard error of a distance, metres.")
+        float, typer.Option("--sigma-distance", metavar="M", help="Standard deviation of a distance, metres.")
     ] = 0.01,
     stable: Annotated[
         str | None, typer.Option("--stable", metavar="IDS", help="Points that did not move, as in A,B,C.")

@@ -89,7 +89,9 @@ class DirectionOptions:
     ] = None
     sigma_arcsec: Annotated[
         float | None,
-        typer.Option("--sigma-arcsec", metavar="SEC", help="Standard error of a direction in one round, both faces."),
+        typer.Option(
+            "--sigma-arcsec", metavar="SEC", help="Standard deviation of a direction in one round, both faces."
+        ),
     ] = None
     vertical_arcsec: Annotated[
         float | None,
@@ -98,7 +100,7 @@ class DirectionOptions:
     rounds: Annotated[int, typer.Option("--rounds", min=1, help="Rounds measured.")] = 1
 
     def sigmas(self, usual: float | None = None) -> Theodolite:
-        """Return the standard errors in one round, and the rounds; `usual` stands where nothing is given."""
+        """Return the standard deviations in one round, and the rounds; `usual` stands where nothing is given."""
         from photostrip.project.terrestrial.options import direction_sigma, theodolite_sigmas
 
         horizontal = direction_sigma(self.theodolite, self.sigma_arcsec, usual)
@@ -135,7 +137,8 @@ def from_photo(
     looking: Looking,
     unit: Unit = "mm",
     sigma_um: Annotated[
-        float | None, typer.Option("--sigma-um", metavar="UM", help="Standard error of x, z and f: that of directions.")
+        float | None,
+        typer.Option("--sigma-um", metavar="UM", help="Standard deviation of x, z and f: that of directions."),
     ] = None,
     form: Format = "text",
     quiet: Silent = False,
@@ -181,7 +184,7 @@ def accuracy(
     *,
     camera: CameraByFormat,
     sigma_um: Annotated[
-        float, typer.Option("--sigma-um", metavar="UM", help="Standard error of x, z and the principal distance.")
+        float, typer.Option("--sigma-um", metavar="UM", help="Standard deviation of x, z and the principal distance.")
     ] = 5.0,
     looking: Looking,
     step: Step = 20.0,
@@ -300,12 +303,12 @@ def orient(  # noqa: PLR0913 (an argument for each option)
     ] = 0.0,
     unit: Unit = "mm",
     angles: AngleUnit = "deg",
-    sigma_um: Annotated[float, typer.Option("--sigma-um", metavar="UM", help="Standard error of x and z.")] = 5.0,
+    sigma_um: Annotated[float, typer.Option("--sigma-um", metavar="UM", help="Standard deviation of x and z.")] = 5.0,
     measuring: DirectionOptions,
     screening: Annotated[
         Literal["deletion", "stated", "none"],
         typer.Option(
-            help="Test points against the scatter of the others, against the stated standard errors, or not at all."
+            help="Test points against the scatter of the others, against the stated standard deviations, or not at all."
         ),
     ] = "deletion",
     significance: Annotated[float, typer.Option(help="Probability of rejecting a point of a clean photo.")] = 0.05,

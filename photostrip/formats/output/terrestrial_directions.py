@@ -34,7 +34,7 @@ class Attitude(NamedTuple):
 
 
 class Theodolite(NamedTuple):
-    """Standard errors of directions measured in one round, in arcseconds, and the number of rounds."""
+    """Standard deviations of directions measured in one round, in arcseconds, and the number of rounds."""
 
     horizontal: float
     vertical: float
@@ -113,7 +113,7 @@ def required_accuracy(
 ) -> Document:
     """Return the accuracy over the photo with which directions must be measured.
 
-    sigma: standard error of image coordinates and principal distance in mm.
+    sigma: standard deviation of image coordinates and principal distance in mm.
     """
     xz = _grid_points(grid)
     exact = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)

@@ -68,7 +68,7 @@ def image_sigma(sigma_um: float) -> float:
 
 
 def direction_sigma(theodolite: str | None, given: float | None, usual: float | None) -> float:
-    """Return the standard error of a direction, arcseconds: as given, of a theodolite by its name, or the usual one."""
+    """Return that of a direction, arcseconds: as given, of a theodolite by its name, or the usual one."""
     if theodolite is None:
         found = usual if given is None else given
         if found is None:
@@ -77,7 +77,7 @@ def direction_sigma(theodolite: str | None, given: float | None, usual: float | 
             raise InputError(Fault(message, "no-theodolite", key="--sigma-arcsec", expected=expected))
         return found
     if given is not None:
-        message = "the theodolite and its standard error are both given"
+        message = "the theodolite and its standard deviation are both given"
         raise InputError(Fault(message, "two-keys", key="--sigma-arcsec", fix="leave out one of them"))
     name = " ".join(theodolite.split())
     if name not in THEODOLITES:

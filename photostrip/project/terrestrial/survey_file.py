@@ -69,7 +69,7 @@ class Station(Section):
         None,
     )
     sigma_arcsec: Annotated[Positive, After(bounded(DIRECTION_SIGMA))] = key(
-        "Standard error of these directions in rows without one", 2.0, unit="arcsec"
+        "Standard deviation of these directions in rows without one", 2.0, unit="arcsec"
     )
     eccentricity: Annotated[Number, After(bounded(ECCENTRICITY))] = key(
         "Perspective centre ahead of `position` on the optical axis, where that is the theodolite's", 0.0, unit="m"

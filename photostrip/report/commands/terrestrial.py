@@ -40,7 +40,7 @@ def _conversion(document: Document) -> tuple[Section, ...]:
     columns = [words("point", "id"), number("x", "x", 4, "mm"), number("z", "z", 4, "mm")]
     columns += [number(name, name, ANGLE_DECIMALS, unit) for name in ("lambda", "beta")]
     if "image_sigma_um" in document:
-        facts.append(("standard error", _sigma(document)))
+        facts.append(("standard deviation", _sigma(document)))
         columns += [number(f"m_{name}", f"sigma_{name}_arcsec", 2, "″") for name in ("lambda", "beta")]
     return (Section("", (Facts(tuple(facts)), tabulated(document["points"], columns))),)
 
@@ -48,7 +48,7 @@ def _conversion(document: Document) -> tuple[Section, ...]:
 def _accuracy(document: Document) -> tuple[Section, ...]:
     printed = document["formulas"] == "as printed"
     points = document["points"]
-    facts = [*_camera_facts(document), ("standard error", _sigma(document)), ("formulas", document["formulas"])]
+    facts = [*_camera_facts(document), ("standard deviation", _sigma(document)), ("formulas", document["formulas"])]
     strictest = {name: min(row[f"{name}_arcsec"] for row in points) for name in ("horizontal", "vertical")}
     facts.append(
         (
@@ -111,7 +111,7 @@ def _theodolite(document: Document) -> tuple[Section, ...]:
     return (
         Section("", (Facts(tuple(facts)),)),
         Section(
-            "Standard error of image coordinates that it supports, µm",
+            "Standard deviation of image coordinates that it supports, µm",
             (_matrix(document["points"], "supported_um"),),
         ),
     )
@@ -136,7 +136,7 @@ def _examples(document: Document) -> tuple[Section, ...]:
     facts = Facts(
         (
             ("point", f"x {short(first['x_mm'])} mm, z {short(first['z_mm'])} mm"),
-            ("standard error", f"{short(first['image_sigma_um'])} µm"),
+            ("standard deviation", f"{short(first['image_sigma_um'])} µm"),
         )
     )
     return (Section("", (facts, table)), Section("What is wrong in print", _misprints(document)))

@@ -118,7 +118,7 @@ def test_accuracy_over_the_photo_in_every_form(capsys: pytest.CaptureFixture[str
     assert {key: float(value) for key, value in rows(out)[-1].items()} == corner
     code, text, _ = call(capsys, *command)
     assert code == 0
-    assert "needed everywhere  horizontal 5.69″, vertical 7.29″" in text
+    assert "needed everywhere   horizontal 5.69″, vertical 7.29″" in text
     assert re.search(r"^ +60 +8\.84 +8\.37 +7\.29$", text, re.MULTILINE)
     code, page, _ = call(capsys, *command, "--format", "md")
     assert code == 0
@@ -556,7 +556,7 @@ def test_nothing_but_a_picture_loads_matplotlib(tmp_path: Path) -> None:
         ("directions accuracy --principal-distance 100 --photo-format 0,3", "--photo-format: 0 is out of range"),
         ("directions theodolite --principal-distance 100 --photo-format 100,80", "--sigma-arcsec: nothing says how well directions are measured; expected arcseconds, or --theodolite"),
         ("directions theodolite --principal-distance 100 --photo-format 100,80 --theodolite T2", "--theodolite: there is no theodolite `T2`; expected one of Theo 010, Theo 020, Theo 080"),
-        ("directions theodolite --principal-distance 100 --photo-format 100,80 --theodolite T2 --sigma-arcsec 1", "--sigma-arcsec: the theodolite and its standard error are both given"),
+        ("directions theodolite --principal-distance 100 --photo-format 100,80 --theodolite T2 --sigma-arcsec 1", "--sigma-arcsec: the theodolite and its standard deviation are both given"),
         ("directions theodolite --principal-distance 100 --photo-format 100,80 --sigma-arcsec 0", "--sigma-arcsec: 0 is out of range"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --step 0", "--step: 0 is out of range"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --step 0.1", "--step: a step of 0.1 mm gives more than 20000 points; expected a larger step"),
