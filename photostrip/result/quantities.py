@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -24,7 +23,7 @@ from photostrip.result.numbers import (
     significant,
     to_decimals,
 )
-from photostrip.result.records import Records, as_records
+from photostrip.result.records import Grouped, Records
 
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
 DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES, "gon": DEGREES, "rad": RADIANS}
@@ -104,11 +103,8 @@ def _cells(
     return [None if each is None else _record(entry, each) for each in column]
 
 
-def grouped(block: str, heads: Mapping[str, Any], columns: Mapping[str, Any], ends: Sequence[int]) -> list[Document]:
+def grouped(block: str, heads: Mapping[str, Any], columns: Mapping[str, Any], ends: Sequence[int]) -> Records:
     """Make records with a list in each column: one value of each head, and the rows between two `ends` of a column."""
     table = table_at(block)
     cells = {key: _cells(table[key], column, len(ends) - 1) for key, column in heads.items()}
-    for key, column in columns.items():
-        values = list(_cells(table[key], column, 0))
-        cells[key] = [values[start:end] for start, end in pairwise(ends)]
-    return as_records(cells)
+    return Records(cells | {key: Grouped(_cells(table[key], column, 0), ends) for key, column in columns.items()})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, cast, overload
 
 from photostrip.notes import Document
@@ -28,6 +29,30 @@ class Row(Mapping[str, Any]):
 
     def __len__(self) -> int:
         return len(self.columns)
+
+
+class Grouped(Sequence[list[Any]]):
+    """A column of lists, kept as one column of their values."""
+
+    def __init__(self, values: Sequence[Plain], ends: Sequence[int]) -> None:
+        self.values, self.ends = values, ends  # of each list, its first value and that of the next
+
+    def __len__(self) -> int:
+        return len(self.ends) - 1
+
+    @overload
+    def __getitem__(self, place: int) -> list[Plain]: ...
+    @overload
+    def __getitem__(self, place: slice) -> Grouped: ...
+    def __getitem__(self, place: int | slice) -> list[Plain] | Grouped:
+        start, stop, _ = (place if isinstance(place, slice) else slice(place, place + 1 or None)).indices(len(self))
+        ends = self.ends[start : stop + 1]
+        values = self.values[ends[0] : ends[-1]]
+        return Grouped(values, [end - ends[0] for end in ends]) if isinstance(place, slice) else list(values)
+
+    def __iter__(self) -> Iterator[list[Plain]]:
+        values = list(self.values)
+        return (values[start:stop] for start, stop in pairwise(self.ends))
 
 
 class Records(Sequence[dict[str, Any]]):

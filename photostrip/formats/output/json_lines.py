@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import accumulate, chain, pairwise
+from itertools import accumulate, chain
 from operator import attrgetter
 from types import NoneType
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ import numpy as np
 from photostrip.formats.text import number_columns
 from photostrip.formats.text.number_columns import Cells
 from photostrip.result.numbers import Plain, RoundedColumn
-from photostrip.result.records import Records
+from photostrip.result.records import Grouped, Records
 
 if TYPE_CHECKING:
     from photostrip.formats.output.json_encoder import Encoder
@@ -48,7 +48,11 @@ def _cells(column: Sequence[Plain], encode: Encoder) -> Cells:
         return number_columns.as_repr(np.where(np.isfinite(column.values), column.values, np.nan), "null")
     if isinstance(column, Records):
         return np.concatenate(_objects(column.columns, encode))
-    kinds = set(map(kind_of, column))
+    kinds: set[type] = set() if isinstance(column, Grouped) else set(map(kind_of, column))
+    if kinds == {list} and any(column):
+        column = Grouped(list(chain.from_iterable(column)), [0, *accumulate(map(len, column))])
+    if isinstance(column, Grouped):
+        return number_columns.listed(_cells(column.values, encode), column.ends)
     if _of_numbers(kinds):
         return _numbers(column, kinds, encode)
     if kinds == {dict} and (parts := columns_of(column)) is not None:
@@ -62,15 +66,6 @@ def _texts(column: Sequence[Plain], kinds: set[type], encode: Encoder) -> list[s
     if kinds <= {str, bool, NoneType}:
         written = {value: encode.value(value) for value in set(column)}
         return [written[value] for value in column]
-    if kinds == {list} and (flat := list(chain.from_iterable(column))):
-        ends = [0, *accumulate(map(len, column))]
-        kinds = set(map(kind_of, flat))
-        if _of_numbers(kinds):
-            groups = number_columns.joined_in_groups(_numbers(flat, kinds, encode), ", ", ends)
-            return [f"[{group}]" for group in groups]
-        if kinds <= {str, bool}:
-            texts = _texts(flat, kinds, encode)
-            return [f"[{', '.join(texts[start:stop])}]" for start, stop in pairwise(ends)]
     return [encode.value(value) for value in column]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from itertools import compress
+from itertools import chain, compress
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from photostrip.result.columns import Column
 from photostrip.result.description import Quantity
 from photostrip.result.numbers import PER_RADIAN
 from photostrip.result.points.image_coordinates import refined_rows
-from photostrip.result.records import Records
+from photostrip.result.records import Grouped, Records
 
 ODD = re.compile(r'[",\s]')  # without these no id needs quotes
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
@@ -132,12 +132,19 @@ def _cell(text: str | Sequence[str] | None) -> str:
     return '"' + text.replace('"', '""') + '"' if NEEDS_QUOTES.search(text) or not text else text
 
 
-def _grouped(columns: Sequence[Column], groups: Iterable[Document]) -> str:
+def _grouped(columns: Sequence[Column], groups: Records | list[Document]) -> str:
     """Write points that stand together under a photo or a pair: its ids, then a line for each point."""
     first = [column.key for column in columns].index("points")
-    groups = list(groups)
-    counts = [len(group["points"]) for group in groups]
-    heads = [_cells(column.quantity, [group[column.key] for group in groups]) for column in columns[:first]]
-    flat = [[value for group in groups for value in group[column.key]] for column in columns[first:]]
-    of_points = [_cells(column.quantity, values) for column, values in zip(columns[first:], flat, strict=True)]
+    found = {column.key: _column(groups, column.key) for column in columns}
+    counts = list(map(len, found["points"]))
+    heads = [_cells(column.quantity, found[column.key]) for column in columns[:first]]
+    of_points = [_cells(column.quantity, _flat(found[column.key])) for column in columns[first:]]
     return _written(columns, [*(np.repeat(head, counts, axis=1) for head in heads), *of_points])
+
+
+def _column(rows: Records | list[Document], key: str) -> Sequence[Any]:
+    return rows.columns.get(key, ()) if isinstance(rows, Records) else [row[key] for row in rows]
+
+
+def _flat(column: Sequence[Any]) -> Sequence[Any]:
+    return column.values if isinstance(column, Grouped) else list(chain.from_iterable(column))

@@ -50,12 +50,12 @@ def as_whole(values: NDArray[np.int64]) -> Cells:
     return _written(values < 0, np.abs(values).astype(np.uint64), 0, short=False)
 
 
-def as_texts(texts: Sequence[str]) -> Cells:
+def as_texts(texts: Sequence[str] | Sequence[bytes]) -> Cells:
     """Take texts as they are; none may hold a NUL."""
     try:
         cells = np.array(texts, "S")
     except UnicodeEncodeError:
-        cells = np.array([text.encode() for text in texts])
+        cells = np.array([text.encode() for text in map(str, texts)])
     return cells.view(np.uint8).reshape(len(texts), cells.itemsize).T
 
 
@@ -66,15 +66,19 @@ def repeated(text: str, count: int) -> Cells:
 
 def joined(columns: Sequence[Cells]) -> str:
     """Join the cells of columns, line by line."""
-    return np.concatenate(columns).T.tobytes().translate(None, b"\0").decode()
+    return _joined(columns).decode()
 
 
-def joined_in_groups(cells: Cells, separator: str, ends: Sequence[int]) -> list[str]:
-    """Join the cells between two ends each."""
-    text = joined([cells, repeated(separator, cells.shape[1])])
-    lengths = np.count_nonzero(cells, axis=0) + len(separator)
+def _joined(columns: Sequence[Cells]) -> bytes:
+    return np.concatenate(columns).T.tobytes().translate(None, b"\0")
+
+
+def listed(cells: Cells, ends: Sequence[int]) -> Cells:
+    """Write the cells between two ends each as a list in brackets."""
+    text = _joined([cells, repeated(", ", cells.shape[1])])
+    lengths = np.count_nonzero(cells, axis=0) + len(", ")
     places = np.concatenate([[0], np.cumsum(lengths)])[np.array(ends)].tolist()
-    return [text[start : stop - len(separator)] if stop > start else "" for start, stop in pairwise(places)]
+    return as_texts([b"[%b]" % text[start : max(stop - len(", "), start)] for start, stop in pairwise(places)])
 
 
 def _with_others(

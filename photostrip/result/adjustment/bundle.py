@@ -214,7 +214,7 @@ def _group(group: reliability.Group, shift: float, kind: GroupKind) -> Document:
     }
 
 
-def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals: list[Document]) -> list[Document]:
+def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals: Records) -> Records | list[Document]:
     """Add to the list ``residuals`` how well each ray is checked by the others; None for rays that took no part.
 
     Without a bundle adjustment the list stays as it is.

@@ -110,7 +110,7 @@ def names_of(result: Result, nodes: Numbers) -> list[str]:
     return [] if measured is None else [measured.points.name(int(node)) for node in nodes]
 
 
-def residuals_of(result: Result, rank: Numbers) -> list[Document]:
+def residuals_of(result: Result, rank: Numbers) -> Records:
     """Return the list ``link_residuals``: differences of what neighbouring models have in common, link by link.
 
     After minus before, in micrometres along the axes of the model before; also of points that took no part.
@@ -129,5 +129,5 @@ def residuals_of(result: Result, rank: Numbers) -> list[Document]:
         }
         heads = {"strip": strip.strip.id, "before": names[:-1], "after": names[1:]}
         ends = np.searchsorted(shared.link[order], np.arange(shared.count + 1)).tolist()
-        found += grouped("link_residuals", heads, columns, ends)
-    return found
+        found.append(grouped("link_residuals", heads, columns, ends))
+    return Records.joined(found)

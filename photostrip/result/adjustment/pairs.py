@@ -115,7 +115,7 @@ def _detectable(strip: StripResult) -> Floats:
     return np.where(np.isfinite(worst), worst, np.nan)
 
 
-def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
+def parallaxes_of(result: Result, rank: Numbers) -> Records:
     """Return the list ``parallaxes``: y parallaxes of all points of every pair, in natural order of the points."""
     ids = result.refined.observations.point_ids
     found = []
@@ -131,5 +131,5 @@ def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
             "detectable_um": 1000.0 * screened.detectable[order],
         }
         heads = {"strip": strip.strip.id, "left": photos[:-1], "right": photos[1:]}
-        found += grouped("parallaxes", heads, columns, [*oriented.pairs.starts.tolist(), len(order)])
-    return found
+        found.append(grouped("parallaxes", heads, columns, [*oriented.pairs.starts.tolist(), len(order)]))
+    return Records.joined(found)

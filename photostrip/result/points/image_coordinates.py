@@ -36,7 +36,7 @@ def fiducials_of(result: Result) -> Document:
         "vy_um": residuals[:, 1],
     }
     ends = np.cumsum([0, *map(len, found.marks)]).tolist()
-    return {"fiducials": grouped("fiducials", heads, of_marks, ends)}
+    return {"fiducials": list(grouped("fiducials", heads, of_marks, ends))}
 
 
 def refined_rows(result: Result) -> Document:

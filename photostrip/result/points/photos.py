@@ -81,7 +81,7 @@ def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
     return found
 
 
-def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> list[Document]:
+def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> Records:
     """Return the list ``residuals``: image residuals photo by photo, points in natural order."""
     observations, found = result.refined.observations, []
     for image in images:
@@ -93,8 +93,8 @@ def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> list[Docum
         }
         photos = image.strip.photos
         ends = np.searchsorted(image.photo, np.arange(len(photos) + 1)).tolist()
-        found += grouped("residuals", {"strip": image.strip.id, "photo": photos}, columns, ends)
-    return found
+        found.append(grouped("residuals", {"strip": image.strip.id, "photo": photos}, columns, ends))
+    return Records.joined(found)
 
 
 def point_rms(result: Result, images: Sequence[ImageResiduals]) -> Floats:

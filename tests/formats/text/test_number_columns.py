@@ -50,4 +50,6 @@ def test_what_is_no_number_is_missing_and_texts_stay() -> None:
     assert written(number_columns.as_whole(np.array([0, -17, 4000]))) == ["0", "-17", "4000"]
     assert written(number_columns.as_texts(["a", "", "Höhe 2"])) == ["a", "", "Höhe 2"]
     cells = number_columns.as_whole(np.array([1, 22, 333]))
-    assert number_columns.joined_in_groups(cells, ", ", [0, 2, 2, 3]) == ["1, 22", "", "333"]
+    assert written(number_columns.listed(cells, [0, 2, 2, 3])) == ["[1, 22]", "[]", "[333]"]
+    names = number_columns.as_texts(["é", "b", "Höhe 2", ""])
+    assert written(number_columns.listed(names, [0, 0, 2, 4])) == ["[]", "[é, b]", "[Höhe 2, ]"]

@@ -14,6 +14,7 @@ import pytest
 from photostrip.report.pictures.ground.footprints import footprint_pictures
 from photostrip.report.pictures.ground.plan_view import plan_of
 from photostrip.report.pictures.ground.terrain import footprints, straightened
+from photostrip.result.records import as_lists
 from photostrip.simulation.ground import surface
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Ground, Image, Spec, Terrain
@@ -44,7 +45,7 @@ def flown(terrain: Terrain, seed: int = 1, sigma_um: float = 5.0) -> tuple[Simul
         image=Image(sigma_um),
     )
     simulation = simulate(spec)
-    return simulation, solved(inputs_of(simulation)).document
+    return simulation, as_lists(solved(inputs_of(simulation)).document)
 
 
 def on_ground(document: Document) -> dict[str, NDArray[np.float64]]:
