@@ -10,10 +10,12 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.notes import Document
-from photostrip.pipeline.results import Result, StripResult
-from photostrip.result.adjustment.parallax_limits import parallax_limits
+from photostrip.pipeline.results import PhotoStages, Result, StripResult
 from photostrip.result.quantities import grouped, records
 from photostrip.result.records import Records
+from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest, residual_sigma
+from photostrip.triangulation.gross_errors.pairs.screening import SEARCHES, tested
+from photostrip.triangulation.gross_errors.pairs.screening import stages as tests_of
 from photostrip.triangulation.relative_orientation.orientation import Orientation, RelativeSettings
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
@@ -77,7 +79,7 @@ def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) 
         "redundancy": sums.redundancy,
         "zones": stages.screened.counts,
         "detectable_um": 1000.0 * _detectable(strip),
-        "limit_um": 1000.0 * parallax_limits(stages, relative),
+        "limit_um": 1000.0 * _parallax_limits(stages, relative),
         "masked_errors_suspected": stages.screened.masked,
         "condition": oriented.condition,
         "iterations": oriented.iterations,
@@ -133,3 +135,23 @@ def parallaxes_of(result: Result, rank: Numbers) -> Records:
         heads = {"strip": strip.strip.id, "left": photos[:-1], "right": photos[1:]}
         found.append(grouped("parallaxes", heads, columns, [*oriented.pairs.starts.tolist(), len(order)]))
     return Records.joined(found)
+
+
+def _parallax_limits(of_photos: PhotoStages, settings: RelativeSettings) -> Floats:
+    """Median parallax of each pair, mm, from which on the search takes a point out; NaN where nothing is tested.
+
+    A limit that depends on the redundancy of a point is smaller where there is little of it.
+    """
+    oriented, test = of_photos.screened.orientation, GlobalTest.of(of_photos.screened.scatter.by_pair)
+    pairs, limit = oriented.pairs, np.full(len(oriented.used), np.inf)
+    if settings.screening in SEARCHES:
+        limit = test.largest_limits(oriented.points_used)[pairs.pair] * residual_sigma(oriented, test.sigma)
+    for name, bound in tests_of(settings, of_photos.sigma):
+        found = tested(oriented, name, bound)
+        limit = np.minimum(limit, found.limit * found.unit)
+    known = np.flatnonzero(oriented.used & np.isfinite(limit))
+    known = known[np.lexsort((limit[known], pairs.pair[known]))]
+    ends = np.searchsorted(pairs.pair[known], np.arange(pairs.size + 1))
+    twice = ends[:-1] + ends[1:]
+    lower, upper = np.append(limit[known], np.nan)[[(twice - 1) // 2, twice // 2]]
+    return np.where(ends[1:] > ends[:-1], (lower + upper) / 2, np.nan)
