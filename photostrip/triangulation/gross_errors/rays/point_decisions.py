@@ -139,8 +139,8 @@ class _Deleted(NamedTuple):
 def _without(total: Floats, pulled: Floats, normal: Floats, sets: Numbers) -> _Deleted:
     """Take sets of as many rays each out."""
     rows = (2 * sets[:, :, None] + np.arange(2)).reshape(len(sets), -1)
-    pull = pulled[..., rows]
-    inverse = np.linalg.pinv(normal[..., rows[:, :, None], rows[:, None, :]], rcond=1e-6, hermitian=True)
-    error = np.einsum("...ij,...j->...i", inverse, pull)
+    pull, part = pulled[..., rows], normal[..., rows[:, :, None], rows[:, None, :]]
+    solved = np.linalg.solve(part + REGULARISATION * np.eye(rows.shape[1]), pull[..., None])
+    error = np.asarray(solved[..., 0], float)
     left = total[..., None] - np.einsum("...i,...i->...", pull, error)
     return _Deleted(left, sets, error.reshape(*error.shape[:-1], -1, 2))

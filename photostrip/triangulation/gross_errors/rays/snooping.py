@@ -43,6 +43,7 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import (
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 from photostrip.triangulation.resection.ray_intersection import two_that_meet
 
+RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
@@ -256,9 +257,11 @@ class _Search:
         return np.where(self.spared | within, 0.0, worst)
 
     def _worst_nearby(self, selection: Selection, value: Floats) -> Flags:
-        """Doubtful points among the worst on each of their photos: one, and as many more as tests took from it."""
+        """Doubtful points among the worst on each of their photos: one, and more where much went or much is left."""
         photo, point = self.problem.images.photo[selection.images], self.problem.images.point[selection.images]
-        more = np.bincount(self.problem.images.photo[self.begin & ~selection.images], minlength=self.problem.photos)
+        out = self.problem.images.photo[self.begin & ~selection.images]
+        more = np.bincount(out, minlength=self.problem.photos)
+        more += np.bincount(photo, minlength=self.problem.photos) // RAYS_TO_ONE_MORE
         order = np.lexsort((-value[point], photo))
         worse = np.arange(len(order)) - np.searchsorted(photo[order], photo[order])
         wait = point[order[worse > more[photo[order]]]]
