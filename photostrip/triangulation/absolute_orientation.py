@@ -227,15 +227,9 @@ def lay(
     return Laid(similarity, _scaled_design(plain, root), iteration)
 
 
-def orient(
-    strip: Floats,
-    targets: Targets,
-    weight: Floats,
-    reach: Floats | None = None,
-    watch: Callable[[Similarity, Floats], None] | None = None,
-) -> AbsoluteOrientation:
+def orient(strip: Floats, targets: Targets, weight: Floats, reach: Floats | None = None) -> AbsoluteOrientation:
     """Lay the strip on its control, and say how well it fits."""
-    laid = lay(strip, targets, weight, reach, watch)
+    laid = lay(strip, targets, weight, reach)
     misclosures = targets.misclosures(laid.similarity(strip))
     values = np.linalg.svd(laid.design, compute_uv=False)
     redundancy = int(targets.control.use.sum()) - PARAMETERS

@@ -26,19 +26,18 @@ LEAST_REDUNDANCY = 3  # below it a standard deviation from the residuals is most
 RANK_TOLERANCE = 5e-3  # of the singular values of the scaled columns: below it x² is as good as a multiple of x
 
 
-def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float, measured: ArrayLike = 0.0) -> Floats:
-    """Return the quantity c, mm, that all errors of a point go through (eq. 10.8).
+def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float) -> Floats:
+    """Return the quantity c, mm, that errors of the elements go through (eq. 10.8, without that of the x parallax).
 
     xy: (n, 2), x and y.
     elements: (..., 5), errors of the elements, radians. A constant f (dalpha2' - dalpha1') is left out of c, which is
         scale and height datum only.
-    measured: error dp of the x parallax, mm.
     """
     x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
     al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
     right = x - base
     turned = (right**2 * al2 - x**2 * al1 + right * y * om2) / focal
-    return np.asarray(turned - y * (ka2 - ka1) - np.asarray(measured, float), float)
+    return np.asarray(turned - y * (ka2 - ka1), float)
 
 
 class Constants(NamedTuple):

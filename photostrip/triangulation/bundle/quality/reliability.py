@@ -57,13 +57,13 @@ class Group:
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(self.sigma[at] * shift / np.sqrt(np.maximum(self.redundancy[at], 0.0)), float)
 
-    def external(self, shift: float, at: tuple[int, int] | EllipsisType = ...) -> Floats:
+    def external(self, shift: float) -> Floats:
         """How far an error that is just not found can move any coordinate, in its standard deviations.
 
         ``shift sqrt((1 - r) / r)``, (n, k): no coordinate, and no function of coordinates, moves by more.
         Source: [Baarda 1968].
         """
-        r = np.clip(self.redundancy[at], 0.0, 1.0)
+        r = np.clip(self.redundancy, 0.0, 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(shift * np.sqrt((1.0 - r) / r), float)
 
