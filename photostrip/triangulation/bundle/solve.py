@@ -66,6 +66,11 @@ def solve(problem: BundleProblem, *, rough: bool = False) -> BundleSolution:
 
 
 def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> tuple[Parameters, tuple[IterationStep, ...]]:
+    """Step until the next step would be short enough.
+
+    Where the sum of squares grows, the step is taken back and the diagonal of the normal equations raised, more each
+    time; where it falls again, less. Source: [Marquardt 1963].
+    """
     start = prepared.problem.start
     state = parameters_from(prepared, start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
     damping, steps = 0.0, []
@@ -192,6 +197,7 @@ def _recorded(reduced: Reduced, move: ParameterStep, damping: float) -> Iteratio
 def _solution(
     prepared: PreparedProblem, state: Parameters, steps: tuple[IterationStep, ...], *, free: bool
 ) -> BundleSolution:
+    """Find the residuals of all observations at the end, in their units, and the weighted sum of their squares."""
     problem, structure = prepared.problem, prepared.structure
     residuals = np.zeros((len(problem.images), 2))
     table, chi_square = prepared.table(state), 0.0
@@ -223,6 +229,10 @@ def _solution(
 
 
 def _redundancy(prepared: PreparedProblem, *, free: bool) -> int:
+    """Observations, priors among them, minus unknowns: six of a photo, three of a point with rays, and those in common.
+
+    A free network has seven unknowns less, those of its datum.
+    """
     problem = prepared.problem
     observed = np.zeros(problem.points, bool)
     observed[problem.images.point] = True

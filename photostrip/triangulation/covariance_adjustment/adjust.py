@@ -122,6 +122,12 @@ class StripOnControl:
 
 
 def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdjustment:
+    """Distribute the misclosures by prediction, and form the strip anew where that turns it too far.
+
+    Derivatives are those of the strip as it was formed: a correction that turns it by an angle leaves an error of the
+    order of its square in the image. While that is more than a part of the scatter of image coordinates, the strip is
+    formed of corrected image coordinates, and what is left is distributed.
+    """
     factor, basis = image_variance(start.orientation, start.sigma)
     one, formations = _solved(start, np.zeros((len(start.errors.images.row), 2)), settings, factor), 1
     turn = rate = relinearisation.largest_turn(one.system)

@@ -137,6 +137,11 @@ class Sums(NamedTuple):
 
 
 def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Sums:
+    """Sum rows with weights, ``operator`` (t, k): what goes through error components, and what enters directly.
+
+    Both parts depend on the same image coordinates: ``images`` are the covariances between them, D_direct D_comp^T,
+    model by model, of the image points on the photos around it.
+    """
     images = errors.images
     by_component = _summed_components(errors, rows, operator.T)
     image, entry = np.unique(rows.image, return_inverse=True)
@@ -235,6 +240,7 @@ class NearImages(NamedTuple):
 
     @classmethod
     def of(cls, errors: StripErrors, rows: ErrorRows) -> Self:
+        """Lay the image points of each row out by photo and place, so that products need no loop over rows."""
         n, slots, size, _ = rows.by_component.shape
         photos = slots + 1
         photo = errors.images.photo[rows.image] - rows.first[rows.item]

@@ -55,6 +55,7 @@ class _Ends(NamedTuple):
 
 
 def _ends(strip: PlacedStrip) -> _Ends:
+    """Order the image points of each point along the flight; its place is the middle between the outermost two rays."""
     orientation, images = strip.orientation, strip.images
     xy, point = np.zeros((len(images.row), 2)), np.zeros(len(images.row), np.intp)
     place = images.rows_of(orientation.rows)

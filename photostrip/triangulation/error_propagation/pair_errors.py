@@ -73,6 +73,7 @@ class _Turns(NamedTuple):
 
 
 def _turns(elements: Floats) -> tuple[_Turns, _Turns]:
+    """Rotations of left and right photos to the base, and their rates by alpha1, kappa1; alpha2, omega2, kappa2."""
     al1, ka1, al2, om2, ka2 = elements.T
     zero = np.zeros_like(al1)
     left = _Turns(

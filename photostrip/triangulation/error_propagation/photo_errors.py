@@ -67,6 +67,12 @@ def _some_photos(
     influence: Callable[[Numbers], Floats],
     distance: float,
 ) -> PhotoErrors:
+    """Differentiate the resections of photos that have sightings: o = sum over their points of by.point times its row.
+
+    The points of a photo lie side by side, (k, 6, 3 most), so that their rows are summed by products of matrices:
+    similarities at once, components model by model. Beyond the first model of the photo a point's similarity is that of
+    the first, and a step for each model between.
+    """
     photos, starts, item = np.unique(sightings.photo, return_index=True, return_inverse=True)
     place = np.arange(len(item)) - starts[item]  # among the sightings of the photo
     by = _resected(sightings, resection, item, place, distance)

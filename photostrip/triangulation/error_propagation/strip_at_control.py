@@ -59,6 +59,7 @@ class StripAtControl:
         return [(rows, self._section(rows)) for rows in parts] if len(parts) > 1 else [(np.sort(order), self)]
 
     def _section(self, rows: Numbers) -> StripAtControl:
+        """Return the strip at some of its control points, numbered anew; covariances stay those of the whole strip."""
         place = np.full(len(self.control), -1)
         place[rows] = np.arange(len(rows))
         inside = np.flatnonzero(place[self.coordinates.point] >= 0)

@@ -79,6 +79,7 @@ def solve(
 
 
 def _distances(distances: Sequence[tuple[str, str, float]], names: list[str]) -> tuple[Numbers, Floats]:
+    """Return the marks at both ends of each distance, (d, 2), and the distances; unknown marks are refused."""
     faults = []
     for number, (first, second, _) in enumerate(distances):
         unknown = [name for name in (first, second) if name not in names]

@@ -176,6 +176,11 @@ def _parts(prepared: PreparedProblem) -> list[Numbers]:
 
 
 def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held:
+    """Find what control, given positions and attitudes say of the seven motions of a part of the network as a whole.
+
+    ``normal`` is their information J^T P J, with offsets and drifts of the positions eliminated. Shifts count in radii
+    of the part, rotations in radians, the scale as its logarithm, so that each moves the rim alike.
+    """
     problem = prepared.problem
     inside = np.zeros(problem.photos, bool)
     inside[photos] = True
@@ -222,6 +227,10 @@ def _information(linear: LinearisedOrientations, moves: Floats, inside: Flags, p
 
 
 def _moves(state: Parameters, held: Held, loose: Floats) -> str:
+    """Name undetermined motions ``loose`` (7, k), orthonormal columns.
+
+    Named are the motions a surveyor knows of which nearly all lies among them; if there is none, the nearest.
+    """
     flight, across, up = _flight_axes(state, held.photos)
     line = _line(held.control)
     zero = np.zeros(3)

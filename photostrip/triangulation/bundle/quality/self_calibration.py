@@ -80,6 +80,10 @@ def image_shift(problem: BundleProblem, common: Floats, xy: Floats, photo: Numbe
 
 
 def parameters_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Parameter, ...]:
+    """Test whether each parameter is there at all: t = value / standard deviation, with the redundancy of the bundle.
+
+    ``redundancy`` of a parameter with a prior: the part of it that the rays decide.
+    """
     sigma = problem.cameras.sigma
     if sigma is None:
         return ()
