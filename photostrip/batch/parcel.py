@@ -39,7 +39,9 @@ def pack(path: Path, overrides: Sequence[str] = ()) -> Parcel:
     if root is None:  # cannot be: read_tree() had a reason, and stop() raised it
         raise InputError(f"{path} cannot be read")
     grids = {name for node in _values(root, "crs") for name in grid_names(node.text)}
-    found = {name: path.parent / name for name in sorted(grids) if _travels(name) and (path.parent / name).is_file()}
+    # grids elsewhere than below the project's folder must be on every machine
+    below = (name for name in sorted(grids) if not Path(name).is_absolute() and ".." not in Path(name).parts)
+    found = {name: path.parent / name for name in below if (path.parent / name).is_file()}
     return Parcel(files, {name: grid.read_bytes() for name, grid in found.items()}, str(Path.cwd()))
 
 
@@ -48,11 +50,6 @@ def unpack_grids(parcel: Parcel, folder: Path) -> None:
     for name, data in parcel.grids.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(data)
-
-
-def _travels(grid: str) -> bool:
-    """Whether a grid file stands below the project's folder; others must be on every machine."""
-    return not Path(grid).is_absolute() and ".." not in Path(grid).parts
 
 
 def _values(node: Node, key: str) -> Iterator[Node]:

@@ -41,7 +41,7 @@ def verification_headline(document: Document) -> str:
 def _differences(document: Document) -> list[str]:
     found = ["the numbers of the result are not those of its certificate: it was edited"] if document["edited"] else []
     for state in ("changed", "missing"):
-        names = [each["file"] for each in _files(document) if each["state"] == state]
+        names = [each["file"] for each in (*document["inputs"], *document["grids"]) if each["state"] == state]
         found += [f"{state}: {listed(names)}"] if names else []
     if document["refused"]:
         found.append(f"the project cannot be adjusted any more: {document['refused']}")
@@ -53,10 +53,6 @@ def _differences(document: Document) -> list[str]:
     elif document["words"]:
         found.append(f"the result made again differs in {listed(document['words'])}")
     return found
-
-
-def _files(document: Document) -> list[Document]:
-    return [*document["inputs"], *document["grids"]]
 
 
 def _remarks(document: Document) -> list[str]:

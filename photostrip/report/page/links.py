@@ -19,8 +19,8 @@ def link(sections: list[Document]) -> None:
     A finding is an item of a list that has names; its rows are those of tables whose first cell has one of these.
     """
     findings: dict[Name, list[Document]] = {}
-    numbered = (item for item in _items(sections) if item["names"])
-    for number, item in enumerate(numbered, 1):
+    lists = (part["items_"] for each in sections for part in each["parts"] if part["kind"] == "list")
+    for number, item in enumerate((item for items in lists for item in items if item["names"]), 1):
         item.update(id=f"finding-{number}", number=number)
         for name in item["names"]:
             findings.setdefault(name, []).append(item)
@@ -44,10 +44,6 @@ def link(sections: list[Document]) -> None:
 def _lead(links: list[Document], to: str, words: str) -> None:
     if len(links) < MOST_LINKS:
         links.append({"id": to, "words": words})
-
-
-def _items(sections: list[Document]) -> Iterator[Document]:
-    return (item for each in sections for part in each["parts"] if part["kind"] == "list" for item in part["items_"])
 
 
 def _rows(section: Document) -> Iterator[tuple[Document, Name]]:

@@ -45,7 +45,9 @@ def fiducials_section(document: Document, *, everything: bool) -> Section:
         for mark, vx, vy in zip(row["marks"], row["vx_um"], row["vy_um"], strict=True)
     ]
     photos, note = worst_first(rows, _largest, ("photos", "fiducials", "fiducials"), everything=everything)
-    shown, rest = worst_first(marks, _length, ("marks", "fiducials", "fiducials"), everything=everything)
+    shown, rest = worst_first(
+        marks, lambda mark: hypot(mark["vx"], mark["vy"]), ("marks", "fiducials", "fiducials"), everything=everything
+    )
     shapes = (
         words("photo", "photo"),
         words("transformation", "transform"),
@@ -88,10 +90,6 @@ def _coefficient(term: int) -> Callable[[tuple[Document, int]], float]:
 
 def _largest(row: Document) -> float:
     return max((hypot(vx, vy) for vx, vy in zip(row["vx_um"], row["vy_um"], strict=True)), default=0.0)
-
-
-def _length(mark: Document) -> float:
-    return hypot(mark["vx"], mark["vy"])
 
 
 def adjustment_of(document: Document) -> str:

@@ -48,7 +48,9 @@ def statement_document(
     if result_hash(document) != document["certificate"]["result_sha256"]:
         message = "its numbers are not those of its certificate: it was edited, no accuracy can be stated"
         raise InputError(Fault(message, "result-edited", file, fix=fix))
-    block = stated({**document["statement"], "reasons": _own(document["statement"]["reasons"])}, wanted)
+    # reasons that depend on the class are found anew for the class that is claimed
+    reasons = [each for each in document["statement"]["reasons"] if each["code"] != "statement-survey"]
+    block = stated({**document["statement"], "reasons": reasons}, wanted)
     if block["status"] == REFUSED:
         raise InputError(_fault(each, file) for each in block["reasons"])
     classes = None if profile is None else classified(block, profile)
@@ -89,11 +91,6 @@ FIGURES = ("plan", "height", "space", "axes", "circle", "line", "not_measured")
 def exit_code(status: str) -> int:
     """Exit code of a statement: 0 when the class was tested as the standard asks, otherwise 1."""
     return EXIT_DONE if status == TESTED else EXIT_TOLERANCE
-
-
-def _own(reasons: list[Document]) -> list[Document]:
-    """Leave out the reasons that depend on the class: they are found anew for the class that is claimed."""
-    return [each for each in reasons if each["code"] != "statement-survey"]
 
 
 def _fault(reason: Document, file: str) -> Fault:

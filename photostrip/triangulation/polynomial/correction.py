@@ -137,7 +137,8 @@ def decide(
         if forced:
             accepted = number == len(candidates) - 1
         else:
-            accepted = number == 0 or _is_justified(p, left_out[number], left_out[against])
+            # asked for by the F test, and by left-out points that more terms predict better
+            accepted = number == 0 or (p < LEVEL and left_out[number] < left_out[against])
         chosen = number if accepted else chosen
         of_group = [fits[number][axis] for axis in axes]
         residuals = np.concatenate([a.residuals[_counted(problem, k)] for k, a in zip(axes, of_group, strict=True)])
@@ -157,11 +158,6 @@ def decide(
             )
         )
     return candidates[chosen], evidence
-
-
-def _is_justified(p: float, rich: float, simple: float) -> bool:
-    """Whether more terms are justified: by the F test, and by left-out points that they predict better."""
-    return p < LEVEL and rich < simple
 
 
 def _expected(problem: FitProblem) -> Floats:
