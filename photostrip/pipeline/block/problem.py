@@ -29,7 +29,7 @@ from photostrip.triangulation.bundle.quality.self_calibration import sigmas
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 
-FAR_FROM_RAY = 10.0  # times the median: a ray of no pair that misses its point by more waits outside at first
+FAR_FROM_RAY = 5.0  # times the median: a ray of no pair that misses its point by more waits outside at first
 LEAST_FAR = 50.0  # in standard deviations
 NO_CORRECTION, DRIFT, BLOCK = "none", "drift", "block"
 

@@ -25,6 +25,7 @@ from photostrip.pipeline.block.datum import (
     datum,
     join_waiting,
 )
+from photostrip.pipeline.block.problem import LEAST_FAR
 from photostrip.pipeline.common_points import compared_strips, mean_points
 from photostrip.pipeline.given_points import cartesian_of
 from photostrip.pipeline.inputs import Inputs, Settings
@@ -238,11 +239,12 @@ def _single(photo: str, focal: float, points: Floats, observations: PhotoPoints,
     xy, xyz = observations.xy[rows], points[observations.point[rows]]
     if photo in known.orientations:
         given = known.orientations[photo]
-        found = _resected(xy, xyz, focal, given)
+        most = LEAST_FAR * float(observations.sigma[rows].max(initial=0.0))
+        found = _resected(xy, xyz, focal, given, most)
         if found.solved:
             return found
         try:  # a given orientation that is too far off
-            found = _resected(xy, xyz, focal, approximate(xy, xyz, focal))
+            found = _resected(xy, xyz, focal, approximate(xy, xyz, focal), most)
         except GeometryError:
             return _SingleStart(*given, solved=False)
         return found if found.solved else _SingleStart(*given, solved=False)
@@ -257,14 +259,16 @@ def _single(photo: str, focal: float, points: Floats, observations: PhotoPoints,
     return _resected(xy, xyz, focal, begin)._replace(solved=True)
 
 
-def _resected(xy: Floats, points: Floats, focal: float, begin: tuple[Floats, Floats]) -> _SingleStart:
-    """Resect one photo; not solved either where it would look away from its points."""
+def _resected(
+    xy: Floats, points: Floats, focal: float, begin: tuple[Floats, Floats], most: float = np.inf
+) -> _SingleStart:
+    """Resect one photo; not solved either where it would look away from its points, or leave `most` mm rms of them."""
     one = np.zeros(len(xy), np.intp)
     with np.errstate(all="ignore"):  # a start far off sends the iteration anywhere
         found = resect(xy, points, one, KnownPhotos(begin[0][None], begin[1][None], np.array([focal])))
     center, rotation = found.centers[0], found.rotations[0]
     before = bool((((points - center) @ rotation)[:, 2] < 0).all())
-    return _SingleStart(center, rotation, solved=bool(found.solved[0]) and before)
+    return _SingleStart(center, rotation, solved=bool(found.solved[0] and found.rms[0] < most) and before)
 
 
 def _rest(

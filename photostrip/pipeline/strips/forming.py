@@ -9,7 +9,7 @@ from typing import Any
 from photostrip.errors import GeometryError
 from photostrip.frozen import replace
 from photostrip.pipeline import overruling
-from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.refusals import require_adjustment_of_models
 from photostrip.pipeline.strips.absolute import StripStage
 from photostrip.pipeline.strips.photos import FormedPhotos, form_strip
@@ -48,16 +48,25 @@ def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings, s
 def as_single_photos(inputs: Inputs, settings: Settings, refused: GeometryError) -> Inputs | None:
     """Cut the strip that a refusal is about into single photos, which a bundle starts from their given orientations.
 
-    None where these are not given for all of them, the bundle rejects nothing, or the strip's positions share an error.
+    A bundle that diverges names none: then all strips are cut.
+
+    None where orientations are not given for all photos, the bundle rejects nothing, or positions of a strip share an
+    error.
     """
-    given, positions = inputs.orientations, inputs.positions
-    named = set(refused.photos)
-    strip = next((strip for strip in inputs.strips if named and named <= set(strip.photos)), None)
-    if strip is None or given is None or len(strip.photos) < 2 or not set(strip.photos) <= set(given.photos):
+    positions, named = inputs.positions, set(refused.photos)
+    known = set() if inputs.orientations is None else set(inputs.orientations.photos)
+    several = [strip for strip in inputs.strips if len(strip.photos) > 1 and named <= set(strip.photos)]
+    if not several or not (named or refused.code == "bundle-diverged"):
+        return None
+    if not all(known.issuperset(strip.photos) for strip in several):
         return None
     if settings.adjustment != "bundle" or "none" in {settings.bundle.screening, settings.relative.screening}:
         return None
     if positions is not None and positions.correction != "none" and positions.group == "strip":
         return None
-    singles = (replace(strip, id=f"{strip.id}/{photo}", photos=(photo,)) for photo in strip.photos)
-    return replace(inputs, strips=tuple(chain(*([each] if each is not strip else singles for each in inputs.strips))))
+
+    def cut(strip: Strip) -> list[Strip]:
+        singles = [replace(strip, id=f"{strip.id}/{photo}", photos=(photo,)) for photo in strip.photos]
+        return singles if strip in several else [strip]
+
+    return replace(inputs, strips=tuple(chain(*map(cut, inputs.strips))))
