@@ -55,10 +55,11 @@ def beside_json(document: Document, resolved: str, refined: str) -> dict[str, st
 def refined_csv(result: Result) -> str:
     """Return refined.csv: the ideal image coordinates of all points; empty for independent models."""
     found = refined_rows(result)
-    if not found["photo"]:
+    if not len(found["x_mm"]):
         return ""
     listed = tables.refined_csv()
-    return _written(listed, [_cells(column.quantity, found[column.key]) for column in listed])
+    ids = [_cells(column.quantity, names)[:, number] for column in listed[:2] for names, number in [found[column.key]]]
+    return _written(listed, ids + [_cells(column.quantity, found[column.key]) for column in listed[2:]])
 
 
 def rejected_csv(document: Document) -> str:

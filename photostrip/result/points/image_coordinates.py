@@ -42,7 +42,8 @@ def fiducials_of(result: Result) -> Document:
 def refined_rows(result: Result) -> Document:
     """Return the columns of refined.csv, photos in flight order and points in natural order; of models there are none.
 
-    The coordinates are those that the adjustment takes, corrected by a calibration where a bundle has found one.
+    Ids stand once, with the number of each row's. The coordinates are those that the adjustment takes, corrected by a
+    calibration where a bundle has found one.
     """
     found = result.refined.observations
     place = {photo: number for number, photo in enumerate(p for strip in result.inputs.strips for p in strip.photos)}
@@ -50,10 +51,10 @@ def refined_rows(result: Result) -> Document:
     rows = np.lexsort((natural_rank(found.point_ids)[found.point], order[found.photo]))
     sigma: Floats = found.sigma[rows] * MICROMETRES
     return {
-        "photo": [found.photo_ids[number] for number in found.photo[rows].tolist()],
-        "point": [found.point_ids[number] for number in found.point[rows].tolist()],
-        "x_mm": found.xy[rows, 0].tolist(),
-        "y_mm": found.xy[rows, 1].tolist(),
-        "sigma_x_um": sigma[:, 0].tolist(),
-        "sigma_y_um": sigma[:, 1].tolist(),
+        "photo": (found.photo_ids, found.photo[rows]),
+        "point": (found.point_ids, found.point[rows]),
+        "x_mm": found.xy[rows, 0],
+        "y_mm": found.xy[rows, 1],
+        "sigma_x_um": sigma[:, 0],
+        "sigma_y_um": sigma[:, 1],
     }
