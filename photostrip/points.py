@@ -99,11 +99,7 @@ class PhotoPoints:
 
     def places(self, photos: Sequence[str]) -> Numbers:
         """Place of the photo of every image point among some photos; -1 for the others."""
-        place = np.full(len(self.photo_ids), -1, np.intp)
-        for at, name in enumerate(photos):
-            if name in self.photo_index:
-                place[self.photo_index[name]] = at
-        return place[self.photo]
+        return np.asarray(locate(self.photo_ids, photos)[self.photo], np.intp)
 
 
 @dataclass(frozen=True, eq=False)
