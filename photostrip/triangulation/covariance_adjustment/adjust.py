@@ -70,7 +70,7 @@ class CovarianceAdjustment:
     @cached_property
     def photos(self) -> Floats:
         """Covariances (m, 6, 6) of centre and small rotation of the photos, metres^2 and radians^2."""
-        return prediction.covariances(self.system, prediction.photo_rows(self.system.errors)) * self.factor
+        return prediction.photo_covariances(self.system) * self.factor
 
     def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
         """Return what errors of control coordinates subtract from points.

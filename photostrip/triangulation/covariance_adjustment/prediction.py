@@ -79,10 +79,25 @@ def covariances(found: system.System, rows: ErrorRows) -> Floats:
     order = np.argsort(rows.first, kind="stable")
     columns = _Columns.of(found, rows.take(order))
     known = np.zeros((*rows.by_similarity.shape[:2], rows.by_similarity.shape[1]))
-    for block in columns.blocks(range(found.layout.blocks)):
+    first, last = columns.rows.first[[0, -1]].tolist() if len(order) else (0, -1)
+    for block in columns.blocks(range(first // found.layout.width, last // found.layout.width + 1)):
         columns.explain(block, known)
     left = local_covariances(found.errors, columns.rows, columns.near) - known
     return np.asarray(left[np.argsort(order, kind="stable")], float)
+
+
+def photo_covariances(found: system.System) -> Floats:
+    """Covariances (m, 6, 6) of photos, as ``covariances`` gives them: all but the last move with their model alone.
+
+    Their columns lie in their own block: the block of the inverse on the diagonal says all.
+    """
+    rows, layout, models = photo_rows(found.errors), found.layout, np.arange(found.errors.models)
+    by_unknowns = rows.by_similarity[:-1] @ found.conditions.local.to_common
+    unknown = layout.unknown[:, None] + np.arange(SIMILARITY_PARAMETERS)
+    block = (models // layout.width)[:, None, None]
+    cofactors = found.factors.diagonal_of_inverse[block, unknown[:, :, None], unknown[:, None]]
+    of_models = -by_unknowns @ cofactors @ by_unknowns.transpose(0, 2, 1)
+    return np.concatenate([of_models, covariances(found, rows.take(models[-1:] + 1))])
 
 
 def photo_rows(errors: StripErrors) -> ErrorRows:
