@@ -2,7 +2,8 @@
 
 Two documents of results and ``tolerances`` come in, one plain document goes out (``comparison``). ``quantities`` finds
 the numbers, each with its kind, id and unit; ``ground`` says how far two points are apart in plan and in height;
-``members`` compares ids, choices, rejections and findings as sets.
+``members`` compares ids, choices, rejections and findings as sets; ``truth`` compares a result with what it was
+simulated from.
 """
 
 from photostrip.comparison.comparison import baseline_of, compare_results

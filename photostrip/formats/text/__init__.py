@@ -2,5 +2,6 @@
 
 - ``source``, ``files``: where bytes come from, and everything that can go wrong before the first line;
 - ``table_text``, ``table_reader``, ``tables``: the text of a CSV table, reading it, what it holds;
-- ``numbers``: numbers as users write them; ``findings``: faults and notes, collected; ``writing``: files, whole or not.
+- ``numbers``: numbers as users write them; ``findings``: faults and notes, collected; ``writing``: files, whole or not;
+- ``number_columns``: columns of numbers as text.
 """

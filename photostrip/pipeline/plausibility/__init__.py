@@ -4,5 +4,7 @@ In come the inputs and settings of a run, or its result; out come findings (``tr
 tests stand in ``triangulation.plausibility``; here is what they are asked about: ``image_evidence`` the image
 coordinates alone, ``base_directions`` the order of photos by relative orientation, ``evidence`` and ``model_evidence``
 strips formed for evidence alone and given points in them, ``given_control`` and ``given_cameras`` what is given on the
-ground, ``distance_trial`` strips formed anew with other principal distances. Nothing here changes what is adjusted.
+ground, ``distance_trial`` strips formed anew with other principal distances, ``control_layout`` where control lies,
+``shared_control`` and ``shared_errors`` what control, or all camera positions, have in common, ``slips`` what the
+adjustment predicts of given coordinates. Nothing here changes what is adjusted.
 """

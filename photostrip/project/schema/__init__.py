@@ -2,5 +2,5 @@
 
 - ``values``: single values, from text to type, and what is wrong with them;
 - ``cameras``, ``measurements``, ``ground``, ``processing``: the blocks of the project file;
-- ``project_file``: the whole of it.
+- ``project_file``: the whole of it; ``sections``: how mappings are read, with all that is wrong in them.
 """

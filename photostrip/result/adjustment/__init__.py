@@ -1,4 +1,4 @@
-"""Blocks of the document about adjustments: strips, pairs, links, rejections, the covariance and the bundle.
+"""Blocks about adjustments: strips, pairs, junctions, links, what was rejected, choices, covariance and bundle.
 
 Each module turns the stages of a ``StripResult`` or of the bundle into records of its blocks: millimetres of the image
 become micrometres, radians degrees, and discrepancies are carried to the ground by the similarity of the strip.

@@ -4,7 +4,7 @@ In come the errors of a strip (``error_propagation``) and its control; out come 
 their covariances, and tests of the whole and of every control coordinate. ``conditions`` collects junctions, control
 and distances of pass points, ``system`` puts them into a banded system that ``block_tridiagonal`` eliminates,
 ``prediction`` reads points, photos and tests from it, ``relinearisation`` forms a long strip again where it has turned
-too much.
+too much, ``left_out`` takes control out without eliminating again; ``adjust`` goes through all of it.
 
 Source: derived; docs/precision.md, eq. 7.
 """

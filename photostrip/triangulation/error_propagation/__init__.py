@@ -3,8 +3,9 @@
 In come the stages of a strip (pairs, formed strip, similarity, polynomials, photos); out come its errors as sparse rows
 of derivatives by the image coordinates, and their covariances. ``pair_errors`` differentiates relative orientation and
 intersection, ``strip_errors`` and ``non_neighbour_errors`` the formation of the strip, ``control_errors`` the fit to
-the control, ``photo_errors`` the resection; ``covariances`` multiplies the rows (law of propagation: C = D D^T), and
-``strip_at_control`` is what the control is tested with.
+the control, ``photo_errors`` the resection; ``covariances`` multiplies the rows (``derivatives``; law of propagation: C
+= D D^T), ``joint_covariances`` those of single coordinates; ``strip_at_control`` is what the control is tested with,
+``check_errors`` what check points are.
 
 Source: derived for [001] eq. 126-151; the equations (1) to (7) stand in docs/precision.md.
 """
