@@ -22,7 +22,7 @@ from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
-from photostrip.geometry.similarity import Similarity, collinearity, similarity_derivatives
+from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import listed
 from photostrip.points import ControlPoints
 
@@ -347,8 +347,15 @@ def _motion(reach: Floats | None, center: Floats, half: float) -> Floats:
     """Triangular root of the matrix that gives the mean square motion of the strip's points from seven parameters."""
     if reach is None:
         return np.eye(PARAMETERS)
-    flat = similarity_derivatives((reach - center) / half, np.zeros(3)).reshape(-1, PARAMETERS)
-    return np.asarray(np.linalg.cholesky(flat.T @ flat / len(reach) + 1e-15 * np.eye(PARAMETERS)), float)
+    arm = (reach - center) / half
+    middle, moments = arm.mean(axis=0), arm.T @ arm / len(arm)
+    square = np.eye(PARAMETERS)  # of the derivatives by shift, rotation and scale: 1, -[a], a
+    square[3:6, :3], square[6, :3] = cross_matrix(middle), middle
+    square[3:6, 3:6] *= np.trace(moments)
+    square[3:6, 3:6] -= moments
+    square[6, 6] = np.trace(moments)
+    # takes what lies below the diagonal
+    return np.asarray(np.linalg.cholesky(square + 1e-15 * np.eye(PARAMETERS)), float)
 
 
 def _scaled_design(design: Floats, root: Floats) -> Floats:
