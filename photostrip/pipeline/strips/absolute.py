@@ -201,9 +201,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
     found = oriented.misclosures
     moved = similarity_derivatives(oriented.at_control[found.point], oriented.at_control.mean(axis=0))
     place = StripAtControl(
-        control=control,
-        frames=oriented.frames,
-        intermediate=oriented.intermediate,
+        targets=oriented.targets,
         xyz=stage.formed.xyz[oriented.control_rows],
         similarity=oriented.absolute.similarity,
         weight=oriented.weights,

@@ -9,8 +9,6 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass, replace
-from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
@@ -32,9 +30,7 @@ class ControlRay(NamedTuple):
 class StripAtControl:
     """Where a strip, or a section of it, stands when its control is tested."""
 
-    control: ControlPoints
-    frames: Sequence[GroundFrame]
-    intermediate: IntermediateFrame
+    targets: Targets  # the control
     xyz: Floats  # (n, 3): strip coordinates of the control points
     similarity: Similarity  # into the intermediate frame, metres
     weight: Floats  # (n, 3): weights of their coordinates in the similarity
@@ -43,6 +39,10 @@ class StripAtControl:
     design: Floats  # (w, 7): their derivatives by a similarity
     covariance: Callable[[Numbers], Floats]  # of some of them, strip and control together, (w, w), metres^2
     share: float  # of a section in the coordinates of the whole strip
+
+    @property
+    def control(self) -> ControlPoints:
+        return self.targets.control
 
     @cached_property
     def placed(self) -> Floats:
@@ -65,7 +65,7 @@ class StripAtControl:
         inside = np.flatnonzero(place[self.coordinates.point] >= 0)
         return replace(
             self,
-            control=self.control.take(rows),
+            targets=replace(self.targets, control=self.control.take(rows)),
             xyz=self.xyz[rows],
             weight=self.weight[rows],
             rays=[ray._replace(point=int(place[ray.point])) for ray in self.rays if place[ray.point] >= 0],
@@ -83,12 +83,14 @@ class StripAtControl:
         """Lay the strip on what is kept: a wrong point of 200 m turns it, and its rays, by a hundredth."""
         found, axes = self.coordinates, np.zeros((*kept.shape, 3))
         axes[found.point, found.axis] = found.direction  # PROJ would take half of the time of the screening for them
-        used = Targets(replace(self.control, use=kept), self.frames, self.intermediate)
-        laid = absolute_orientation.lay(self.xyz, used, np.where(kept, self.weight, 0.0), known=axes)
+        targets = self.targets
+        if kept is not self.control.use:
+            targets = replace(targets, control=replace(self.control, use=kept))
+        laid = absolute_orientation.lay(self.xyz, targets, np.where(kept, self.weight, 0.0), known=axes)
         return replace(self, similarity=laid.similarity)
 
     def misclosures(self, control: ControlPoints | None = None) -> Floats:
         """Strip minus given (w,), metres along the ground axes; control: other coordinates than the given ones."""
-        given = Targets(control or self.control, self.frames, self.intermediate).of(self.placed)
+        given = (replace(self.targets, control=control) if control else self.targets).of(self.placed)
         found = self.coordinates
         return np.asarray(np.einsum("wi,wi->w", found.direction, (self.placed - given)[found.point]), float)

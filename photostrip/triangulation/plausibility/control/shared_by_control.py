@@ -86,7 +86,7 @@ def _relief(strip: StripAtControl, w: Floats) -> Floats:
     height, place = strip.placed[:, HEIGHT].copy(), strip.coordinates
     rows = np.flatnonzero(place.axis == HEIGHT)
     height[place.point[rows]] -= w[rows]
-    if strip.frames[0].kind != "local":
+    if strip.targets.frames[0].kind != "local":
         d = strip.placed[:, :HEIGHT] - strip.placed[:, :HEIGHT].mean(axis=0)
         height += (d**2).sum(axis=1) / (2.0 * EARTH_RADIUS)
     return np.asarray(height - height.mean(), float)

@@ -21,6 +21,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.result.document import document_of
+from photostrip.triangulation.absolute_orientation import Targets
 from photostrip.triangulation.error_propagation import strip_at_control
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
@@ -79,9 +80,7 @@ def drawn(seed: int, points: int = 8, worse: float = 1.0) -> Drawn:
         frame=np.zeros(points, np.intp),
     )
     return Drawn(
-        control=control,
-        frames=(),
-        intermediate=nothing,
+        targets=Targets(control, (), nothing),
         xyz=rng.uniform(-1, 1, (points, 3)),
         similarity=Similarity(1.0, np.eye(3), np.zeros(3)),
         weight=np.ones((points, 3)),
