@@ -123,7 +123,8 @@ def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, c
 
     The origin is the middle of the photo, unless `system` has its own. Rows of other photos than `photos` are left out.
     """
-    rows = np.flatnonzero(np.array([name in photos for name in read.photo_ids], bool)[read.photo])
+    known = np.array([name in photos for name in read.photo_ids], bool)
+    rows = slice(None) if known.all() else np.flatnonzero(known[read.photo])
     owners = [photos.get(name) for name in read.photo_ids]
     scale = _per_photo([_millimetres(system.unit, each) for each in owners], read, rows)
     sigma = _filled(read.sigma[rows], system.sigma)
@@ -155,7 +156,7 @@ def _corner(owner: camera.Camera | None, *, half_pixel: bool) -> tuple[float, fl
     return -owner.format[0] / 2 + shift, owner.format[1] / 2 - shift
 
 
-def _per_photo(values: Sequence[tuple[float, float]], read: Measurements, rows: Numbers) -> Floats:
+def _per_photo(values: Sequence[tuple[float, float]], read: Measurements, rows: Numbers | slice) -> Floats:
     return np.array(values, float).reshape(-1, 2)[read.photo[rows]]
 
 
@@ -168,6 +169,8 @@ def _renumbered(ids: Sequence[str], codes: Numbers) -> tuple[tuple[str, ...], Nu
     first = np.full(len(ids), len(codes))
     first[codes[::-1]] = np.arange(len(codes))[::-1]  # of the rows of an id the first is assigned last, and stays
     order = np.argsort(first, kind="stable")[: np.count_nonzero(first < len(codes))]
+    if np.array_equal(order, np.arange(len(ids))):
+        return tuple(ids), codes
     rank = np.empty(len(ids), np.intp)
     rank[order] = np.arange(len(order))
     return tuple(ids[code] for code in order.tolist()), rank[codes]

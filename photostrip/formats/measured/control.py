@@ -80,7 +80,7 @@ def given_columns(table: Table, name: str, up: int) -> dict[str, Any]:
     meaning = {"xyz": np.ones(3, bool), "xy": ~height, "z": height}
     uses = _uses(table)
     return {
-        "table": table,
+        "table": table.without_numbers(),
         "ids": table.cells(name),
         "xyz": table.columns(*AXES),
         "sigma": table.columns(*SIGMAS),

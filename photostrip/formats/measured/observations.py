@@ -55,14 +55,14 @@ def read_measurements(file: str, findings: Findings, manner: Manner | None = Non
         return None
     target = "mark" if manner.marks else "point"
     read = Measurements(
-        table=table,
+        table=table.without_numbers(),
         photo_ids=table.ids["photo"],
         target_ids=table.ids[target],
         photo=table.codes["photo"],
         target=table.codes[target],
         xy=table.columns("x", "y"),
         sigma=table.columns("sx", "sy"),
-        times=np.ones(len(table), np.intp),
+        times=np.broadcast_to(np.intp(1), len(table)),
     )
     if not manner.has_sigma and not findings.number(file):
         key = "fiducial_measurements.sigma or observations.sigma" if manner.marks else "observations.sigma"

@@ -56,13 +56,19 @@ class Table:
         return self.numbers[name] if name in self.numbers else np.full(len(self), np.nan)
 
     def columns(self, *names: str) -> Floats:
-        """Return columns of numbers side by side, shape (n, number of names)."""
+        """Return columns of numbers side by side, shape (n, number of names); not to be written into."""
+        if self.numbers.keys().isdisjoint(names):
+            return np.broadcast_to(np.nan, (len(self), len(names)))
         return np.column_stack([self.column(name) for name in names])
 
     def cells(self, name: str) -> list[str]:
         """Return a column of ids, or of words, row by row."""
         ids = self.ids[name]
         return [ids[code] for code in self.codes[name]]
+
+    def without_numbers(self) -> Table:
+        """Return the table without its numbers, where they are kept elsewhere."""
+        return replace(self, numbers={})
 
     def take(self, rows: Numbers) -> Table:
         numbers = {name: each[rows] for name, each in self.numbers.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from math import erfc, sqrt
 
 import numpy as np
@@ -193,8 +194,8 @@ def control_of(result: Result, found: Differences) -> Records:
     columns = {
         "id": list(control.ids),
         "role": ["check" if check else "control" for check in control.check.tolist()],
-        "use": [_use(counts) for counts in control.use.tolist()],
-        "rejected": [_use(out) if any(out) else "" for out in found.rejected.tolist()],
+        "use": [_use(*counts) for counts in control.use.tolist()],
+        "rejected": [_use(*out) if any(out) else "" for out in found.rejected.tolist()],
         "measured": result.control_rows >= 0,
         **size_columns(found.axes, found.plan, found.height, found.scale),
         "sigma": _in_list_order(result, control.sigma),
@@ -216,9 +217,9 @@ def _in_list_order(result: Result, enu: Floats) -> Floats:
     return columns
 
 
-def _use(counts: list[bool]) -> str:
+@cache  # one text for thousands of points
+def _use(east: bool, north: bool, up: bool) -> str:  # noqa: FBT001 (of one kind, in the order of the axes)
     """Return the word of the project file for which coordinates count."""
-    east, north, up = counts
     return f"{'x' if east else ''}{'y' if north else ''}{'z' if up else ''}" or "off"
 
 
