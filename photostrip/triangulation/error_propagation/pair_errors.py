@@ -109,7 +109,8 @@ def elements_by_image(orientation: Orientation) -> Floats:
         by_image = _parallax_by_image(orientation.elements, pairs, *_turns(orientation.elements))
         share = np.einsum("mij,jm->mi", cofactors[pairs.pair], jacobian * pairs.weight)
         found = -share[:, :, None] * by_image[:, None, :]
-    return np.where(orientation.used[:, None, None], found, 0.0)
+    found[~orientation.used] = 0.0
+    return found
 
 
 def _parallax_by_image(elements: Floats, pairs: Pairs, left: _Turns, right: _Turns) -> Floats:

@@ -15,6 +15,9 @@ Source: derived; see docs/precision.md, eq. 2 and 3.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property, partial
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
@@ -50,8 +53,13 @@ class StripErrors:
     steps: Floats
     component_covariances: Floats  # (p, 3, 6, 6): Q, of each model with itself, the next and the one after
     points: ErrorRows
-    pairs: PairErrors
+    make_pairs: Callable[[], PairErrors]
     origin: Floats  # (3,): common origin of all similarities
+
+    @cached_property
+    def pairs(self) -> PairErrors:
+        """Errors inside the pairs, found again: as much memory as a quarter of all else, and not always asked for."""
+        return self.make_pairs()
 
     @property
     def models(self) -> int:
@@ -75,7 +83,9 @@ def differentiate_strip(
     """
     rotations = similarity.rotation @ formed.rotations
     across = formed.rotations[:-1, 1] if formed.left_ray else None
-    pairs = pair_errors.differentiate_pairs(orientation, rotations[:-1], similarity.scale * formed.scale, across)
+    scale = similarity.scale * formed.scale
+    make_pairs = partial(pair_errors.differentiate_pairs, orientation, rotations[:-1], scale, across)
+    pairs = make_pairs()
     centers = similarity(formed.centers)
     origin = centers.mean(axis=0)
     strip = PlacedStrip(
@@ -98,7 +108,7 @@ def differentiate_strip(
         steps=strip.steps,
         component_covariances=_component_covariances(strip.images, len(strip.steps)),
         points=points,
-        pairs=pairs,
+        make_pairs=make_pairs,
         origin=origin,
     )
 
@@ -205,28 +215,32 @@ def _point_rows(strip: PlacedStrip) -> ErrorRows:
     slot = model - first[item]
     slots = int(slot.max()) + 1
     share = 1 / formed.model_count[item]
+    place = strip.images.rows_of(orientation.rows)
+    by_image = np.zeros((len(strip.images.row), 3, 2))
+    point_of = np.full(len(strip.images.row), -1)
+    for side, columns in ((0, slice(0, 2)), (1, slice(2, 4))):
+        by_image[place[rows, side]] += share[:, None, None] * pairs.point_by_image[rows, :, columns]
+        point_of[place[rows, side]] = item
+    entries = np.flatnonzero(point_of >= 0)
+    entries = entries[np.argsort(point_of[entries], kind="stable")]
+    by_image = by_image[entries]
+    by_image *= strip.images.sigma[entries][:, None, :]
     by_component = np.zeros((count, slots, 3, COMPONENTS))
-    by_component[item, slot, :, ELEMENTS] = share[:, None, None] * pairs.point_by_elements[rows]
+    by_component[item, slot, :, ELEMENTS] = pairs.point_by_elements[rows]
+    by_component *= (1 / np.maximum(formed.model_count, 1))[:, None, None, None]
     held = np.zeros((count, slots + 1))
     held[item, slot] = share
     beyond = np.cumsum(held[:, ::-1], axis=1)[:, ::-1][:, 1:]  # share of the models after each slot
     by_similarity = similarity_derivatives(strip.xyz, np.zeros(3))
     for s in range(slots):
         moved = np.flatnonzero(beyond[:, s] > 0)
-        by_component[moved, s] += beyond[moved, s, None, None] * (by_similarity[moved] @ steps[first[moved] + s])
-    place = strip.images.rows_of(orientation.rows)
-    by_image = np.zeros((len(strip.images.row), 3, 2))
-    point_of = np.full(len(strip.images.row), -1)
-    for side, columns in ((0, slice(0, 2)), (1, slice(2, 4))):
-        by_image[place[rows, side]] += share[:, None, None] * pairs.point_by_image[rows][:, :, columns]
-        point_of[place[rows, side]] = item
-    entries = np.flatnonzero(point_of >= 0)
-    entries = entries[np.argsort(point_of[entries], kind="stable")]
+        for some in np.split(moved, range(IMAGES, len(moved), IMAGES)):  # the steps of all take twice the memory
+            by_component[some, s] += beyond[some, s, None, None] * (by_similarity[some] @ steps[first[some] + s])
     return ErrorRows(
         first=first,
         by_similarity=by_similarity,
         by_component=by_component,
         item=point_of[entries],
         image=entries,
-        by_image=by_image[entries] * strip.images.sigma[entries][:, None, :],
+        by_image=by_image,
     )
