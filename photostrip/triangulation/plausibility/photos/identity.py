@@ -180,8 +180,11 @@ def find_copied_points(control: ControlPoints, observations: PhotoPoints) -> Ite
     """Find given points with the very same coordinates in plan that photos show at two places (P410)."""
     rows = np.flatnonzero(control.use[:, :2].all(axis=1))
     key = np.column_stack([control.frame[rows], control.enu[rows, :2]])
-    _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    one = rows[first[number.ravel()]]
+    order = np.lexsort(key.T)  # np.unique sorts rows as bytes, in five times the time
+    new = np.ones(len(order), bool)
+    new[1:] = (key[order[1:]] != key[order[:-1]]).any(axis=1)
+    one = np.empty_like(rows)
+    one[order] = rows[order[new]][np.cumsum(new) - 1]
     shown = locate(control.ids, observations.point_ids)
     both = (one != rows) & (shown[one] >= 0) & (shown[rows] >= 0)
     for a, b in zip(one[both][:MOST_COPIED].tolist(), rows[both][:MOST_COPIED].tolist(), strict=True):
