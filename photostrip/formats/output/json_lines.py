@@ -49,7 +49,7 @@ def _cells(column: Sequence[Plain], encode: Encoder) -> Cells:
     if isinstance(column, Records):
         return np.concatenate(_objects(column.columns, encode))
     kinds: set[type] = set() if isinstance(column, Grouped) else set(map(kind_of, column))
-    if kinds == {list} and any(column):
+    if kinds == {list}:
         column = Grouped(list(chain.from_iterable(column)), [0, *accumulate(map(len, column))])
     if isinstance(column, Grouped):
         return number_columns.listed(_cells(column.values, encode), column.ends)
