@@ -5,24 +5,20 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
-from typing import Self
-
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import NamedTuple, dataclass
+from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import gamma_cdf, normal_quantile
-from photostrip.triangulation.covariance_adjustment import relinearisation, system
+from photostrip.triangulation.covariance_adjustment import dense_models, relinearisation, system
+from photostrip.triangulation.covariance_adjustment.columns import Columns
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of
 from photostrip.triangulation.error_propagation import joint_covariances
-from photostrip.triangulation.error_propagation.covariances import NearImages, along_strip, local_covariances
+from photostrip.triangulation.error_propagation.covariances import along_strip, local_covariances
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-AT_A_TIME = 32  # blocks whose columns are made together: 5 MB of points
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
 
 
@@ -77,12 +73,9 @@ def covariances(found: system.System, rows: ErrorRows) -> Floats:
     inverse on the diagonal says what all later ones add.
     """
     order = np.argsort(rows.first, kind="stable")
-    columns = _Columns.of(found, rows.take(order))
-    known = np.zeros((*rows.by_similarity.shape[:2], rows.by_similarity.shape[1]))
-    first, last = columns.rows.first[[0, -1]].tolist() if len(order) else (0, -1)
-    for block in columns.blocks(range(first // found.layout.width, last // found.layout.width + 1)):
-        columns.explain(block, known)
-    left = local_covariances(found.errors, columns.rows, columns.near) - known
+    columns = Columns.of(found, rows.take(order))
+    explained = dense_models.explained if dense_models.are_dense(columns) else _explained
+    left = local_covariances(found.errors, columns.rows, columns.near) - explained(columns)
     return np.asarray(left[np.argsort(order, kind="stable")], float)
 
 
@@ -100,6 +93,27 @@ def photo_covariances(found: system.System) -> Floats:
     return np.concatenate([of_models, covariances(found, rows.take(models[-1:] + 1))])
 
 
+def _explained(of_rows: Columns) -> Floats:
+    """Give what the conditions explain of the covariances of rows (n, d, d), b^T K^-1 b."""
+    found, (n, size) = of_rows.found, of_rows.rows.by_similarity.shape[:2]
+    known = np.zeros((n, size, size))
+    for number, rows, columns in of_rows.blocks(of_rows.held):
+        count = rows.stop - rows.start
+        if not count:
+            continue
+        before, after = max(number - 1, 0), min(number + 1, found.layout.blocks - 1)
+        first, own, last = columns  # beyond the ends they are 0
+        own = own - found.factors.shares[before].T @ first
+        last = last - found.factors.shares[number].T @ own
+        reduced = np.concatenate([first, own, last])
+        inverses, later = found.factors.inverses, found.factors.diagonal_of_inverse
+        weights = inverses[before], inverses[number], later[after]
+        weighted = np.concatenate([weight @ each for weight, each in zip(weights, (first, own, last), strict=True)])
+        left, right = (each.reshape(-1, count, size) for each in (reduced, weighted))
+        known[rows] = left.transpose(1, 2, 0) @ right.transpose(1, 0, 2)
+    return known
+
+
 def photo_rows(errors: StripErrors) -> ErrorRows:
     """Rows of the photos of a strip: centre and small rotation, d = 6.
 
@@ -115,114 +129,6 @@ def photo_rows(errors: StripErrors) -> ErrorRows:
     return ErrorRows.without_images(np.append(np.arange(models), models - 1), by_similarity, by_component)
 
 
-class BlockColumns(NamedTuple):
-    """Columns of the rows whose first model lies in one block."""
-
-    number: int  # of the block
-    rows: slice
-    values: Floats  # (3, b, k): in the blocks before, own and after
-
-
-@dataclass(frozen=True, eq=False)
-class _Columns:
-    """Columns b of rows that are ordered by their first models, block by block."""
-
-    found: system.System
-    rows: ErrorRows
-    near: NearImages  # what enters them directly
-    by_unknowns: Floats  # (n, d, 7): by the unknowns of the first model
-    shared: system.SameImages  # image points in common with conditions, ordered by rows
-
-    @classmethod
-    def of(cls, found: system.System, rows: ErrorRows) -> Self:
-        shared = system.same_images(rows, found.conditions.rows)
-        order = np.argsort(shared.first, kind="stable")
-        return cls(
-            found=found,
-            rows=rows,
-            near=NearImages.of(found.errors, rows),
-            by_unknowns=rows.by_similarity @ found.conditions.local.to_common[rows.first],
-            shared=system.SameImages(shared.first[order], shared.second[order], shared.value[order, :, 0]),
-        )
-
-    def blocks(self, numbers: range) -> Iterator[BlockColumns]:
-        """Go through consecutive blocks; a few are made together."""
-        for low in numbers[::AT_A_TIME]:
-            yield from self._made(low, min(low + AT_A_TIME, numbers.stop))
-
-    def explain(self, block: BlockColumns, known: Floats) -> None:
-        """Fill in b^T K^-1 b of one block."""
-        number, rows, columns = block
-        size, found, count = self.rows.by_similarity.shape[1], self.found, rows.stop - rows.start
-        if not count:
-            return
-        before, after = max(number - 1, 0), min(number + 1, found.layout.blocks - 1)
-        first, own, last = columns  # beyond the ends they are 0
-        own = own - found.factors.shares[before].T @ first
-        last = last - found.factors.shares[number].T @ own
-        reduced = np.concatenate([first, own, last])
-        inverses, later = found.factors.inverses, found.factors.diagonal_of_inverse
-        weights = inverses[before], inverses[number], later[after]
-        weighted = np.concatenate([weight @ each for weight, each in zip(weights, (first, own, last), strict=True)])
-        left, right = (each.reshape(-1, count, size) for each in (reduced, weighted))
-        known[rows] = left.transpose(1, 2, 0) @ right.transpose(1, 0, 2)
-
-    def _made(self, low: int, high: int) -> list[BlockColumns]:
-        """Make the columns of blocks: covariances with conditions around, coefficients of unknowns, common images."""
-        layout, size = self.found.layout, self.rows.by_similarity.shape[1]
-        models = len(layout.start)
-        some = range(low * layout.width, min(high * layout.width, models))
-        ends = np.searchsorted(self.rows.first, [*some, some.stop])
-        bounds = ends[np.minimum(np.arange(high - low + 1) * layout.width, len(some))]
-        counts = np.diff(bounds)
-        offsets = np.concatenate([[0], np.cumsum(3 * layout.height * counts * size)])
-        whole = np.zeros(offsets[-1])
-        columns = [
-            whole[start:stop].reshape(3, layout.height, count * size)
-            for (start, stop), count in zip(pairwise(offsets.tolist()), counts.tolist(), strict=True)
-        ]
-        begin, end = ends[[0, -1]].tolist()
-        part, near = self.rows.part(begin, end), self.near.with_components[begin:end]
-        slots = self.found.padded.by_component.shape[1]
-        padded = system.PaddedRows.of(self.found.errors, part, near, slots, some)
-        starts, unknowns, reached = layout.start.tolist(), layout.unknown.tolist(), ends.tolist()
-        # the place of each model's rows: its block, and its columns there
-        places = {
-            place: (place // layout.width, slice((start - first) * size, (stop - first) * size))
-            for place, (start, stop) in enumerate(pairwise(reached))
-            for first in [int(bounds[place // layout.width])]
-            if stop > start
-        }
-        for apart in range(-layout.width, layout.width + 1):
-            others = range(max(some.start + apart, 0), min(some.stop + apart, models))
-            if not others:
-                continue
-            values = system.products(self.found.padded, padded, others, -apart)
-            for number, (block, across) in places.items():
-                other = some.start + number + apart
-                if other not in others:
-                    continue
-                beside = other // layout.width - (low + block) + 1
-                top, height = starts[other], unknowns[other]
-                value = values[other - others.start]
-                columns[block][beside, top:height, across] = value[: height - top, : across.stop - across.start]
-        for number, (block, across) in places.items():
-            unknown = unknowns[number + some.start]
-            by_unknowns = self.by_unknowns[reached[number] : reached[number + 1]].reshape(-1, SIMILARITY_PARAMETERS)
-            columns[block][1, unknown : unknown + SIMILARITY_PARAMETERS, across] = by_unknowns.T
-        # products of image points that rows have in common with conditions
-        inside = slice(*np.searchsorted(self.shared.first, [begin, end]).tolist())
-        row, condition, value = self.shared.first[inside], self.shared.second[inside], self.shared.value[inside]
-        own = self.rows.first[row] // layout.width - low
-        place = (layout.block[condition] - (low + own) + 1) * layout.height + layout.position[condition]
-        first = offsets[own] + (place * counts[own] + row - bounds[own]) * size
-        np.add.at(whole, first[:, None] + np.arange(size), value)  # flat: three indices take ten times as long
-        return [
-            BlockColumns(number, slice(start, stop), values)
-            for number, (start, stop), values in zip(range(low, high), pairwise(bounds.tolist()), columns, strict=True)
-        ]
-
-
 def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
     """Differentiate predicted errors by the misclosures of conditions: b^T K^-1 e, shape (n, d, c).
 
@@ -230,7 +136,7 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
     """
     layout, size = found.layout, rows.by_similarity.shape[1]
     order = np.argsort(rows.first, kind="stable")
-    columns = _Columns.of(found, rows.take(order))
+    columns = Columns.of(found, rows.take(order))
     block, position = layout.block[chosen], layout.position[chosen]
     result = np.zeros((len(order), size, len(chosen)))
     if len(order) * size < len(chosen):
@@ -258,7 +164,7 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     """
     order = np.argsort(rows.first, kind="stable")
     rows = rows.take(order)
-    columns, layout, factors = _Columns.of(found, rows), found.layout, found.factors
+    columns, layout, factors = Columns.of(found, rows), found.layout, found.factors
     own = rows.without_similarity()  # the similarities of the models are unknowns, not errors
     covariance = joint_covariances.joint_covariance(found.errors, own, along_strip(found.errors))
     blocks = list(columns.blocks(range(layout.blocks)))

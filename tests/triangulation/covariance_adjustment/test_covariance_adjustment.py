@@ -20,10 +20,12 @@ from photostrip.triangulation.covariance_adjustment import (
     adjust,
     block_tridiagonal,
     conditions,
+    dense_models,
     prediction,
     relinearisation,
     system,
 )
+from photostrip.triangulation.covariance_adjustment.columns import Columns
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
 from photostrip.triangulation.polynomial import correction
 from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
@@ -355,3 +357,21 @@ def test_points_on_many_photos_leave_so_many_distances_to_each_junction(monkeypa
     assert [each for each in taken.notes if each.code == note.code] == [note]
     monkeypatch.undo()
     assert note.code not in {each.code for each in triangulate(result.inputs, COVARIANCE).notes}
+
+
+@pytest.mark.parametrize(("photos", "lap"), [(2, 62.0), (9, 62.0), (9, 80.0)])
+def test_many_points_of_a_model_get_their_covariances_together(photos: int, lap: float) -> None:
+    """A strip of 2000 points a photo took 41 s and 3.2 GB, a product with the inverse for each coordinate."""
+    errors, wanted = prepared(noisy(photos, lap, min(3, photos)), distances=True)
+    solved = system.system(errors, wanted, 1.3)
+    some = errors.points.take(np.random.default_rng(1).permutation(len(errors.points.first))[::2])
+    one_by_one = prediction.covariances(solved, some)
+    copies = errors.points.take(np.repeat(np.arange(len(errors.points.first)), 40))
+    assert dense_models.are_dense(Columns.of(solved, copies))
+    assert not dense_models.are_dense(Columns.of(solved, some))
+    columns = Columns.of(solved, some.take(np.argsort(some.first, kind="stable")))
+    direct, together = prediction._explained(columns), dense_models.explained(columns)
+    assert together == pytest.approx(direct, abs=1e-12 * np.abs(direct).max())
+    assert prediction.covariances(solved, copies)[::40] == pytest.approx(
+        prediction.covariances(solved, errors.points), abs=1e-12 * np.abs(one_by_one).max()
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photostrip.triangulation.covariance_adjustment import conditions, prediction, relinearisation, system
+from photostrip.triangulation.covariance_adjustment import columns, conditions, prediction, relinearisation, system
 from photostrip.triangulation.covariance_adjustment.left_out import _predicted, left_out_errors
 from tests.derivatives import errors_of
 from tests.loops import nonempty
@@ -48,7 +48,7 @@ def test_a_strip_predicts_the_same_in_parts_of_which_some_hold_no_wanted_coordin
     solved = system.system(found.errors, conditions.conditions(*parts, found.control, given), FACTOR)
     wanted = found.control.take(np.arange(3)).rows
     at_once = prediction.joint_covariance(solved, wanted)
-    monkeypatch.setattr(prediction, "AT_A_TIME", 1)
+    monkeypatch.setattr(columns, "AT_A_TIME", 1)
     assert prediction.joint_covariance(solved, wanted) == pytest.approx(at_once)
 
 

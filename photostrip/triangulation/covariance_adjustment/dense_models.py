@@ -1,0 +1,126 @@
+"""Covariances of many points of few models: what they share is taken through the inverse once for each model.
+
+The column of a row is b = B a + c. B belongs to its model: covariances of the conditions with the error components of
+the models around, coefficients of the conditions by these components, and the unknowns of the model. a are the row's
+own coefficients of these; c has only the conditions that share image points with the row. So no row needs a product of
+its own with the inverse: b^T K^-1 b = a^T (B^T K^-1 B) a + 2 c^T (K^-1 B) a + c^T K^-1 c.
+
+Source: derived; see docs/precision.md, eq. 7.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photostrip.arrays import Floats, Numbers
+from photostrip.frozen import NamedTuple
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
+from photostrip.triangulation.covariance_adjustment.block_tridiagonal import Factors
+from photostrip.triangulation.covariance_adjustment.columns import Columns
+from photostrip.triangulation.covariance_adjustment.system import SameImages
+from photostrip.triangulation.error_propagation.covariances import NearImages
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows
+
+
+def are_dense(columns: Columns) -> bool:
+    """Whether this takes fewer multiplications than a product with the inverse for each row.
+
+    With n rows and r columns B in a block of height b: 10 n b^2 there, 18 r b^2 + 6 b^3 here.
+    """
+    layout = columns.found.layout
+    in_block = np.bincount(columns.rows.first // layout.width).max(initial=0) * columns.rows.by_similarity.shape[1]
+    shared = layout.width * _coefficients(columns, slice(0, 1)).shape[1]
+    return bool(10 * in_block > 18 * shared + 6 * layout.height)
+
+
+def explained(columns: Columns) -> Floats:
+    """Give what the conditions explain of the covariances of rows, b^T K^-1 b, shape (n, d, d)."""
+    found, rows = columns.found, columns.rows
+    layout, models = found.layout, found.errors.models
+    sparse = _Sparse.of(columns)
+    ends = np.searchsorted(rows.first, np.arange(models + 1)).tolist()
+    result = np.empty((*rows.by_similarity.shape[:2], rows.by_similarity.shape[1]))
+    for number, some, values in _shared_columns(columns).blocks(columns.held):
+        inverse = _inverse_around(found.factors, number)
+        by_model = np.split(values.reshape(3 * layout.height, -1), some.stop - some.start, axis=1)
+        for model, shared in enumerate(by_model, some.start):
+            part = slice(ends[model], ends[model + 1])
+            if part.start == part.stop:
+                continue
+            through = inverse @ shared
+            a, c, place = _coefficients(columns, part), sparse.value[part], sparse.place(part, layout.height, number)
+            mixed = c.transpose(0, 2, 1) @ through[place] @ a
+            alone = c.transpose(0, 2, 1) @ inverse[place[:, :, None], place[:, None, :]] @ c
+            result[part] = a.transpose(0, 2, 1) @ (shared.T @ through) @ a + mixed + mixed.transpose(0, 2, 1) + alone
+    return result
+
+
+def _coefficients(columns: Columns, part: slice) -> Floats:
+    """Coefficients a of some rows, (n, r, d)."""
+    by_component, with_components = columns.rows.by_component[part], columns.near.with_components[part]
+    n, _, size, _ = by_component.shape
+    parts = (
+        by_component.transpose(0, 2, 1, 3).reshape(n, size, -1),
+        with_components.reshape(n, size, -1),
+        columns.by_unknowns[part],
+    )
+    return np.concatenate(parts, axis=2).transpose(0, 2, 1)
+
+
+def _shared_columns(columns: Columns) -> Columns:
+    """Make the columns B of every model: one row of r coordinates, in the order of ``_coefficients``."""
+    models, slots = columns.found.errors.models, columns.rows.by_component.shape[1]
+    ends = np.cumsum([slots * COMPONENTS, np.prod(columns.near.with_components.shape[2:]), SIMILARITY_PARAMETERS])
+    count = int(ends[-1])
+    first, second, third = np.split(np.broadcast_to(np.eye(count), (models, count, count)), ends[:-1], axis=2)
+    by_component = first.reshape(models, count, slots, COMPONENTS).transpose(0, 2, 1, 3)
+    by_similarity, none = np.zeros((models, count, SIMILARITY_PARAMETERS)), np.zeros(0, np.intp)
+    return Columns(
+        found=columns.found,
+        rows=ErrorRows.without_images(np.arange(models), by_similarity, by_component),
+        near=NearImages(np.zeros((models, count, 0)), second.reshape(models, count, -1, COMPONENTS)),
+        by_unknowns=third,
+        shared=SameImages(none, none, np.zeros((0, count))),
+    )
+
+
+class _Sparse(NamedTuple):
+    """Coefficients c of rows, side by side; rows with fewer than q of them have zeros."""
+
+    block: Numbers  # (n, q): of the condition
+    position: Numbers  # (n, q): there
+    value: Floats  # (n, q, d)
+
+    @classmethod
+    def of(cls, columns: Columns) -> _Sparse:
+        layout, shared = columns.found.layout, columns.shared
+        n, size = columns.rows.by_similarity.shape[:2]
+        counts = np.bincount(shared.first, minlength=n)
+        place = np.arange(len(shared.first)) - np.repeat(np.cumsum(counts) - counts, counts)
+        block = np.repeat(columns.rows.first[:, None] // layout.width, counts.max(initial=0), axis=1)
+        position, value = np.zeros_like(block), np.zeros((*block.shape, size))
+        block[shared.first, place] = layout.block[shared.second]
+        position[shared.first, place] = layout.position[shared.second]
+        value[shared.first, place] = shared.value
+        return cls(block, position, value)
+
+    def place(self, part: slice, height: int, number: int) -> Numbers:
+        """Place of some of them in the block of a number and those beside it."""
+        return np.asarray((self.block[part] - number + 1) * height + self.position[part], np.intp)
+
+
+def _inverse_around(factors: Factors, number: int) -> Floats:
+    """Blocks of the inverse (3 b, 3 b) before, at and after a number: Z_ij = -P_i^-1 B_i Z_(i+1)j for i < j."""
+    later, shares = factors.diagonal_of_inverse, factors.shares
+    height = later.shape[1]
+    result = np.zeros((3, height, 3, height))
+    for place in range(3):
+        column = number - 1 + place
+        if not 0 <= column < len(later):
+            continue
+        result[place, :, place] = later[column]
+        for row in range(place - 1, -1, -1):
+            if number - 1 + row >= 0:
+                result[row, :, place] = -shares[number - 1 + row] @ result[row + 1, :, place]
+                result[place, :, row] = result[row, :, place].T
+    return result.reshape(3 * height, 3 * height)
