@@ -233,6 +233,19 @@ def test_gate_constants_prints_what_each_change_does() -> None:
 
 
 @pytest.mark.slow
+def test_run_constants_prints_what_each_value_does() -> None:
+    out = printed("run_constants.py", "1", "--only", "GROWN", "FAR_FROM_RAY")
+    told = re.findall(r"^GROWN = (\S+): .*plan and camera heights: 1 ([a-z ]+); two", out, re.MULTILINE)
+    assert told == [("4.0", "told"), ("2.0", "told"), ("8.0", "told"), ("0.0", "told"), ("inf", "not told")]
+    assert re.findall(r"^FAR_FROM_RAY = (\S+): half of a pair wrong: 1 \w+; ", out, re.MULTILINE) == [
+        "5.0",
+        "2.5",
+        "10.0",
+        "inf",
+    ]
+
+
+@pytest.mark.slow
 def test_false_alarms_prints_a_row_for_each_layout() -> None:
     out = printed("false_alarms.py", "--count", "1", "--first", "7", "corners", "GNSS")
     assert len(re.findall(r"^(?:corners|blocks|strips|GNSS)[\w ,]+ +1 +0", out, re.MULTILINE)) == 4

@@ -306,7 +306,7 @@ def _pairs(document: Document) -> Iterator[str]:
             f"photos {pair['left']} and {pair['right']}: sigma0 {found:.1f} µm, stated {given:.1f} µm{beside}; the "
             f"largest y parallax is at point {pair['max_parallax_point']}"
         )
-    yield from _more(len(odd), "pairs")
+    yield from _more(len(odd), "pair")
 
 
 def _common_deformation(document: Document, *, in_metres: bool) -> Iterator[str]:
@@ -331,29 +331,30 @@ def _deformed(document: Document) -> Iterator[str]:
             f"the model of photos {row['left']} and {row['right']} is deformed ({name}): {size:.3f} m at a corner "
             f"against the middle, t = {t:.1f}"
         )
-    yield from _more(len(odd), "models")
+    yield from _more(len(odd), "model")
 
 
-def _more(number: int, what: str) -> Iterator[str]:
+def _more(number: int, one: str, kind: str = "") -> Iterator[str]:
     if number > NAMED:
-        yield f"{number - NAMED} more {what} like these"
+        yield f"{counted(number - NAMED, f'more {one}')}{kind} like these"
 
 
 def _photos(document: Document) -> Iterator[str]:
-    """Name photos of large residuals, and those of which much was rejected, as by a shift of all their points."""
+    """Name photos of large residuals, then those of which much was rejected, as by a shift of all their points."""
     whole = document["summary"]["image_rms_um"]
     rejected = {(row["photo"], row["point"]) for row in document["rejected"] if not row.get("readmitted")}
-    lost, odd = Counter(photo for photo, _ in rejected), []
+    lost, poor, robbed = Counter(photo for photo, _ in rejected), [], []
     for photo in document["photos"]:
         name, rms, count = photo["id"], photo["image_rms_um"] or 0, lost[photo["id"]]
         measured = count + photo["points"]
         if whole and rms > PHOTO_RATIO * whole:
             text = f"image residuals of {rms:.1f} µm under the final orientation, {whole:.1f} µm in the whole project"
-            odd.append((rms / whole, f"photo {name}: {text}"))
+            poor.append((rms / whole, f"photo {name}: {text}"))
         elif count > MANY_OF_PHOTO * measured:
-            odd.append((count / measured, f"photo {name}: {count} of its {measured} points were rejected"))
-    yield from (text for _, text in sorted(odd, reverse=True)[:NAMED])
-    yield from _more(len(odd), "photos")
+            robbed.append((count / measured, f"photo {name}: {count} of its {measured} points were rejected"))
+    for odd, kind in ((poor, " with large residuals"), (robbed, " that lost points")):
+        yield from (text for _, text in sorted(odd, reverse=True)[:NAMED])
+        yield from _more(len(odd), "photo", kind)
 
 
 def _rejected(document: Document) -> Iterator[str]:
@@ -376,7 +377,7 @@ def _findings(document: Document, severity: str) -> Iterator[str]:
         for each in kind[:NAMED]:
             unused = bool(each["points"]) and out.issuperset(each["points"])
             yield f"{each['code']} {each['message']}{'; not used' if unused else ''}"
-        yield from _more(len(kind), "findings")
+        yield from _more(len(kind), "finding")
 
 
 def _notes(document: Document) -> Iterator[str]:
@@ -391,7 +392,7 @@ def _notes(document: Document) -> Iterator[str]:
     for _, group in groupby(warnings, key=itemgetter("code")):
         kind = list(group)
         yield from (before(n["file"], n["line"], n["column"]) + n["message"] for n in kind[:NAMED])
-        yield from _more(len(kind), "notes")
+        yield from _more(len(kind), "note")
 
 
 def _on_control(document: Document) -> list[Document]:

@@ -295,3 +295,25 @@ def test_a_photo_that_is_shifted_as_a_whole_is_named_first(shift: tuple[float, f
     assert verdict["status"] == LOOK
     assert re.match(r"photo 1005: \d+ of its \d+ points were rejected", named[0])
     assert len(named) <= 3
+
+
+def test_photos_with_large_residuals_come_before_those_that_lost_points_worst_first() -> None:
+    document = case("projected", 2).document
+    head = document["photos"][0]
+    photos = [{**head, "id": str(name), "points": 10, "image_rms_um": 1.0} for name in range(9)]
+    for name, rms in ((1, 4.0), (2, 9.0), (3, 5.0), (4, 6.0)):
+        photos[name]["image_rms_um"] = rms
+    lost = [
+        {"photo": str(name), "point": f"p{each}"} for name, count in ((5, 5), (6, 20), (7, 1)) for each in range(count)
+    ]
+    summary = {**document["summary"], "image_rms_um": 1.0}
+    found = verdict_of({**document, "summary": summary, "photos": photos, "rejected": lost})["look_at"]
+    told = [text.partition(":")[0] for text in found if "photo" in text]
+    assert told == [
+        "photo 2",
+        "photo 4",
+        "photo 3",
+        "1 more photo with large residuals like these",
+        "photo 6",
+        "photo 5",
+    ]

@@ -23,7 +23,7 @@ from photostrip.triangulation import absolute_orientation
 LEAST_TIES = 3
 ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line
 FREE_BASE = 1000.0  # metres: mean length of the bases where nothing gives a scale
-DOWN, TURNED = 0.3, 0.01  # radians: standard deviations of cameras that are taken to look down, of given rotations
+TURNED = 0.01  # radians: standard deviation of given rotations
 START_STEPS, START_CONVERGED = 20, 1e-6  # of a start on all that is given; of its half length, the last step
 OF_PHOTO = "of photo {}"  # names a camera among given points
 
@@ -79,7 +79,7 @@ class Level(NamedTuple):
     """What is taken to point up in a block, however little the control says of it."""
 
     up: Floats  # (3,): unit vector
-    sigma: float  # radians
+    sigma: float  # radians; infinite where it only says where to start
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,8 +211,8 @@ def _with_cameras(
 ) -> Similarity:
     """Similarity of a block to its control, to known positions and orientations of its cameras.
 
-    Known rotations say what is level; without any its cameras are taken to look down, more or less: that is a start,
-    the adjustment decides what is determined.
+    Known rotations say what is level; without any it starts with its cameras looking down, and the adjustment decides
+    what is determined.
     """
     names = [name for number in group.members for name in stages[number].strip.photos]
     centers, rotations = _oriented(stages, group)
@@ -226,7 +226,7 @@ def _with_cameras(
     else:
         up = rotations[:, :, 2].sum(axis=0)
     up = np.asarray(up / np.linalg.norm(up), float)
-    level = Level(up, TURNED if turned else DOWN)
+    level = Level(up, TURNED if turned else np.inf)  # cameras may look aside
     xyz, control = on_ground
     given_of_all = concatenated([control, cameras])
     found = _on_given(np.concatenate([xyz, centers[rows]]), given_of_all, known, level)
