@@ -40,18 +40,18 @@ class Factors:
 
 
 def eliminate(diagonal: Floats, beside: Floats) -> Factors:
-    """Eliminate block after block.
+    """Eliminate block after block; the factors take the place of the blocks.
 
     diagonal: (n, b, b), blocks D on the diagonal, symmetric.
     beside: (n, b, b), blocks B to the right of them; the last does not count.
     Raises numpy.linalg.LinAlgError when a pivot block is singular.
     """
-    inverses, shares = np.empty_like(diagonal), np.zeros_like(beside)
-    pivot = diagonal[0]
+    beside[-1] = 0.0
     for number in range(len(diagonal)):
-        inverse = np.linalg.inv(pivot)
-        inverses[number] = (inverse + inverse.T) / 2
+        inverse = np.linalg.inv(diagonal[number])
+        diagonal[number] = (inverse + inverse.T) / 2
         if number + 1 < len(diagonal):
-            shares[number] = inverses[number] @ beside[number]
-            pivot = diagonal[number + 1] - beside[number].T @ shares[number]
-    return Factors(inverses, shares)
+            share = diagonal[number] @ beside[number]
+            diagonal[number + 1] -= beside[number].T @ share
+            beside[number] = share
+    return Factors(diagonal, beside)

@@ -267,11 +267,15 @@ class NearImages(NamedTuple):
 
 def local_covariances(errors: StripErrors, rows: ErrorRows, near: NearImages) -> Floats:
     """Covariances (n, d, d) of rows, ordered by their first models, without the similarities of these."""
-    by, slots = _coefficients(rows.without_similarity(), near), rows.by_component.shape[1]
-    half = _by_model(by, rows.first, _halves(errors, none_along(errors), distinct(rows.first), slots))
-    found = half @ by[:, :, : half.shape[2]].transpose(0, 2, 1)
-    found += near.by_image @ near.by_image.transpose(0, 2, 1) / 2
-    return np.asarray(found + found.transpose(0, 2, 1), float)
+    count, slots, size, _ = rows.by_component.shape
+    result, along = np.empty((count, size, size)), none_along(errors)
+    for some in _slices(rows):
+        part, images = rows.part(some.start, some.stop), near.by_image[some]
+        by = _coefficients(part.without_similarity(), NearImages(images, near.with_components[some]))
+        half = _by_model(by, part.first, _halves(errors, along, distinct(part.first), slots))
+        found = half @ by[:, :, : half.shape[2]].transpose(0, 2, 1) + images @ images.transpose(0, 2, 1) / 2
+        result[some] = found + found.transpose(0, 2, 1)
+    return result
 
 
 def _halves(errors: StripErrors, along: SimilarityCovariances, models: Numbers, slots: int) -> Floats:
