@@ -7,7 +7,7 @@ coordinate gets and from where, and what became of every row of every table.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted
 from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior
+from photostrip.pipeline.inputs import Strip
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_whole
 from photostrip.points import PhotoPoints, locate
@@ -147,40 +148,41 @@ def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
     return notes
 
 
-def _points_of_photos(observations: PhotoPoints) -> dict[str, set[int]]:
-    order = np.argsort(observations.photo, kind="stable")
-    ends = np.cumsum(np.bincount(observations.photo, minlength=len(observations.photo_ids)))
-    parts = np.split(observations.point[order], ends[:-1])
-    return {name: set(part.tolist()) for name, part in zip(observations.photo_ids, parts, strict=True)}
+def _common(strip: Strip, observations: PhotoPoints) -> list[Numbers]:
+    """Count the points that each photo of a strip has in common with the next, and with the next two."""
+    place, width = strip.positions(observations), len(strip.photos) + 2
+    key = distinct((observations.point * width + place)[place >= 0])  # on the next photo it is larger by one
+    on_next = np.diff(key, append=-1) == 1
+    rows = on_next, on_next & np.append(on_next[1:], [False])
+    return [np.bincount(key[some] % width, minlength=width) for some in rows]
 
 
 def _neighbours(project: Project) -> list[Fault]:
     """Refuse neighbouring photos that cannot be oriented, or whose models cannot be joined."""
-    points = _points_of_photos(project.inputs.observations)
-    return [*_pairs(project, points), *_junctions(project, points)]
+    common = [_common(strip, project.inputs.observations) for strip in project.inputs.strips]
+    of_two, of_three = zip(*common, strict=True) if common else ((), ())
+    return [*_pairs(project, of_two), *_junctions(project, of_three)]
 
 
-def _pairs(project: Project, points: Mapping[str, set[int]]) -> Iterator[Fault]:
+def _pairs(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
     """Refuse neighbouring photos with too few common points for their relative orientation."""
     from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
-    for i, strip in enumerate(project.inputs.strips):
-        for j, (left, right) in enumerate(zip(strip.photos, strip.photos[1:], strict=False)):
-            common = len(points.get(left, set()) & points.get(right, set()))
-            if common < MINIMUM_POINTS:
-                message = f"photos {left} and {right} have {counted(common, 'point')} in common"
-                fix = "measure more, or correct the order of the photos"
-                expected = f"at least {MINIMUM_POINTS}, better 12"
-                path = ("strips", i, "photos", j + 1)
-                yield fault_at(project.tree, path, message, "too-few-common-points", expected=expected, fix=fix)
+    for i, (strip, count) in enumerate(zip(project.inputs.strips, common, strict=True)):
+        for j in np.flatnonzero(count[: len(strip.photos) - 1] < MINIMUM_POINTS).tolist():
+            left, right = strip.photos[j : j + 2]
+            message = f"photos {left} and {right} have {counted(int(count[j]), 'point')} in common"
+            fix = "measure more, or correct the order of the photos"
+            expected = f"at least {MINIMUM_POINTS}, better 12"
+            path = ("strips", i, "photos", j + 1)
+            yield fault_at(project.tree, path, message, "too-few-common-points", expected=expected, fix=fix)
 
 
-def _junctions(project: Project, points: Mapping[str, set[int]]) -> Iterator[Fault]:
+def _junctions(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
     """Refuse three photos in a row without a common point: nothing would carry the scale on."""
-    for i, strip in enumerate(project.inputs.strips):
-        for j, names in enumerate(zip(strip.photos, strip.photos[1:], strip.photos[2:], strict=False)):
-            if set.intersection(*(points.get(name, set()) for name in names)):
-                continue
+    for i, (strip, count) in enumerate(zip(project.inputs.strips, common, strict=True)):
+        for j in np.flatnonzero(count[: max(len(strip.photos) - 2, 0)] == 0).tolist():
+            names = strip.photos[j : j + 3]
             message = f"no point is common to photos {', '.join(names[:2])} and {names[2]}: nothing carries the scale"
             fix = "measure at least one pass point on all three"
             yield fault_at(project.tree, ("strips", i, "photos", j + 1), message, "broken-joint", fix=fix)
