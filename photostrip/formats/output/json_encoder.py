@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from json.encoder import encode_basestring, encode_basestring_ascii
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
+
+from photostrip.frozen import NamedTuple
 
 if TYPE_CHECKING:
     from photostrip.result.numbers import Plain

@@ -12,7 +12,6 @@ from typing import (
     Annotated,
     Any,
     ClassVar,
-    NamedTuple,
     Never,
     Self,
     TypeVar,
@@ -24,7 +23,7 @@ from typing import get_type_hints as annotations_of
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import counted
 
 Path = tuple[str | int, ...]  # keys and numbers that lead to a value
