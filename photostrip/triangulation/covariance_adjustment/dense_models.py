@@ -10,6 +10,8 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
@@ -29,7 +31,7 @@ def are_dense(columns: Columns) -> bool:
     """
     layout = columns.found.layout
     in_block = np.bincount(columns.rows.first // layout.width).max(initial=0) * columns.rows.by_similarity.shape[1]
-    shared = layout.width * _coefficients(columns, slice(0, 1)).shape[1]
+    shared = layout.width * _coefficients(columns, slice(0, 1)).shape[2]
     return bool(10 * in_block > 18 * shared + 6 * layout.height)
 
 
@@ -40,8 +42,8 @@ def explained(columns: Columns) -> Floats:
     sparse = _Sparse.of(columns)
     ends = np.searchsorted(rows.first, np.arange(models + 1)).tolist()
     result = np.empty((*rows.by_similarity.shape[:2], rows.by_similarity.shape[1]))
-    for number, some, values in _shared_columns(columns).blocks(columns.held):
-        inverse = _inverse_around(found.factors, number)
+    blocks = _shared_columns(columns).blocks(columns.held)
+    for (number, some, values), inverse in zip(blocks, _inverses_around(found.factors, columns.held), strict=True):
         by_model = np.split(values.reshape(3 * layout.height, -1), some.stop - some.start, axis=1)
         for model, shared in enumerate(by_model, some.start):
             part = slice(ends[model], ends[model + 1])
@@ -49,14 +51,15 @@ def explained(columns: Columns) -> Floats:
                 continue
             through = inverse @ shared
             a, c, place = _coefficients(columns, part), sparse.value[part], sparse.place(part, layout.height, number)
-            mixed = c.transpose(0, 2, 1) @ through[place] @ a
+            of_a = (a.reshape(-1, shared.shape[1]) @ (shared.T @ through)).reshape(a.shape)
+            mixed = c.transpose(0, 2, 1) @ through[place] @ a.transpose(0, 2, 1)
             alone = c.transpose(0, 2, 1) @ inverse[place[:, :, None], place[:, None, :]] @ c
-            result[part] = a.transpose(0, 2, 1) @ (shared.T @ through) @ a + mixed + mixed.transpose(0, 2, 1) + alone
+            result[part] = of_a @ a.transpose(0, 2, 1) + mixed + mixed.transpose(0, 2, 1) + alone
     return result
 
 
 def _coefficients(columns: Columns, part: slice) -> Floats:
-    """Coefficients a of some rows, (n, r, d)."""
+    """Coefficients a of some rows, (n, d, r)."""
     by_component, with_components = columns.rows.by_component[part], columns.near.with_components[part]
     n, _, size, _ = by_component.shape
     parts = (
@@ -64,7 +67,7 @@ def _coefficients(columns: Columns, part: slice) -> Floats:
         with_components.reshape(n, size, -1),
         columns.by_unknowns[part],
     )
-    return np.concatenate(parts, axis=2).transpose(0, 2, 1)
+    return np.concatenate(parts, axis=2)
 
 
 def _shared_columns(columns: Columns) -> Columns:
@@ -109,18 +112,21 @@ class _Sparse(NamedTuple):
         return np.asarray((self.block[part] - number + 1) * height + self.position[part], np.intp)
 
 
-def _inverse_around(factors: Factors, number: int) -> Floats:
-    """Blocks of the inverse (3 b, 3 b) before, at and after a number: Z_ij = -P_i^-1 B_i Z_(i+1)j for i < j."""
+def _inverses_around(factors: Factors, numbers: range) -> Iterator[Floats]:
+    """Blocks of the inverse (3 b, 3 b) before, at and after each number: Z_ij = -P_i^-1 B_i Z_(i+1)j for i < j."""
     later, shares = factors.diagonal_of_inverse, factors.shares
-    height = later.shape[1]
-    result = np.zeros((3, height, 3, height))
-    for place in range(3):
-        column = number - 1 + place
-        if not 0 <= column < len(later):
-            continue
-        result[place, :, place] = later[column]
-        for row in range(place - 1, -1, -1):
-            if number - 1 + row >= 0:
-                result[row, :, place] = -shares[number - 1 + row] @ result[row + 1, :, place]
-                result[place, :, row] = result[row, :, place].T
-    return result.reshape(3 * height, 3 * height)
+    count, height, _ = later.shape
+    before = -shares[numbers.start - 1] @ later[numbers.start] if numbers.start else None
+    for number in numbers:
+        result = np.zeros((3, height, 3, height))
+        for place in range(max(1 - number, 0), min(count - number + 1, 3)):
+            result[place, :, place] = later[number - 1 + place]
+        after = -shares[number] @ later[number + 1] if number + 1 < count else None
+        for row, column, block in ((0, 1, before), (1, 2, after)):
+            if block is not None:
+                result[row, :, column], result[column, :, row] = block, block.T
+        if before is not None and after is not None:
+            result[0, :, 2] = -shares[number - 1] @ after
+            result[2, :, 0] = result[0, :, 2].T
+        before = after
+        yield result.reshape(3 * height, 3 * height)
