@@ -92,11 +92,16 @@ class _Network:
 
     def shifted(self, about: int) -> ShiftedPhoto | None:
         """Adjust both photos that may be shifted with their principal points, and screen the better one."""
-        best, most = about, 0.0
-        for photo in {about, int(self._asking().argmax())}:
-            rays = self._put_back(photo)
-            one, other = (solve(selected(each, rays), rough=True) for each in (self.problem, self._freed([photo])))
-            explained = (one.chi_square - other.chi_square) / _unit(other) ** 2
+        asking = int(self._asking().argmax())
+        best, most = asking, 0.0
+        for photo in {about, asking}:
+            rays, plain = self._put_back(photo), self.solution
+            if (rays.images != self.plain.images).any():
+                plain = solve(selected(self.problem, rays), rough=True)
+            elif photo != asking:
+                continue  # it would explain less
+            freed = solve(selected(self._freed([photo]), rays), rough=True)
+            explained = (plain.chi_square - freed.chi_square) / _unit(freed) ** 2
             if explained > most:
                 best, most = photo, explained
         limit = limit_of(self.solution, SEARCH, 0).value
