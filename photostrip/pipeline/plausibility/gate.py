@@ -85,7 +85,7 @@ def of_result(result: Result, directory: Path | None = None, made: Stages | None
     stretched = {
         each.strip.id: isinstance(each.shared, StretchedHeights) or each.strip.id in doubted for each in stages
     }
-    tried = {} if slips.fits_measurements(result) else stretched
+    tried = {} if result.bundle is not None else stretched  # a bundle tries another distance itself
     of_control = _of_control(control, images, strips, doubtful, tried)
     findings = [*images.findings, *(of_control if control is None else slips.confirmed(of_control, predicted, control))]
     if control is not None and not any(each.is_error for each in findings):

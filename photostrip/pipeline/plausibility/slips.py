@@ -28,7 +28,6 @@ from photostrip.triangulation.plausibility.control.plan_fit import ODD_PROBABILI
 CODE = "P406"
 OF_DOUBTED_CONTROL = {"control-doubtful", "control-rejected"}  # notes
 LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)
-BUNDLE_SIGMA0 = 2.0  # of a bundle, over what is stated: a principal distance of another lens leaves 4 and more
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +57,9 @@ class Predicted:
         return bool(not self.sound[row, axis] and off > LIMIT * self.spread(row, axis))
 
 
-def fits_measurements(result: Result) -> bool:
-    """Whether a bundle leaves no more than what measurements do; the strip method does not see all of it together."""
-    return result.bundle is not None and result.bundle.screened.solution.sigma0 < BUNDLE_SIGMA0
-
-
 def is_doubtful(formed: EvidenceStrip, result: Result, predicted: Predicted) -> bool:
     """Whether the given points of a strip may be wrong: no bundle has seen them, or some do not agree with it."""
-    if not fits_measurements(result):
+    if result.bundle is None:
         return True
     control = result.inputs.control
     shown = rows_of_given(control.ids, formed.formed.point, result.refined.observations.point_ids) >= 0
