@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def all_stages() -> Stages:
-    return Stages("pairs", "strip", "control", "covariance", "failure")
+    return Stages("pairs", "strip", "control", "covariance", "shifted", "failure")
 
 
 @pytest.fixture
@@ -110,3 +110,11 @@ def test_values_are_alike_when_they_say_the_same() -> None:
     assert not alike(1, 1.5)
     assert alike(np.array([1.0, np.nan]), np.array([1.0, np.nan]))
     assert not alike(np.arange(3), np.arange(4))
+
+
+def test_a_stage_that_found_nothing_is_not_made_again() -> None:
+    made: list[int] = []
+    stages = Stages("shifted")
+    for _ in range(2):
+        assert stages.once("shifted", lambda: made.append(1), 5) is None
+    assert made == [1]

@@ -42,7 +42,7 @@ def compare_methods(
             from photostrip.report.html import check_html, methods_html
 
             check_html()
-        stages = Stages("pairs", "strip", "control", "covariance", "failure")
+        stages = Stages("pairs", "strip", "control", "covariance", "shifted", "failure")
         for adjustment in (*METHODS, AUTO):
             waiting.at(f"adjusting: {adjustment}")
             # of auto only the choice is asked

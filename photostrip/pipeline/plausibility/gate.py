@@ -7,12 +7,13 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, median
+from photostrip.arrays import Floats, Numbers, median
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import replace
 from photostrip.geodesy.ground_frame import GroundFrame
@@ -30,13 +31,14 @@ from photostrip.pipeline.plausibility import (
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import ImageEvidence, of_images
+from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import PhotoPoints, locate
 from photostrip.triangulation.plausibility import accepted
 from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, units
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result
-    from photostrip.pipeline.strips.stages import Stages
+    from photostrip.triangulation.gross_errors.rays.shifted_photo import ShiftedPhoto
     from photostrip.triangulation.independent_models.formation import FormedModels
 
 STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give
@@ -96,7 +98,9 @@ def of_result(result: Result, directory: Path | None = None, made: Stages | None
         findings += _of_formed(each, points)
     wrong = {photo for each in findings if each.is_error for photo in each.photos}
     names = {name for note in doubts for name in note.points}
-    findings += [each for each in _shifted_photos(result, formed, names) if wrong.isdisjoint(each.photos)]
+    findings += [
+        each for each in _shifted_photos(result, formed, names, made or Stages()) if wrong.isdisjoint(each.photos)
+    ]
     in_metres = not any(each.is_error for each in findings)
     if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
         checks = inputs.control.check
@@ -269,9 +273,19 @@ def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     return findings
 
 
-def _shifted_photos(result: Result, formed: Sequence[EvidenceStrip], doubted: Collection[str]) -> Iterator[Finding]:
+def _shifted_photos(
+    result: Result, formed: Sequence[EvidenceStrip], doubted: Collection[str], made: Stages
+) -> Iterator[Finding]:
     """Look for a photo of each strip whose image coordinates are all shifted; ``doubted`` are names of control."""
     from photostrip.triangulation.plausibility.photos import shifted_photo  # a check forms no strips
+
+    def tried(strip: EvidenceStrip, position: Numbers, about: int) -> ShiftedPhoto | None:
+        from photostrip.triangulation.gross_errors.rays.shifted_photo import (
+            shifted_photo,  # needs the bundle adjustment
+        )
+
+        given = (strip.orientation, strip.formed, points, position, about)
+        return made.once("shifted", partial(shifted_photo, *given), *given)
 
     points = result.refined.observations
     is_doubted = np.array([name in doubted for name in points.point_ids], bool)
@@ -284,7 +298,8 @@ def _shifted_photos(result: Result, formed: Sequence[EvidenceStrip], doubted: Co
             rows=strip.of_photos.rows,
             doubted=bool(is_doubted[each.formed.point].any()),
         )
-        yield from shifted_photo.find_shifted_photo(each.orientation, each.formed, points, adjusted)
+        rows = each.orientation.rows
+        yield from shifted_photo.find_shifted_photo(rows, points, adjusted, partial(tried, each))
 
 
 def _of_rotations(result: Result, formed: Sequence[EvidenceStrip], directory: Path | None) -> list[Finding]:

@@ -11,9 +11,9 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 
 T = TypeVar("T")
-Stage = Literal["pairs", "strip", "control", "covariance", "failure"]
-"""Pairs searched, a strip formed, on its control without what is wrong, adjusted with its covariance, what speaks for a
-failure."""
+Stage = Literal["pairs", "strip", "control", "covariance", "shifted", "failure"]
+"""Pairs searched, a strip formed, on its control without what is wrong, adjusted with its covariance, a shifted photo
+looked for in it, what speaks for a failure."""
 
 
 class Stages:
@@ -28,8 +28,10 @@ class Stages:
         Raises the GeometryError or InputError that it raised then.
         """
         made: list[tuple[tuple[object, ...], T | GeometryError | InputError]] = self._made.get(name, [])
-        found = next((each for values, each in made if alike(values, given)), None)
-        if found is None:
+        known = [each for values, each in made if alike(values, given)]
+        if known:
+            found = known[0]
+        else:
             try:
                 found = make()
             except (GeometryError, InputError) as error:

@@ -8,7 +8,8 @@ adjustment in which the principal point of the photo is unknown.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,8 +18,9 @@ from photostrip.frozen import dataclass
 from photostrip.notes import Finding, counted
 from photostrip.points import PhotoPoints, locate
 from photostrip.triangulation.plausibility.finding import found
-from photostrip.triangulation.relative_orientation.orientation import Orientation
-from photostrip.triangulation.strip_formation.strip import FormedStrip
+
+if TYPE_CHECKING:
+    from photostrip.triangulation.gross_errors.rays.shifted_photo import ShiftedPhoto
 
 POOR_SQUARES = 2.0  # mean square of the residuals of a photo, in variances, from which it is looked at
 LOST_SQUARES = 8.0  # what a rejected ray counts as: four standard deviations in one coordinate
@@ -43,16 +45,22 @@ class AdjustedPhotos:
 
 
 def find_shifted_photo(
-    oriented: Orientation, formed: FormedStrip, observations: PhotoPoints, adjusted: AdjustedPhotos
+    rows: Numbers,
+    observations: PhotoPoints,
+    adjusted: AdjustedPhotos,
+    tried: Callable[[Numbers, int], ShiftedPhoto | None],
 ) -> Iterator[Finding]:
-    """Find the photo of a strip whose image coordinates are all shifted (P109), at most one."""
+    """Find the photo of a strip whose image coordinates are all shifted (P109), at most one.
+
+    rows: (p, 2): image points of the pairs.
+    tried: adjusts with the principal point of a photo, or of one near it; takes the place in the strip of the photo of
+        every image point, and that of the photo.
+    """
     position = locate(observations.photo_ids, adjusted.photos)[observations.photo]
-    misfit = _misfit(position, distinct(oriented.rows), adjusted)
+    misfit = _misfit(position, distinct(rows), adjusted)
     if not (adjusted.doubted or misfit.max() > POOR_SQUARES):
         return
-    from photostrip.triangulation.gross_errors.rays.shifted_photo import shifted_photo  # needs the bundle adjustment
-
-    shifted = shifted_photo(oriented, formed, observations, position, int(misfit.argmax()))
+    shifted = tried(position, int(misfit.argmax()))
     if shifted is None or shifted.sigma0 > FITTING_SIGMA0 or shifted.agreeing < LEAST_AGREEING * shifted.measured:
         return
     name, (x, y) = adjusted.photos[shifted.photo], shifted.shift.tolist()
