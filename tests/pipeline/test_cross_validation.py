@@ -11,6 +11,7 @@ import pytest
 
 from photostrip.pipeline.cross_validation import FOLDS
 from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.precision import check_points
 from photostrip.pipeline.strips import forming
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.report.sections.accuracy_report import sections_of
@@ -189,3 +190,15 @@ def test_control_that_the_whole_rejected_is_not_searched_for_again(
     assert not rejected & {row["id"] for row in nonempty(again["cross_validation"]["points"])}
     assert len(searched) == 2 * alone[0]  # nothing more than in the whole of the second run
     assert len(adjusted) == 2 * alone[1] + (FOLDS if adjustment == "bundle" else 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("adjustment", ["polynomial", "covariance"])
+def test_points_that_are_too_many_to_be_tested_together_have_standard_deviations(
+    adjustment: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(check_points, "MOST_TESTED", 1)
+    document = solved(without_checks(bands=5), replace(TURNED, adjustment=adjustment)).document
+    points = document["cross_validation"]["points"]
+    assert len(points) > FOLDS
+    assert all(row["sigma_z"] > 0.0 for row in nonempty(points))

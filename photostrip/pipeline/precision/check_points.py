@@ -48,10 +48,18 @@ class Propagation:
 
 
 class CheckPoints(NamedTuple):
-    """Check points that a strip holds, and their rows (c,) in ``strip.formed.point``."""
+    """Check points that a strip holds, along it, and their rows (c,) in ``strip.formed.point``."""
 
     points: ControlPoints
     rows: Numbers
+
+    def spread(self) -> CheckPoints:
+        """Those that are tested together."""
+        count = len(self.rows)
+        if count <= MOST_TESTED:
+            return self
+        some = np.linspace(0, count - 1, MOST_TESTED).round().astype(int)
+        return CheckPoints(self.points.take(some), self.rows[some])
 
 
 def check_points(strip: StripResult, control: ControlPoints, observations: PhotoPoints) -> CheckPoints:
@@ -59,8 +67,6 @@ def check_points(strip: StripResult, control: ControlPoints, observations: Photo
     rows = rows_of_given(control.ids, strip.formed.point, observations.point_ids)
     found = np.flatnonzero(control.check & (rows >= 0) & control.use.any(axis=1))
     found = found[np.argsort(strip.xyz[rows[found], 0], kind="stable")]
-    if len(found) > MOST_TESTED:
-        found = found[np.linspace(0, len(found) - 1, MOST_TESTED).round().astype(int)]
     return CheckPoints(control.take(found), rows[found])
 
 

@@ -58,7 +58,7 @@ def of_models(
         variance=control.variance,
         sigma=sigma,
         basis=basis,
-        check=_check(strip, oriented, fit, influence, check_points(strip, given, observations), factor),
+        check=_check(strip, oriented, fit, influence, check_points(strip, given, observations).spread(), factor),
     )
 
 

@@ -52,7 +52,7 @@ def of_photos(
     for some in () if of_checks else found.photos():
         of_some = covariances.covariances(errors, some.rows, parameters, some.influence.__getitem__)
         photos[some.photos] = of_some * factor
-    compared = check_points.compare_with_checks(strip, errors, checks, oriented.frames)
+    compared = check_points.compare_with_checks(strip, errors, checks.spread(), oriented.frames)
     axes = strip.intermediate.axes
     return StripPrecision(
         points=axes @ points @ axes.T,
@@ -75,7 +75,7 @@ def _of_covariance(
     of_checks: bool,
 ) -> StripPrecision:
     """Covariances from the system that the adjustment with the strip's own covariance has solved."""
-    compared = check_points.compare_with_checks(strip, adjusted.system.errors, checks, frames)
+    compared = check_points.compare_with_checks(strip, adjusted.system.errors, checks.spread(), frames)
     control, axes = adjusted.control, strip.intermediate.axes
     if of_checks:
         points, photos = np.full((len(strip.xyz), 3, 3), np.nan), np.full((len(strip.strip.photos), 6, 6), np.nan)
