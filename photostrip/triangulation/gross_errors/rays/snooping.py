@@ -43,9 +43,7 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import (
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 from photostrip.triangulation.resection.ray_intersection import two_that_meet
 
-# rays of a photo for each that hardly moves it: that may go beside the worst, or change before its points are looked at
-# again
-RAYS_TO_ONE_MORE = 50
+RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
@@ -346,12 +344,10 @@ class _Search:
         point, images = self.problem.images.point, done.selection.images.copy()
         limit, xyz = done.limit, self.problem.start.points.copy()
         changed = np.full(self.problem.photos, done.selection.given != self.decided.given)
-        photo, photos = self.problem.images.photo, self.problem.photos
-        other = np.bincount(photo[images != self.decided.images], minlength=photos)
-        changed |= other * RAYS_TO_ONE_MORE > np.bincount(photo[images], minlength=photos)
+        changed[self.problem.images.photo[images != self.decided.images]] = True
         self.decided = done.selection
         within = self.beyond <= limit.of(np.diff(self.first))  # the limit rises where less is established
-        numbers = distinct(point[~images & (changed[photo] | within[point])])
+        numbers = distinct(point[~images & (changed[self.problem.images.photo] | within[point])])
         rows, single = list(map(self.rays_of, numbers.tolist())), np.diff(self.first)[numbers, None] < LEAST_RAYS
         placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] > 1
         place = np.where(single, xyz[numbers], np.where(placed, done.solution.points[numbers], np.nan))
