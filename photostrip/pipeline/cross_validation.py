@@ -26,7 +26,7 @@ def cross_validate(result: Result, adjust: Callable[[Inputs], Result]) -> tuple[
     adjust: adjusts the formed strips with other control.
     """
     control, folds = result.inputs.control, []
-    # the search in a strip need not find again what the whole rejected; a bundle begins without it by itself
+    # nothing is searched again in strips: what the whole rejected stays out; a bundle leaves it out by itself
     use = control.use & ~rejected_control(result) if result.bundle is None else control.use
     taken = np.flatnonzero(~control.check & use.any(axis=1))
     for group in _groups(result):

@@ -84,7 +84,9 @@ class CovarianceAdjustment:
         return by_all if self.left_out is None else by_all - self.left_out.influence(rows, conditions)
 
     def without(self, coordinates: Numbers) -> CovarianceAdjustment:
-        """Leave out control coordinates, given by their rows in ``control``: points and covariances follow.
+        """Leave out control coordinates, given by their rows in ``control``.
+
+        Points, photos and the covariances of points follow; covariances of photos and tests stay those of the whole.
 
         Raises numpy.linalg.LinAlgError where the others do not determine them.
         """
