@@ -35,23 +35,24 @@ TURNED = Settings(cross_validation=True)
 
 
 @cache
-def without_checks(bands: int = 3) -> Inputs:
-    wanted = spec("projected", 1, 5.0, bands=bands)
+def without_checks(bands: int = 3, strips: int = 1) -> Inputs:
+    wanted = spec("projected", strips, 5.0, bands=bands)
     return inputs_of(simulate(replace(wanted, seed=11, control=replace(wanted.control, check=0))))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("adjustment", ADJUSTMENTS)
-def test_a_fold_is_the_run_without_its_point(adjustment: str) -> None:
-    inputs, settings = without_checks(), Settings(adjustment=adjustment)
+@pytest.mark.parametrize(("adjustment", "strips"), [*((each, 1) for each in ADJUSTMENTS), ("covariance", 2)])
+def test_a_fold_is_the_run_without_its_point(adjustment: str, strips: int) -> None:
+    inputs, settings = without_checks(strips=strips), Settings(adjustment=adjustment)
     document = solved(inputs, replace(settings, cross_validation=True)).document
     rows = {row["id"]: row for row in document["cross_validation"]["points"]}
     assert set(rows) == {row["id"] for row in document["control"] if row["measured"]}
-    for name in nonempty(sorted(rows)[::4]):
-        check = np.array([each == name for each in inputs.control.ids])
+    for fold in nonempty(document["cross_validation"]["folds"][::4]):
+        name = fold["left_out"][-1]
+        check = np.isin(inputs.control.ids, fold["left_out"])
         alone = solved(replace(inputs, control=replace(inputs.control, check=check)), settings).document
         (given,) = (row for row in alone["control"] if row["id"] == name)
-        (tested,) = alone["precision"]["check"]["points"]
+        (tested,) = (row for row in alone["precision"]["check"]["points"] if row["id"] == name)
         keys = ("dx", "dy", "dz", "plan", "height", "plan_um", "height_um")
         (point,) = (row for row in alone["points"] if row["id"] == name)
         expected = {key: given[key] for key in keys}

@@ -32,20 +32,12 @@ class LeftOut(NamedTuple):
 def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[LeftOut]:
     """Predict groups of control coordinates (rows of the misclosures), each from all the others."""
     rows = found.conditions.of_control(np.concatenate(groups))
-    inverse = _columns(found, rows)[found.layout.block[rows], found.layout.position[rows]]
+    inverse = found.columns_of_inverse(rows)[found.layout.block[rows], found.layout.position[rows]]
     ends = np.cumsum([0, *(len(group) for group in groups)])
     return [
         _predicted(inverse[start:stop, start:stop], found.correlates[rows[start:stop]])
         for start, stop in pairwise(ends.tolist())
     ]
-
-
-def _columns(found: System, rows: Numbers) -> Floats:
-    """Columns K^-1 e of conditions, by blocks."""
-    layout = found.layout
-    right = np.zeros((layout.blocks, layout.height, len(rows)))
-    right[layout.block[rows], layout.position[rows], np.arange(len(rows))] = 1.0
-    return found.factors.solve(right)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,13 +56,11 @@ class Without:
         Raises numpy.linalg.LinAlgError where the others do not determine them.
         """
         rows = found.conditions.of_control(coordinates)
-        columns = _columns(found, rows)
+        columns = found.columns_of_inverse(rows)
         cofactors = columns[found.layout.block[rows], found.layout.position[rows]]
-        square = np.diag(cofactors)
-        size = np.sqrt(np.where(square > 0.0, square, 1.0))
-        if (square <= 0.0).any() or np.linalg.eigvalsh(cofactors / size / size[:, None])[0] < UNCHECKED:
+        inverse = _inverse(cofactors)
+        if inverse is None:
             raise np.linalg.LinAlgError("the control that is left does not determine what is left out")
-        inverse = np.asarray(np.linalg.inv(cofactors), float)
         return cls(system=found, rows=rows, columns=columns, inverse=inverse)
 
     @property
@@ -91,11 +81,20 @@ class Without:
 
 
 def _predicted(cofactors: Floats, correlates: Floats) -> LeftOut:
+    inverse = _inverse(cofactors)
+    if inverse is None:
+        return LeftOut(np.full(len(correlates), np.inf), np.inf)
+    errors = inverse @ correlates
+    return LeftOut(np.asarray(errors, float), float(errors @ correlates))
+
+
+def _inverse(cofactors: Floats) -> Floats | None:
+    """Pi^-1 of a group (k, k); None where the others do not determine it."""
     square = np.diag(cofactors)
-    if (square > 0.0).all():
-        size = np.sqrt(square)
-        scaled = cofactors / size / size[:, None]
-        if np.linalg.eigvalsh(scaled)[0] >= UNCHECKED:
-            errors = np.linalg.solve(scaled, correlates / size) / size
-            return LeftOut(np.asarray(errors, float), float(errors @ correlates))
-    return LeftOut(np.full(len(correlates), np.inf), np.inf)
+    if not (square > 0.0).all():
+        return None
+    size = np.sqrt(square)
+    scaled = cofactors / size / size[:, None]
+    if np.linalg.eigvalsh(scaled)[0] < UNCHECKED:
+        return None
+    return np.asarray(np.linalg.inv(scaled) / size / size[:, None], float)

@@ -146,10 +146,8 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
         solved = found.factors.solve(right[1:-1].reshape(layout.blocks, layout.height, -1))
         result[:] = solved[block, position].T.reshape(result.shape)
         return result
-    right = np.zeros((layout.blocks, layout.height, len(chosen)))
-    right[block, position, np.arange(len(chosen))] = 1.0
     solved = np.zeros((layout.blocks + 2, layout.height, len(chosen)))
-    solved[1:-1] = found.factors.solve(right)
+    solved[1:-1] = found.columns_of_inverse(chosen)
     for number, at, values in columns.blocks(range(layout.blocks)):
         near = solved[number : number + 3].reshape(3 * layout.height, -1)
         result[order[at]] = (values.reshape(len(near), -1).T @ near).reshape(-1, size, len(chosen))

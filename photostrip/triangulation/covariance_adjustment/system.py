@@ -197,6 +197,12 @@ class System:
         place = self.layout.position
         return np.asarray(self.factors.diagonal_of_inverse[self.layout.block, place, place], float)
 
+    def columns_of_inverse(self, rows: Numbers) -> Floats:
+        """Columns K^-1 e of conditions (c,), by blocks: shape (g, b, c)."""
+        right = np.zeros((self.layout.blocks, self.layout.height, len(rows)))
+        right[self.layout.block[rows], self.layout.position[rows], np.arange(len(rows))] = 1.0
+        return self.factors.solve(right)
+
     @property
     def unknowns(self) -> Floats:
         """Small similarities y of the models, shape (p, 7)."""
