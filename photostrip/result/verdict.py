@@ -343,7 +343,7 @@ def _photos(document: Document) -> Iterator[str]:
     """Name photos of large residuals, then those of which much was rejected, as by a shift of all their points."""
     whole = document["summary"]["image_rms_um"]
     rejected = {(row["photo"], row["point"]) for row in document["rejected"] if not row.get("readmitted")}
-    lost, poor, robbed = Counter(photo for photo, _ in rejected), [], []
+    lost, poor, losing = Counter(photo for photo, _ in rejected), [], []
     for photo in document["photos"]:
         name, rms, count = photo["id"], photo["image_rms_um"] or 0, lost[photo["id"]]
         measured = count + photo["points"]
@@ -351,8 +351,8 @@ def _photos(document: Document) -> Iterator[str]:
             text = f"image residuals of {rms:.1f} µm under the final orientation, {whole:.1f} µm in the whole project"
             poor.append((rms / whole, f"photo {name}: {text}"))
         elif count > MANY_OF_PHOTO * measured:
-            robbed.append((count / measured, f"photo {name}: {count} of its {measured} points were rejected"))
-    for odd, kind in ((poor, " with large residuals"), (robbed, " that lost points")):
+            losing.append((count / measured, f"photo {name}: {count} of its {measured} points were rejected"))
+    for odd, kind in ((poor, " with large residuals"), (losing, " that lost points")):
         yield from (text for _, text in sorted(odd, reverse=True)[:NAMED])
         yield from _more(len(odd), "photo", kind)
 

@@ -34,9 +34,8 @@ LARGEST_SCALE_STEP = 5.0  # of the logarithm of the scale, in one iteration
 ITERATIONS = 50
 CONVERGED = 1e-10  # of the strip's half length; the next step would be its square
 LAST_AXES_UPDATE = 2  # iteration; afterwards the directions of the ground axes no longer change
-LEAST_MOTION = (
-    1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
-)
+# smallest over largest singular value: a motion of the strip of which the control sees a thousandth
+LEAST_MOTION = 1e-3
 WEAK_LIMIT = 1 / 8  # well spread control has about 1; at an eighth errors of the control grow eightfold somewhere
 MOST_OFF = 0.2  # of half the strip's length, of half of the control: an error of ids or of the place
 OFF_LINE = 0.1  # breadth of given coordinates on a line over that of the strip's points, as parts of their lengths

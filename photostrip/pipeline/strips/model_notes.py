@@ -15,10 +15,8 @@ from photostrip.triangulation.independent_models.link_screening import LEFT
 from photostrip.triangulation.independent_models.model_errors import far_ends
 
 ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others
-ANOTHER_UNIT, NO_ERRORS = (
-    100.0,
-    1e-5,
-)  # ratio of residuals to what is stated; below the second there are no errors at all
+# ratio of residuals to what is stated; below the second there are no errors at all
+ANOTHER_UNIT, NO_ERRORS = 100.0, 1e-5
 WEAK_LINK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model
 
 

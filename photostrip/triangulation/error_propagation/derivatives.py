@@ -19,9 +19,8 @@ from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 COMPONENTS = 6  # of the error of a model: five elements of its pair, logarithm of the scale that it hands on
 ELEMENTS, SCALE = slice(0, 5), 5
-SHARING = (
-    2  # models between which error components share image coordinates: pairs share a photo, a scale transfer three
-)
+# models between which error components share image coordinates: pairs share a photo, a scale transfer three
+SHARING = 2
 SPAN = SHARING + 1  # photos on which the image coordinates of an error component lie
 
 

@@ -20,9 +20,8 @@ from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
 
 SQUARED_SINE = 1e-10  # square of the sine of the angle between rays
-LOOSE_SHARE = (
-    0.1  # standard deviation, as a part of the size of the network, from which a datum parameter is not determined
-)
+# standard deviation, as a part of the size of the network, from which a datum parameter is not determined
+LOOSE_SHARE = 0.1
 ALIKE = 0.95  # part of a named movement that lies among the undetermined ones
 COSINE_ALONG = 0.94  # cosine of 20 degrees: a line counts as the flight line
 LEFT_OVER = 1e-11  # part of its information that the other parameters leave a common parameter

@@ -15,9 +15,8 @@ from photostrip.triangulation.plausibility.control.straightening import GivenPoi
 _LevelPoints = tuple[Floats, Callable[[], WrittenAxes]]  # (n, 3) in the level frame; what the written axes are
 
 USUAL_SIGMA = 0.1  # metres, of coordinates without one
-FAR_AWAY = (
-    20.0  # times as far from the middle of a list as a good half of it: strip and map say nothing of such a place
-)
+# times as far from the middle of a list as a good half of it: strip and map say nothing of such a place
+FAR_AWAY = 20.0
 LEAST_OF_LIST = 4  # points that tell where a list lies
 
 

@@ -23,9 +23,8 @@ MARGIN_SHARES = (0.6, 0.25)  # of the width and the height of the area: a neighb
 MARGIN_LIMITS_DEG = (1.0, 4.0)
 CIRCLE_DEG = 360.0
 MOST_OUTSIDE_SHARE = 0.5  # of the points: single ones are slips
-SLIP_OF_PEN = (
-    1000.0  # times the median distance from the median place: a slip of the pen, which says nothing of the others
-)
+# times the median distance from the median place: a slip of the pen, which says nothing of the others
+SLIP_OF_PEN = 1000.0
 MOST_ROUND_TRIP = 1.0  # units of the frame between a point and where its geocentric coordinates lead back to
 MILLION = 1e6
 TENS = (10.0, 100.0, 1000.0)  # of coordinates with lost digits, or in kilometres

@@ -28,12 +28,10 @@ LEAST_COMMON_OF_MIRROR = 5  # common points that tell a mirror image
 MIRROR_MISFIT_SHARE = 0.25  # of the mirrored to the plain misfit
 MOST_MIRROR_MISFIT = 0.12  # of the spread of the points; relief and tilts leave less
 LEAST_BREADTH = 0.15  # breadth over length of the common points: mirror images of a line fit as well
-MOST_SHARE = (
-    0.4  # of the spread of the points left by a link: relief leaves 0.1, an oblique mount 0.33, other points 0.9
-)
-FAR_OUTSIDE = (
-    3.0  # times as far from the centre of a photo as four fifths of its points: a gross error, which turns any fit
-)
+# of the spread of the points left by a link: relief leaves 0.1, an oblique mount 0.33, other points 0.9
+MOST_SHARE = 0.4
+# times as far from the centre of a photo as four fifths of its points: a gross error, which turns any fit
+FAR_OUTSIDE = 3.0
 FAR_SHARE = 0.8
 SCALE_JUMP = 4.0  # ratio of the scales of two photos that neither height nor an oblique mount explains
 TINY = 1e-12
