@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
@@ -78,11 +78,11 @@ def _text(value: Plain, encode: Encoder) -> str:
     return encode.value(value)
 
 
-def parsed(file: str) -> Any:  # noqa: ANN401 (any JSON)
-    """Read a file of JSON, or raise what keeps it from being one."""
+def parsed(file: str, block: Callable[[Document], Document] | None = None) -> Any:  # noqa: ANN401 (any JSON)
+    """Read a file of JSON, or raise what keeps it from being one; `block` makes its blocks from dictionaries."""
     text, _ = decode(file, read_bytes(file, LARGEST_RESULT))
     try:
-        return json.loads(text)
+        return json.loads(text, object_hook=block)
     except json.JSONDecodeError as error:
         message = f"is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
         fix = "a result.json that was not written to its end? run the project again"
@@ -97,7 +97,7 @@ def parsed(file: str) -> Any:  # noqa: ANN401 (any JSON)
 
 def read_document(file: str, key: str) -> Document:
     """Read a document of another kind, which has this key, or else a result.json."""
-    document = parsed(file)
+    document = _located(file)
     if isinstance(document, dict) and key in document:
         return document
     return checked(document, file)
@@ -105,7 +105,13 @@ def read_document(file: str, key: str) -> Document:
 
 def read_result(file: str) -> Document:
     """Read a result.json, or raise what keeps it from being one."""
-    return checked(parsed(file), file)
+    return checked(_located(file), file)
+
+
+def _located(file: str) -> Any:  # noqa: ANN401 (any JSON)
+    from photostrip.result.reading import located
+
+    return located(lambda block: parsed(file, block))
 
 
 def checked(document: Any, file: str) -> Document:  # noqa: ANN401 (any JSON)
@@ -120,7 +126,7 @@ def checked(document: Any, file: str) -> Document:  # noqa: ANN401 (any JSON)
             expected=str(SCHEMA),
             fix="run the project again with this version of photostrip",
         )
-    from photostrip.result.reading import faults_of, located
+    from photostrip.result.reading import Located, faults_of, located, made_anew
 
     try:
         faults = faults_of(document, file)
@@ -128,5 +134,7 @@ def checked(document: Any, file: str) -> Document:  # noqa: ANN401 (any JSON)
         refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
     if faults:
         raise InputError(faults)
-    whole: Document = located(document)
+    if isinstance(document, Located):
+        return document
+    whole: Document = located(lambda block: made_anew(document, block))  # of a script
     return whole
