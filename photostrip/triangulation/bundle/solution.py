@@ -7,6 +7,7 @@ from functools import cached_property
 from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 from photostrip.triangulation.bundle.normal_equations.factored import Factored
+from photostrip.triangulation.bundle.normal_equations.reduced import Reduced, reduce
 from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
 
 
@@ -40,6 +41,7 @@ class BundleSolution:
     free: bool  # true when the datum came from inner constraints on the points: no control, no positions
     steps: tuple[IterationStep, ...]  # the way from the start, one entry for each step that was taken or refused
     prepared: PreparedProblem  # the problem as it was laid out; spares the precision that work
+    reduced: Reduced | None  # the normal equations at the solution, where the last steps of a rough one left them
 
     @property
     def state(self) -> Parameters:
@@ -49,7 +51,8 @@ class BundleSolution:
     @cached_property
     def factored(self) -> Factored:
         """The normal equations at the solution."""
-        return Factored.at(self.prepared, self.state, free=self.free)
+        reduced = self.reduced or reduce(self.prepared, self.state)
+        return Factored.of(self.prepared, self.state, reduced, free=self.free)
 
     @property
     def sigma0(self) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
+from photostrip.frozen import NamedTuple
 from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation.bundle.normal_equations import datum, defects
 from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
@@ -61,11 +62,17 @@ def solve(problem: BundleProblem, *, rough: bool = False) -> BundleSolution:
     prepared = prepare(problem)
     free = datum.is_free(problem)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # starts far off: such steps are refused
-        state, steps = _iterate(prepared, free=free, rough=rough)
-    return _solution(prepared, state, steps, free=free)
+        ended = _iterate(prepared, free=free, rough=rough)
+    return _solution(prepared, ended, free=free)
 
 
-def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> tuple[Parameters, tuple[IterationStep, ...]]:
+class _Ended(NamedTuple):
+    state: Parameters
+    reduced: Reduced | None  # the normal equations there, or of a rough solution before a last step that moves nothing
+    steps: list[IterationStep]
+
+
+def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> _Ended:
     """Step until the next step would be short enough.
 
     Where the sum of squares grows, the step is taken back and the diagonal of the normal equations raised, more each
@@ -83,11 +90,11 @@ def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> tuple[Par
         steps.append(_recorded(best, move, damping))
         moved = _moved(prepared, state, move)
         if damping == 0.0 and _still_to_come(steps) < CONVERGED:
-            return moved, tuple(steps)
+            return _Ended(moved, best if rough else None, steps)
         found = reduce(prepared, moved)
         if found.chi_square <= best.chi_square * (1.0 + SQUARES_ROUNDING):
             if rough and found.chi_square > best.chi_square * (1.0 - ROUGH):
-                return moved, tuple(steps)
+                return _Ended(moved, found, steps)
             state, best = moved, found
             damping = 0.0 if damping <= FIRST_DAMPING else damping * LESS
             continue
@@ -194,11 +201,9 @@ def _recorded(reduced: Reduced, move: ParameterStep, damping: float) -> Iteratio
     return IterationStep(chi_square=reduced.chi_square, length=move.length, damping=damping, shift=shift, turn=turn)
 
 
-def _solution(
-    prepared: PreparedProblem, state: Parameters, steps: tuple[IterationStep, ...], *, free: bool
-) -> BundleSolution:
+def _solution(prepared: PreparedProblem, ended: _Ended, *, free: bool) -> BundleSolution:
     """Find the residuals of all observations at the end, in their units, and the weighted sum of their squares."""
-    problem, structure = prepared.problem, prepared.structure
+    problem, structure, state = prepared.problem, prepared.structure, ended.state
     residuals = np.zeros((len(problem.images), 2))
     table, chi_square = prepared.table(state), 0.0
     for batch, xyz in zip(structure.batches, state.xyz, strict=True):
@@ -223,8 +228,9 @@ def _solution(
         chi_square=chi_square,
         redundancy=_redundancy(prepared, free=free),
         free=free,
-        steps=steps,
+        steps=tuple(ended.steps),
         prepared=prepared,
+        reduced=ended.reduced,
     )
 
 

@@ -18,7 +18,7 @@ from photostrip.triangulation.bundle.observations.problem import (
     ControlObservations,
     PositionObservations,
 )
-from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
+from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
 from photostrip.triangulation.bundle.quality.joint_points import joint_cofactors, sum_cofactors
 from photostrip.triangulation.bundle.solve import solve
 from tests.bundles import dense
@@ -177,3 +177,31 @@ def test_sums_of_coordinates_have_the_cofactors_of_the_joint_ones(problem: Bundl
     flat = factors.reshape(-1, 2)
     expected = flat.T @ joint_cofactors(solution, wanted) @ flat
     assert sum_cofactors(solution, wanted, factors) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["block", "everything"])
+def test_functions_of_photos_have_joint_cofactors(name: str) -> None:
+    """Three functions of photos one beside the other, in any order: the photos' own cofactors carried over."""
+    problem = PROBLEMS[name]()
+    solution = solve(problem)
+    joint, m = JointCofactors.of_solution(solution), problem.photos
+    functions = np.random.default_rng(4).normal(size=(m, 1, 3, 6))
+    own, photos = functions[:, 0], cofactors_of(solution).photos
+    np.testing.assert_allclose(
+        joint.of(np.arange(m)[:, None], functions), own @ photos @ own.swapaxes(1, 2), rtol=1e-7, atol=1e-18
+    )
+    expected = dense(problem, solution).cofactors[: 6 * m, : 6 * m].reshape(m, 6, m, 6)
+    for some in ((1, 0), (0, 2, 1), (m - 1, 0, 2)):
+        sets, by = np.array([some]), functions[list(some), 0]
+        wanted = np.einsum("icp,ipjq,jdq->icjd", by, expected[list(some)][:, :, list(some)], by)
+        found = joint.of(sets, by[None])[0].reshape(wanted.shape)
+        np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
+
+
+def test_a_rough_solution_has_the_cofactors_of_its_residuals() -> None:
+    problem = PROBLEMS["free"]()
+    exact, rough = solve(problem), solve(problem, rough=True)
+    found, expected = cofactors_of(rough, rough=True), cofactors_of(exact)
+    np.testing.assert_allclose(found.image_residuals, expected.image_residuals, rtol=1e-4, atol=1e-9)
+    assert rough.reduced is not None
+    assert exact.reduced is None

@@ -7,11 +7,14 @@ be looked at as a plain matrix without copying; what such a view shows beyond th
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.triangulation.bundle.normal_equations.lapack import lapack
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 COLUMNS_AT_A_TIME = 48  # columns of the inverse that are found at a time
 
@@ -34,12 +37,26 @@ class Band:
         return row + column * self.width
 
     def holds(self, row: Numbers, column: Numbers) -> Flags:
-        """Whether elements (row >= column) lie within the band."""
-        return np.asarray(row - column <= self.width)
+        """Whether the blocks of pairs of photos lie within the band."""
+        return np.asarray(np.abs(row - column) <= self.width // PHOTO)
 
-    def at(self, row: Numbers, column: Numbers) -> Floats:
-        """Give elements within the band (row >= column)."""
-        return np.asarray(self.flat[self.place(row, column)])
+    def blocks(self, row: Numbers, column: Numbers) -> Floats:
+        """Give blocks within the band, shape (..., 6, 6)."""
+        table, middle = self._table, self.width // PHOTO
+        return table.reshape(-1, PHOTO, PHOTO)[row * table.shape[1] + column - row + middle]
+
+    @cached_property
+    def _table(self) -> Floats:
+        """All blocks, of both halves: in row i those of photo i with the photos from i - w to i + w."""
+        photos, width, stride = self.size // PHOTO, self.width // PHOTO, self.flat.itemsize
+        strides = (PHOTO * (1 + self.width) * stride, PHOTO * stride, stride, self.width * stride)
+        lower = as_strided(self.flat, (photos, width + 1, PHOTO, PHOTO), strides)  # by column, from the diagonal down
+        table = np.empty((photos, 2 * width + 1, PHOTO, PHOTO))
+        table[:, width] = np.tril(lower[:, 0]) + np.tril(lower[:, 0], -1).swapaxes(1, 2)
+        for lag in range(1, width + 1):
+            table[lag:, width - lag] = lower[:-lag, lag]
+            table[:-lag, width + lag] = lower[:-lag, lag].swapaxes(1, 2)
+        return table
 
     def look(self, row: int, column: int, rows: int, columns: int) -> Floats:
         """Look at a block; only what lies in the band's lower half belongs to the matrix."""

@@ -7,11 +7,11 @@ from typing import Self
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
 from photostrip.triangulation.bundle.normal_equations import datum
-from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced, factored, reduce
+from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced, factored
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
@@ -32,19 +32,8 @@ class Inverse:
         W = Z times the border and C of the common parameters: [Z + W C W', -W C; -C W', C].
         """
         groups, n = len(sets), PHOTO * sets.shape[1]
-        number = (PHOTO * sets[:, :, None] + np.arange(PHOTO)).reshape(groups, n)
-        row, column = number[:, :, None], number[:, None, :]
         whole = np.empty((groups, n + more, n + more))
-        late, early = np.maximum(row, column), np.minimum(row, column)
-        near = self.band.holds(late, early)
-        if near.all():
-            whole[:, :n, :n] = self.band.at(late, early)
-        else:
-            whole[:, :n, :n][near] = self.band.at(late[near], early[near])
-            far = np.unique(number[~near.all(axis=(1, 2))])
-            columns = self.factor.solve(np.eye(self.factor.size)[:, far])
-            row, column = np.broadcast_arrays(row, column)
-            whole[:, :n, :n][~near] = columns[row[~near], np.searchsorted(far, column[~near])]
+        whole[:, :n, :n] = self.blocks(sets).swapaxes(2, 3).reshape(groups, n, n)
         if len(self.common):
             cross = self.cross[sets].reshape(groups, n, -1)
             whole[:, :n, :n] += cross @ self.common @ cross.swapaxes(1, 2)
@@ -53,6 +42,21 @@ class Inverse:
             whole[:, n:, n:] = self.common[:more, :more]
         return whole
 
+    def blocks(self, sets: Numbers) -> Floats:
+        """Blocks (g, k, k, 6, 6) of Z between the photos of sets (g, k) of places in the band."""
+        row, column = np.broadcast_arrays(sets[:, :, None], sets[:, None, :])
+        near = self.band.holds(row, column)
+        if near.all():
+            return self.band.blocks(row, column)
+        found = np.empty((*row.shape, PHOTO, PHOTO))
+        found[near] = self.band.blocks(row[near], column[near])
+        far, m = distinct(column[~near]), self.factor.size // PHOTO
+        unit = np.zeros((m, PHOTO, len(far), PHOTO))
+        unit[far, :, np.arange(len(far))] = np.eye(PHOTO)
+        solved = self.factor.solve(unit.reshape(m * PHOTO, -1)).reshape(unit.shape)
+        found[~near] = solved[row[~near], :, np.searchsorted(far, column[~near])]
+        return found
+
 
 @dataclass(frozen=True, eq=False)
 class Factored:
@@ -60,9 +64,8 @@ class Factored:
     band: Factor
 
     @classmethod
-    def at(cls, prepared: PreparedProblem, state: Parameters, *, free: bool) -> Self:
-        """Factor the reduced normal equations at given values; ``bundle-rank`` where they are singular."""
-        reduced = reduce(prepared, state)
+    def of(cls, prepared: PreparedProblem, state: Parameters, reduced: Reduced, *, free: bool) -> Self:
+        """Factor the reduced normal equations; ``bundle-rank`` where they are singular."""
         blocks = reduced.blocks[prepared.structure.diagonal]
         band = factored(prepared, reduced, datum.anchor(prepared, state, blocks) if free else None)
         if band is None:

@@ -28,7 +28,7 @@ class Sparse:
 
     def __init__(self, photos: int, rows: Numbers, columns: Numbers, blocks: Floats) -> None:
         self.photos, self.size = photos, PHOTO * photos
-        self.rows, self.columns, self.blocks = rows, columns, blocks
+        self.rows, self.columns, self.stored = rows, columns, blocks
         self.factored: SuperLU | None = None
 
     def factor(self) -> bool:
@@ -37,14 +37,14 @@ class Sparse:
         from scipy.sparse.linalg import splu
 
         element = np.arange(PHOTO)
-        row = np.broadcast_to((PHOTO * self.rows)[:, None, None] + element[:, None], self.blocks.shape)
-        column = np.broadcast_to((PHOTO * self.columns)[:, None, None] + element, self.blocks.shape)
+        row = np.broadcast_to((PHOTO * self.rows)[:, None, None] + element[:, None], self.stored.shape)
+        column = np.broadcast_to((PHOTO * self.columns)[:, None, None] + element, self.stored.shape)
         below = self.rows != self.columns
         place = (
             np.concatenate([row.ravel(), column[below].ravel()]),
             np.concatenate([column.ravel(), row[below].ravel()]),
         )
-        values = np.concatenate([self.blocks.ravel(), self.blocks[below].ravel()])
+        values = np.concatenate([self.stored.ravel(), self.stored[below].ravel()])
         matrix = coo_array((values, place), shape=(self.size, self.size)).tocsc()
         try:
             self.factored = splu(
@@ -62,7 +62,7 @@ class Sparse:
 
     def inverse(self) -> Sparse:
         """Return the elements of the inverse at the pairs."""
-        found = np.empty_like(self.blocks)
+        found = np.empty_like(self.stored)
         order = np.argsort(self.columns, kind="stable")
         edges = np.searchsorted(self.columns[order], np.arange(0, self.photos + TOGETHER, TOGETHER))
         for chunk, first in enumerate(range(0, self.photos, TOGETHER)):
@@ -75,16 +75,17 @@ class Sparse:
         return Sparse(self.photos, self.rows, self.columns, found)
 
     def _pair(self, row: Numbers, column: Numbers) -> tuple[Numbers, Flags]:
-        """Return the number of the pair of elements (row >= column), and whether there is one."""
+        """Return the number of the pair of photos, and whether there is one."""
         keys = self.rows * self.photos + self.columns
-        wanted = row // PHOTO * self.photos + column // PHOTO
+        wanted = np.maximum(row, column) * self.photos + np.minimum(row, column)
         pair = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
         return pair, keys[pair] == wanted
 
     def holds(self, row: Numbers, column: Numbers) -> Flags:
-        """Whether elements (row >= column) are stored."""
+        """Whether the blocks of pairs of photos are stored."""
         return self._pair(row, column)[1]
 
-    def at(self, row: Numbers, column: Numbers) -> Floats:
-        """Give stored elements (row >= column)."""
-        return np.asarray(self.blocks[self._pair(row, column)[0], row % PHOTO, column % PHOTO])
+    def blocks(self, row: Numbers, column: Numbers) -> Floats:
+        """Give stored blocks, shape (..., 6, 6)."""
+        found = self.stored[self._pair(row, column)[0]]
+        return np.where((row < column)[..., None, None], found.swapaxes(-1, -2), found)

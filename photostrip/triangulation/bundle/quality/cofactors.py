@@ -25,8 +25,11 @@ from photostrip.triangulation.bundle.parameters import Parameters, PreparedProbl
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 
-def cofactors_of(solution: BundleSolution) -> Cofactors:
-    """Cofactors of all parameters and residuals; ``bundle-rank`` when the normal matrix is singular at the solution."""
+def cofactors_of(solution: BundleSolution, *, rough: bool = False) -> Cofactors:
+    """Cofactors of all parameters and residuals; ``bundle-rank`` when the normal matrix is singular at the solution.
+
+    rough: leave points and photos of a free network in the datum of its band, which no residual feels.
+    """
     prepared = solution.prepared
     state, reduced, inverse = solution.state, solution.factored.reduced, solution.factored.inverse
     points = np.full((prepared.problem.points, 3, 3), np.nan)
@@ -38,7 +41,7 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
         residuals[batch.row[:, batch.real].ravel()] = of_rays[:, batch.real].reshape(-1, 2, 2)
     of_photos = inverse.cofactors(np.arange(len(table[0]))[:, None], len(state.common))
     positions, attitudes = (_given(prepared, linear, of_photos) for linear in given_at(prepared, state))
-    if solution.free:
+    if solution.free and not rough:
         points, of_photos = _inner(solution, state, points, of_photos)
     photos, cross = _turned(prepared, state, of_photos)
     weights = prepared.prior**-2.0
@@ -68,17 +71,20 @@ class JointCofactors:
     def of_solution(cls, solution: BundleSolution) -> Self:
         return cls(solution.factored.inverse, solution.prepared.structure.rank, solution.rotations)
 
-    def of(self, photos: Numbers) -> Floats:
-        """Shifts (m) and rotation vectors (rad) of g sets of k photos in the Cartesian frame, shape (g, 6k, 6k)."""
-        (g, k), order = photos.shape, np.argsort(self.rank[photos], axis=1)
-        ordered = np.take_along_axis(photos, order, axis=1)
-        whole = self.inverse.cofactors(self.rank[ordered], 0)
-        turn = np.zeros((g, k, PHOTO, k, PHOTO))
-        for part in (slice(3), slice(3, PHOTO)):
-            turn[np.arange(g)[:, None], order, part, np.arange(k), part] = self.rotations[ordered]
-        turn *= SIGNS
-        flat = turn.reshape(whole.shape)
-        return np.asarray(flat @ whole @ flat.swapaxes(1, 2), float)
+    def of(self, photos: Numbers, partials: Floats) -> Floats:
+        """Joint cofactors (g, k c, k c) of c functions of each of k photos, in g sets of photos (g, k).
+
+        partials: (g, k, c, 6): by shift (m) and rotation vector (rad) of the photo in the Cartesian frame.
+        """
+        (g, k, c, _), sets = partials.shape, self.rank[photos]
+        inner = partials @ _own_axes(self.rotations)[photos]
+        half = inner @ self.inverse.blocks(sets).swapaxes(2, 3).reshape(g, k, PHOTO, -1)
+        whole = half.reshape(g, k * c, k, PHOTO).swapaxes(1, 2) @ inner.swapaxes(2, 3)
+        found = whole.swapaxes(1, 2).reshape(g, k * c, -1)
+        if len(self.inverse.common):
+            cross = (inner @ self.inverse.cross[sets]).reshape(g, k * c, -1)
+            found += cross @ self.inverse.common @ cross.swapaxes(1, 2)
+        return np.asarray(found, float)
 
 
 def _batch(
@@ -164,12 +170,16 @@ def _given(prepared: PreparedProblem, linear: LinearisedOrientations, of_photos:
 
 def _turned(prepared: PreparedProblem, state: Parameters, of_photos: Floats) -> tuple[Floats, Floats]:
     """Turn the cofactors of photos (and common parameters) into the Cartesian frame and the problem's order."""
-    rank = prepared.structure.rank
-    turn = np.zeros((len(rank), PHOTO, PHOTO))
-    turn[:, :3, :3] = turn[:, 3:, 3:] = state.rotations
-    turn *= SIGNS
+    rank, turn = prepared.structure.rank, _own_axes(state.rotations)
     alone = turn @ of_photos[rank, :PHOTO, :PHOTO] @ turn.swapaxes(1, 2)
     return alone, turn @ of_photos[rank, :PHOTO, PHOTO:]
+
+
+def _own_axes(rotations: Floats) -> Floats:
+    """Turn steps of photos in their own axes and signs into the Cartesian frame: matrices (m, 6, 6)."""
+    turn = np.zeros((len(rotations), PHOTO, PHOTO))
+    turn[:, :3, :3] = turn[:, 3:, 3:] = rotations
+    return turn * SIGNS
 
 
 def _inner(solution: BundleSolution, state: Parameters, points: Floats, of_photos: Floats) -> tuple[Floats, Floats]:

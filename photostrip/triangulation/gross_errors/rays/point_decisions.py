@@ -34,8 +34,7 @@ class PointRays:
     rays: int  # the first 2 r rows are theirs, x and y of one ray after the other
     misfit: Floats  # (m, n): measured minus computed
     by_point: Floats  # (m, n, 3): derivatives by the point
-    by_photos: Floats  # (m, n, 6 r): derivatives by shift and rotation of the photos; 0 for control
-    cofactors: Floats  # (m, 6 r, 6 r): joint cofactors of the photos
+    of_photos: Floats  # (m, n, n): covariances that their photos bring into the rows; 0 for control
     inside: Flags  # (m, n): rows that took part in their adjustment
 
 
@@ -117,16 +116,15 @@ def _misclosures(point: PointRays) -> _Misclosures:
     grow to (I - S)^-1 times those found, and the cofactors Z of the photos to Z + Z D' (I - S)^-1 D Z.
     """
     basis = np.linalg.qr(point.by_point, mode="complete")[0][..., 3:]
-    across, cofactors, misfit = basis.swapaxes(-1, -2), point.cofactors, point.misfit[..., None]
-    design = across @ point.by_photos
+    across, misfit = basis.swapaxes(-1, -2), point.misfit[..., None]
     inside = (point.inside & (point.inside.sum(axis=-1, keepdims=True) > 3))[..., None]
     place = np.linalg.qr(point.by_point * inside)[0] * inside
     beside = np.eye(misfit.shape[-2]) * inside - place @ place.swapaxes(-1, -2)
-    part = beside @ point.by_photos
-    pull, own = (each @ cofactors @ part.swapaxes(-1, -2) for each in (design, part))
+    spread = across @ point.of_photos
+    pull, own = spread @ beside, beside @ point.of_photos @ beside
     lever = pull @ np.linalg.inv(np.eye(own.shape[-1]) * (1 + REGULARISATION) - own)
     gap = across @ misfit + lever @ (beside @ misfit)
-    variance = np.eye(design.shape[-2]) + design @ cofactors @ design.swapaxes(-1, -2) + lever @ pull.swapaxes(-1, -2)
+    variance = np.eye(across.shape[-2]) + spread @ basis + lever @ pull.swapaxes(-1, -2)
     return _Misclosures(gap[..., 0], np.asarray(np.linalg.inv(variance), float), basis)
 
 

@@ -19,6 +19,7 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.bundle.normal_equations.factored import Factored
+from photostrip.triangulation.bundle.normal_equations.reduced import reduce
 from photostrip.triangulation.bundle.observations.problem import BundleCameras, BundleProblem
 from photostrip.triangulation.bundle.parameters import parameters_from, prepare
 from photostrip.triangulation.bundle.quality.reliability import limit_of
@@ -114,7 +115,7 @@ class _Network:
         prepared = prepare(selected(freed, self.plain))
         start = prepared.problem.start
         state = parameters_from(prepared, start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
-        factored = Factored.at(prepared, state, free=True)
+        factored = Factored.of(prepared, state, reduce(prepared, state), free=True)
         p = len(state.common)
         border = factored.reduced.border.reshape(-1, p + 1)
         rest = factored.reduced.corner[:p] - border[:, :p].T @ factored.band.solve(border)

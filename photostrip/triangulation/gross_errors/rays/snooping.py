@@ -21,7 +21,6 @@ from photostrip.rejection import SEVERAL_RAYS, Rejection
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up
 from photostrip.triangulation.bundle.normal_equations.defects import refuse_endless
-from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
@@ -71,7 +70,7 @@ class ScreenedBundle:
             problem=chosen,
             selection=selection,
             solution=solution,
-            precision=cofactors_of(solution),
+            precision=cofactors_of(solution, rough=rough),
             limit=reliability.limit_of(solution, settings, points_out, BOTH_GO if rough else 1.0),
         )
 
@@ -325,16 +324,15 @@ class _Search:
         sound = np.asarray(np.isfinite(np.concatenate([off[..., None], by_photo], axis=3)).all(axis=(1, 2, 3)))
         for each in (off, by_photo, by_point):
             each[~sound] = 0.0
-        of_photos = np.zeros((m, r, 2, r, PHOTO))
-        of_photos[:, np.arange(r), :, np.arange(r)] = (by_photo / sigma).swapaxes(0, 1)
         spread, axes = control.sigma[given], control.axes[given]
+        of_photos = np.zeros((m, 2 * r + spread.shape[1], 2 * r + spread.shape[1]))
+        of_photos[:, : 2 * r, : 2 * r] = done.joint.of(photo, by_photo / sigma)
         to_given = np.einsum("mci,mci->mc", axes, control.xyz[given[0]] - xyz[:, None]) / spread
         rays = PointRays(
             rays=r,
             misfit=np.hstack([(off / sigma[..., 0]).reshape(m, -1), np.where(sound[:, None], to_given, 0.0)]),
             by_point=np.hstack([(by_point / sigma).reshape(m, -1, 3), axes / spread[..., None]]),
-            by_photos=np.hstack([of_photos.reshape(m, 2 * r, -1), np.zeros((*spread.shape, PHOTO * r))]),
-            cofactors=done.joint.of(photo),
+            of_photos=of_photos,
             inside=np.hstack([np.repeat(done.selection.images[rows], 2, axis=1), done.selection.control[given]]),
         )
         return [each if meets else undecided(r) for each, meets in zip(decide(rays, limit), sound, strict=True)]
