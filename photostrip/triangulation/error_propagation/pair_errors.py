@@ -5,18 +5,14 @@ Source: derived, docs/precision.md, eq. 1; [001] eq. 126-138 for the operations.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from photostrip.arrays import Floats
+from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
-from photostrip.geometry.rotation import angle_rates, from_alpha_omega_kappa
+from photostrip.geometry.rotation import angle_rates, cross_matrix, from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.pairs import Pairs
-from photostrip.triangulation.relative_orientation.solution import base_rays, linearised_parallaxes, normal_matrices
-
-_ByRay = Callable[[Floats], Floats]  # from changes of a ray, (m, 3, k), to those of the points
+from photostrip.triangulation.relative_orientation.solution import normal_matrices
 
 SYSTEM = "alpha-omega-kappa"
 LEFT, RIGHT = slice(0, 2), slice(2, 5)  # elements that turn the left and the right photo
@@ -33,6 +29,8 @@ class PairErrors:
     rotation_by_elements: Floats  # (p, 3, 5): small rotation of the right photo
     point_by_elements: Floats  # (m, 3, 5): metres per radian
     point_by_image: Floats  # (m, 3, 4): the elements held fast, metres per mm
+    parallax_by_elements: Floats  # (5, m): y parallax in the base frame, mm per radian
+    parallax_by_image: Floats  # (m, 4): without unit
     point: Floats  # (m, 3): model point from the left perspective centre, metres
     base: Floats  # (p, 3): right from left perspective centre, metres
 
@@ -50,17 +48,37 @@ def differentiate_pairs(
     left, right = _turns(orientation.elements)
     to_ground = rotations @ left.rotation.transpose(0, 2, 1) * scale[:, None, None]
     turn = np.concatenate([-left.rates, right.rates], axis=2)
+    of_row, count = _by_row(to_ground, pairs.pair), len(pairs.pair)
+    by_elements, by_image = np.empty((count, 3, 5)), np.empty((count, 3, 4))
+    parallax_by_elements, parallax_by_image = np.empty((5, count)), np.empty((count, 4))
     with np.errstate(all="ignore"):
-        points = _points(orientation, left, right, across)
+        levels = [_levelled(*each, pairs) for each in zip(orientation.rays, (left, right), strict=True)]
+        if across is None:
+            point, by_levels = _on_both_rays(levels[0].xy, levels[1].xy, pairs.focal)
+        else:
+            seen_along = np.einsum("pij,pj->pi", left.rotation, across)[pairs.pair]
+            point, by_levels = _on_left_rays(levels[0].xy, levels[1].xy, pairs.focal, seen_along)
+        for level, by_level, elements, image, sign in zip(
+            levels, by_levels, (LEFT, RIGHT), (slice(0, 2), slice(2, 4)), (1.0, -1.0), strict=True
+        ):
+            in_ground = _product(of_row, by_level)
+            by_elements[:, :, elements] = _product(in_ground, level.by_elements).transpose(2, 0, 1)
+            by_image[:, :, image] = _product(in_ground, level.by_image).transpose(2, 0, 1)
+            parallax_by_elements[elements] = sign * level.by_elements[1]
+            parallax_by_image[:, image] = sign * level.by_image[1].T
+        # in the frame of the left photo, which is held: (p x) turned to the ground
+        point = (of_row * point).sum(axis=1).T
+        by_elements[:, :, LEFT] += cross_matrix(point) @ (to_ground @ left.rates / scale[:, None, None])[pairs.pair]
     base = np.zeros((pairs.size, 3, 5))
-    base[:, :, LEFT] = -_crossed(left.rates, np.array([1.0, 0.0, 0.0]))  # the left photo is held, the base turns
-    of_row = to_ground[pairs.pair]
+    base[:, :, LEFT] = cross_matrix(np.array([1.0, 0.0, 0.0])) @ left.rates  # the left photo is held, the base turns
     return PairErrors(
         base_by_elements=to_ground @ base,
         rotation_by_elements=to_ground @ turn / scale[:, None, None],
-        point_by_elements=of_row @ points.by_elements,
-        point_by_image=of_row @ points.by_image,
-        point=np.einsum("mij,mj->mi", of_row, points.point),
+        point_by_elements=by_elements,
+        point_by_image=by_image,
+        parallax_by_elements=parallax_by_elements,
+        parallax_by_image=parallax_by_image,
+        point=point,
         base=to_ground[:, :, 0],
     )
 
@@ -87,97 +105,78 @@ def _turns(elements: Floats) -> tuple[_Turns, _Turns]:
     return left, right
 
 
-class _Points(NamedTuple):
-    """Model points in the base frame with base 1, the left photo held."""
+class _Level(NamedTuple):
+    """Image points of one photo of every pair, brought to a level photo in the base frame, and their derivatives."""
 
-    point: Floats  # (m, 3)
-    by_elements: Floats  # (m, 3, 5)
-    by_image: Floats  # (m, 3, 4)
-
-
-def _crossed(axes: Floats, vectors: Floats) -> Floats:
-    """Cross products axis x vector of every column of the axes, shape (..., 3, k)."""
-    return np.asarray(np.cross(axes, vectors[..., :, None], axisa=-2, axisb=-2, axisc=-2), float)
+    xy: Floats  # (2, m): image coordinates, mm
+    by_elements: Floats  # (2, k, m): by the photo's angles among the elements
+    by_image: Floats  # (2, 2, m)
 
 
-def elements_by_image(orientation: Orientation) -> Floats:
-    """Elements of each row's pair, (m, 5, 4), radians per mm, 0 if not used: de = -(J^T W J)^-1 J^T W B v (eq. 1)."""
+def elements_by_parallax(orientation: Orientation, jacobian: Floats) -> Floats:
+    """Elements by the y parallax of each row, (m, 5), radians per mm, 0 if not used: -(J^T W J)^-1 J^T W (eq. 1).
+
+    jacobian: (5, m), y parallaxes by the elements.
+    """
     pairs = orientation.pairs
     with np.errstate(all="ignore"):
-        _, jacobian = linearised_parallaxes(orientation.elements, pairs)
         cofactors = np.linalg.inv(normal_matrices(jacobian, pairs))
-        by_image = _parallax_by_image(orientation.elements, pairs, *_turns(orientation.elements))
-        share = np.einsum("mij,jm->mi", cofactors[pairs.pair], jacobian * pairs.weight)
-        found = -share[:, :, None] * by_image[:, None, :]
+        found = np.zeros(jacobian.shape[::-1])
+        for row, weighted in zip(cofactors.transpose(1, 0, 2), jacobian * pairs.weight, strict=True):
+            found -= row[pairs.pair] * weighted[:, None]
     found[~orientation.used] = 0.0
     return found
 
 
-def _parallax_by_image(elements: Floats, pairs: Pairs, left: _Turns, right: _Turns) -> Floats:
-    """B: y parallax q by (x1, y1, x2, y2), shape (m, 4), without unit."""
-    rays = base_rays(elements, pairs)
-    result = np.empty((len(pairs.pair), 4))
-    for columns, sign, ray, photo in ((slice(0, 2), 1.0, rays[0], left), (slice(2, 4), -1.0, rays[1], right)):
-        turned = photo.rotation[pairs.pair][:, :, :2]
-        result[:, columns] = sign * _levelled(ray, turned, pairs.focal)[:, 1]
-    return result
+def _by_row(of_pairs: Floats, pair: Numbers) -> Floats:
+    """Bring matrices of pairs (p, i, j) to the rows, (i, j, m), as all below has them: products run along the rows."""
+    return of_pairs.transpose(1, 2, 0).take(pair, axis=2)
 
 
-def _levelled(ray: Floats, change: Floats, focal: float) -> Floats:
-    """Change of the image coordinates of a ray brought to a level photo, shape (m, 2, k), by that of the ray."""
-    slope = ray[:2] / ray[2]
-    return np.asarray(-focal * (change[:, :2] - slope.T[:, :, None] * change[:, 2:]) / ray[2][:, None, None], float)
+def _product(first: Floats, second: Floats) -> Floats:
+    """Multiply matrices of rows, (i, j, m) and (j, k, m)."""
+    return np.asarray(np.einsum("ijm,jkm->ikm", first, second), float)
 
 
-def _points(orientation: Orientation, left: _Turns, right: _Turns, across: Floats | None) -> _Points:
-    """Differentiate the intersection by both rays, and these by elements and image coordinates."""
-    pairs = orientation.pairs
-    rays = base_rays(orientation.elements, pairs)
-    if across is None:
-        point, by_ray = _on_both_rays(*rays, pairs.focal)
-    else:
-        point, by_ray = _on_left_rays(*rays, np.einsum("pij,pj->pi", left.rotation, across)[pairs.pair])
-    by_elements, by_image = np.empty((len(point), 3, 5)), np.empty((len(point), 3, 4))
-    for side, (columns, photo) in enumerate(zip((LEFT, RIGHT), (left, right), strict=True)):
-        by_elements[:, :, columns] = by_ray[side](_crossed(photo.rates[pairs.pair], rays[side].T))
-        by_image[:, :, 2 * side : 2 * side + 2] = by_ray[side](photo.rotation[pairs.pair][:, :, :2])
-    by_elements[:, :, LEFT] -= _crossed(left.rates[pairs.pair], point)  # in the frame of the left photo, which is held
-    return _Points(point, by_elements, by_image)
+def _levelled(ray: Floats, photo: _Turns, pairs: Pairs) -> _Level:
+    """Bring rays (3, m) to a level photo: x = -f X/Z, y = -f Y/Z, by small turns of the photo and by its images."""
+    focal = pairs.focal
+    x, y = xy = -focal * ray[:2] / ray[2]
+    by_turn = np.stack([x * y, -(focal**2) - x * x, -y * focal, focal**2 + y * y, -x * y, x * focal]) / focal
+    by_ray = np.zeros((2, 3, len(x)))
+    by_ray[0, 0] = by_ray[1, 1] = -focal / ray[2]
+    by_ray[:, 2] = -xy / ray[2]
+    by_elements = _product(by_turn.reshape(2, 3, -1), _by_row(photo.rates, pairs.pair))
+    return _Level(xy, by_elements, _product(by_ray, _by_row(photo.rotation[:, :, :2], pairs.pair)))
 
 
-def _on_both_rays(left: Floats, right: Floats, focal: float) -> tuple[Floats, tuple[_ByRay, _ByRay]]:
-    """Differentiate N = 1 / (x1 - x2), X = N x1, Y = N (y1 + y2) / 2, Z = -N f of image coordinates made level."""
-    level = [-focal * ray[:2] / ray[2] for ray in (left, right)]
-    factor = 1 / (level[0][0] - level[1][0])  # eq. 138 with the base along x
-    middle = (level[0][1] + level[1][1]) / 2
-    point = np.column_stack([factor * level[0][0], factor * middle, -factor * focal])
-    by_level = np.zeros((2, len(factor), 3, 2))
-    by_level[0, :, :, 0] = -factor[:, None] * point
-    by_level[1, :, :, 0] = factor[:, None] * point
-    by_level[0, :, 0, 0] += factor
-    by_level[:, :, 1, 1] = factor / 2
-    return point, (
-        lambda change: by_level[0] @ _levelled(left, change, focal),
-        lambda change: by_level[1] @ _levelled(right, change, focal),
-    )
+def _on_both_rays(left: Floats, right: Floats, focal: float) -> tuple[Floats, Floats]:
+    """Intersect level image points (2, m): N = 1 / (x1 - x2), X = N x1, Y = N (y1 + y2) / 2, Z = -N f.
 
-
-def _on_left_rays(left: Floats, right: Floats, across: Floats) -> tuple[Floats, tuple[_ByRay, _ByRay]]:
-    """Differentiate P = N l with N = w . (b x r) / w . (l x r): the rays l and r meet, seen along w; b = (1, 0, 0).
-
-    Where a y parallax is left over, w matters to the point; how the elements turn it is of second order.
+    Returns points (3, m), the base being 1, and their derivatives (2, 3, 2, m) by both image points.
     """
-    first, second = left.T, right.T
+    factor = 1 / (left[0] - right[0])  # eq. 138 with the base along x
+    point = np.stack([factor * left[0], factor * (left[1] + right[1]) / 2, -factor * focal])
+    by_level = np.zeros((2, 3, 2, len(factor)))
+    by_level[1, :, 0] = factor * point
+    by_level[0, :, 0] = -by_level[1, :, 0]
+    by_level[0, 0, 0] += factor
+    by_level[:, 1, 1] = factor / 2
+    return point, by_level
+
+
+def _on_left_rays(left: Floats, right: Floats, focal: float, across: Floats) -> tuple[Floats, Floats]:
+    """Intersect along the left rays: P = N l, N = w . (b x r) / w . (l x r) with b = (1, 0, 0); see ``_on_both_rays``.
+
+    The rays l and r meet, seen along w, ``across`` (m, 3). Where a y parallax is left over, w matters to the point; how
+    the elements turn it is of second order.
+    """
+    first, second = (np.column_stack([*each, np.full(len(across), -focal)]) for each in (left, right))
     base = np.cross(across, np.array([1.0, 0.0, 0.0]))
     size = np.einsum("mi,mi->m", across, np.cross(first, second))[:, None]
     factor = np.einsum("mi,mi->m", base, second)[:, None] / size
     by_first = -factor * np.cross(second, across) / size
     by_second = (base - factor * np.cross(across, first)) / size
-
-    def along(gradient: Floats, change: Floats) -> Floats:
-        return np.asarray(first[:, :, None] * np.einsum("mi,mik->mk", gradient, change)[:, None, :], float)
-
-    return factor * first, (
-        lambda change: along(by_first, change) + factor[:, :, None] * change,
-        lambda change: along(by_second, change),
-    )
+    by_level = np.stack([first.T[:, None] * each.T[:2] for each in (by_first, by_second)])
+    by_level[0, [0, 1], [0, 1]] += factor[:, 0]
+    return (factor * first).T, by_level

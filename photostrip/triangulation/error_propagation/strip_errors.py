@@ -34,6 +34,7 @@ from photostrip.triangulation.error_propagation.derivatives import (
     ErrorRows,
     ImagePoints,
     PlacedStrip,
+    add_rows,
 )
 from photostrip.triangulation.error_propagation.pair_errors import PairErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
@@ -142,32 +143,31 @@ def _image_points(
     row = row[np.argsort(position[row], kind="stable")]
     components = np.zeros((len(row), 2, SPAN, COMPONENTS))
     images = ImagePoints(row=row, photo=position[row], sigma=sigma[row], components=components)
-    place = images.rows_of(orientation.rows)
-    by_left, by_right = np.split(pair_errors.elements_by_image(orientation).transpose(0, 2, 1), 2, axis=1)
-    components[place[:, 0], :, 2, ELEMENTS] = by_left
-    components[place[:, 1], :, 1, ELEMENTS] = by_right
     joined, models = formed.junctions, orientation.pairs.size
     before, after = scale_shares(orientation, formed, pairs)
-    scale_by_elements, scale_by_next = (np.zeros((models, 5)) for _ in range(2))  # elements of a model, of the next
+    # elements of a model, and of the next, by which the scale is handed on from it; after the last model it is not
+    of_scale, of_scale_before = (np.zeros((models, 5)) for _ in range(2))
     center_to_point = pairs.point_by_elements[joined.before] - pairs.base_by_elements[joined.junction]
-    np.add.at(scale_by_elements, joined.junction, np.einsum("ti,tij->tj", before, center_to_point))
-    np.add.at(scale_by_next, joined.junction, -np.einsum("ti,tij->tj", after, pairs.point_by_elements[joined.after]))
-    by_before = np.einsum("ti,tij->tj", before, pairs.point_by_image[joined.before])
-    by_after = np.einsum("ti,tij->tj", after, pairs.point_by_image[joined.after])
+    add_rows(of_scale, joined.junction, (before[:, None] @ center_to_point)[:, 0])
+    by_next = after[:, None] @ pairs.point_by_elements[joined.after]
+    add_rows(of_scale_before, joined.junction + 1, -by_next[:, 0])
+    place, stated = images.rows_of(orientation.rows), sigma[orientation.rows].reshape(-1, 4)
+    by_parallax = pair_errors.elements_by_parallax(orientation, pairs.parallax_by_elements)
+    parallax = np.where(orientation.used[:, None], pairs.parallax_by_image * stated, 0.0)
+    scale, scale_before = (
+        (by_parallax * shares[orientation.pairs.pair]).sum(axis=1) for shares in (of_scale, of_scale_before)
+    )
+    by_parallax = np.column_stack([by_parallax, scale])
+    sides = (parallax[:, :2], place[:, 0], 2), (parallax[:, 2:], place[:, 1], 1)
+    for by_image, image, slot in sides:
+        components[image, :, slot] = by_image[:, :, None] * by_parallax[:, None, :]
+    for by_image, image, slot in sides:
+        components[image, :, slot - 1, SCALE] += by_image * scale_before[:, None]
+    by_before = (before[:, None] @ pairs.point_by_image[joined.before])[:, 0] * stated[joined.before]
+    by_after = (after[:, None] @ pairs.point_by_image[joined.after])[:, 0] * stated[joined.after]
     components[place[joined.before, 0], :, 2, SCALE] += by_before[:, :2]
     components[place[joined.before, 1], :, 1, SCALE] += by_before[:, 2:] - by_after[:, :2]
     components[place[joined.after, 1], :, 0, SCALE] -= by_after[:, 2:]
-    photo = images.photo
-    none = np.zeros((SPAN, 5))  # beyond the ends there is no model and no share
-    mine, following = (np.concatenate([shares, none]) for shares in (scale_by_elements, scale_by_next))
-    for slot, shares, model, elements in (
-        (2, mine, photo, 2),
-        (1, mine, photo - 1, 1),
-        (1, following, photo - 1, 2),
-        (0, following, photo - 2, 1),
-    ):
-        components[:, :, slot, SCALE] += np.einsum("ni,nji->nj", shares[model], components[:, :, elements, ELEMENTS])
-    components *= images.sigma[:, :, None, None]
     return images
 
 

@@ -86,6 +86,11 @@ class Orientation:
         right = from_alpha_omega_kappa(al2, om2, ka2)
         return left[:, 0, :], left.transpose(0, 2, 1) @ right
 
+    @cached_property
+    def rays(self) -> tuple[Floats, Floats]:
+        """Image rays of the left and the right photo in the base frame, mm, shape (3, m) each."""
+        return solution.base_rays(self.elements, self.pairs)
+
     def take(self, numbers: Numbers) -> Orientation:
         """Take some of the pairs, given by ascending numbers; they are renumbered from 0."""
         part = take_rows(take_rows(self, numbers, BY_PAIR), self.pairs.rows_of(numbers), BY_ROW)
@@ -188,22 +193,18 @@ def condition_numbers(normal: Floats) -> Floats:
     return np.where(sound & (values[:, 0] > 0), condition, np.inf)
 
 
-def unusable_pairs(result: Orientation, converged: Flags, rays: tuple[Floats, Floats] | None = None) -> Flags:
-    """Pairs that cannot be used as they are: degenerate, not converged, behind their cameras, or without a base.
-
-    rays: (3, m) each, optional, rays of their points in the base frame, when they are known already.
-    """
+def unusable_pairs(result: Orientation, converged: Flags) -> Flags:
+    """Pairs that cannot be used as they are: degenerate, not converged, behind their cameras, or without a base."""
     pairs = result.pairs
-    left, right = solution.base_rays(result.elements, pairs) if rays is None else rays
-    front = solution.rays_meet_in_front(left, right) & result.used
+    front = solution.rays_meet_in_front(*result.rays) & result.used
     share = pairs.sums(front.astype(float)) / np.maximum(result.points_used, 1)
     bad: Flags = ~converged | ~(result.condition <= CONDITION_LIMIT) | (share <= LEAST_IN_FRONT)
-    return bad | (_mean_parallaxes(result, left, right) < SMALLEST_PARALLAX * pairs.focal)
+    return bad | (_mean_parallaxes(result) < SMALLEST_PARALLAX * pairs.focal)
 
 
-def _mean_parallaxes(result: Orientation, left: Floats, right: Floats) -> Floats:
+def _mean_parallaxes(result: Orientation) -> Floats:
     """Mean x parallax of each pair in the base frame, mm; near zero for two photos taken from one place."""
-    (lx, _, lz), (rx, _, rz) = left, right
+    (lx, _, lz), (rx, _, rz) = result.rays
     with np.errstate(all="ignore"):
         size = np.where(result.used, np.abs(lx / lz - rx / rz), 0.0) * result.pairs.focal
     return np.nan_to_num(result.pairs.sums(size)) / np.maximum(result.points_used, 1)
@@ -227,7 +228,7 @@ def _reason(pair: Orientation, *, converged: bool) -> tuple[str, str]:
             "all common points lie on one line of the photo; points in at least the corners of the overlap are needed",
             "points-on-a-line",
         )
-    parallax = float(_mean_parallaxes(pair, *solution.base_rays(pair.elements, pair.pairs))[0])
+    parallax = float(_mean_parallaxes(pair)[0])
     if parallax < SMALLEST_PARALLAX * pair.pairs.focal:
         return (
             f"the x parallax is only {parallax:.3f} mm: the photos have no base; the same photo twice?",

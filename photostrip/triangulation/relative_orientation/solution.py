@@ -26,7 +26,6 @@ LARGEST_STEP = 0.5  # rad; a longer step is shortened, far starts swing otherwis
 RIDGE = 1e-13  # relative; keeps a singular pair from stopping the batch, changes no digit of a regular one
 RETRY_AZIMUTHS = np.radians([15, -15, 30, -30, 60, -60, 90, -90, 180])
 RETRY_RMS = 1e-3  # of the principal distance: a larger rms y parallax is a false minimum or a gross error
-UPPER = np.triu_indices(5)
 
 
 class Solved(NamedTuple):
@@ -53,8 +52,8 @@ def base_rays(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
     rotations = (from_alpha_omega_kappa(al1, 0.0, ka1), from_alpha_omega_kappa(al2, om2, ka2))
     turned: list[Floats] = []
     for rotation, xy in zip(rotations, (pairs.left, pairs.right), strict=True):
-        a = rotation.reshape(-1, 9).T.take(pairs.pair, axis=1).reshape(3, 3, -1)
-        turned.append(a[:, 0] * xy[:, 0] + a[:, 1] * xy[:, 1] - a[:, 2] * pairs.focal)  # eq. 137
+        rows = rotation.transpose(1, 2, 0).take(pairs.pair, axis=2)
+        turned.append(np.stack([a * xy[:, 0] + b * xy[:, 1] - c * pairs.focal for a, b, c in rows]))  # eq. 137
     return turned[0], turned[1]
 
 
@@ -89,11 +88,10 @@ def linearised_parallaxes(elements: Floats, pairs: Pairs) -> Linearised:
 
 def normal_matrices(jacobian: Floats, pairs: Pairs) -> Floats:
     """Form the normal matrices J^T W J of all pairs, shape (p, 5, 5), from the derivatives, shape (5, m)."""
-    weighted = jacobian * pairs.weight
-    sums = pairs.sums(weighted[UPPER[0]] * jacobian[UPPER[1]])
     normal = np.empty((pairs.size, 5, 5))
-    normal[:, UPPER[0], UPPER[1]] = sums.T
-    normal[:, UPPER[1], UPPER[0]] = sums.T
+    for row, weighted in enumerate(jacobian * pairs.weight):
+        normal[:, row, row:] = pairs.sums(weighted * jacobian[row:]).T
+        normal[:, row:, row] = normal[:, row, row:]
     return normal
 
 

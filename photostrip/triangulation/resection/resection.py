@@ -114,10 +114,10 @@ def _steps(
             points[rows] - centers[number], rotations[number], focal[number], distance[number]
         )
         misfit_x, misfit_y = xy[rows].T - computed
-        products = np.concatenate(
-            [by_x[UPPER[0]] * by_x[UPPER[1]] + by_y[UPPER[0]] * by_y[UPPER[1]], by_x * misfit_x + by_y * misfit_y]
-        )
-        sums[present[low:high]] = np.add.reduceat(products, starts[low:high] - ends[low], axis=1).T
+        products = [x * by_x[row:] + y * by_y[row:] for row, (x, y) in enumerate(zip(by_x, by_y, strict=True))]
+        products.append(by_x * misfit_x + by_y * misfit_y)
+        segments = starts[low:high] - ends[low]
+        sums[present[low:high]] = np.concatenate([np.add.reduceat(each, segments, axis=1) for each in products]).T
     normal = np.zeros((len(centers), UNKNOWNS, UNKNOWNS))
     normal[:, UPPER[0], UPPER[1]] = sums[:, : len(UPPER[0])]
     normal[:, UPPER[1], UPPER[0]] = sums[:, : len(UPPER[0])]

@@ -18,7 +18,6 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.orientation import Orientation
-from photostrip.triangulation.relative_orientation.solution import base_rays
 from photostrip.triangulation.strip_formation.intersection import Intersection, intersect
 from photostrip.triangulation.strip_formation.scale_transfer import (
     LEFT_RAY,
@@ -138,8 +137,7 @@ def intersect_models(orientation: Orientation, first: FirstPhoto, *, left_ray: b
     if not left_ray:
         al1, ka1 = orientation.elements[:, 0], orientation.elements[:, 1]
         frames = np.asarray(from_alpha_omega_kappa(al1, 0.0, ka1), float)
-        rays = base_rays(orientation.elements, pairs)
-        return intersect(np.array([1.0, 0.0, 0.0]), *rays, pairs.focal), frames
+        return intersect(np.array([1.0, 0.0, 0.0]), *orientation.rays, pairs.focal), frames
     base, rotation = orientation.relative
     chain = hand_on_rotations(rotation, first.rotation)
     left, right = (

@@ -32,7 +32,7 @@ from photostrip.triangulation.relative_orientation.orientation import (
     unusable_pairs,
 )
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
-from photostrip.triangulation.relative_orientation.solution import base_rays, in_front_of_cameras, rays_meet_in_front
+from photostrip.triangulation.relative_orientation.solution import rays_meet_in_front
 from photostrip.triangulation.relative_orientation.zones import MINIMUM_LEFT, Support, zones
 
 SEARCHES = {"auto": (True, True), "deletion": (False, True), "robust": (True, False)}  # robust start, sets of points
@@ -87,9 +87,8 @@ def screen_pairs(
         msg = f"screening method {settings.screening!r} is not available; choose one of {', '.join(SCREENINGS)}"
         raise InputError(msg)
     sound = np.ones(orientation.pairs.size, bool) if converged is None else converged
-    rays = base_rays(orientation.elements, orientation.pairs)
-    doubtful = unusable_pairs(orientation, sound, rays)
-    behind = ~rays_meet_in_front(*rays)
+    doubtful = unusable_pairs(orientation, sound)
+    behind = ~rays_meet_in_front(*orientation.rays)
     start, sets = SEARCHES.get(settings.screening, SEARCHES["auto"])
     with np.errstate(all="ignore"):
         found = search(orientation, max(np.sqrt(2.0) * sigma, NEGLIGIBLE), doubtful, start=start, sets=sets)
@@ -114,7 +113,7 @@ def _searched(given: Orientation, found: PairSearch, behind: Flags) -> tuple[Ori
     """Write the log of a search, and take out what lies behind a camera."""
     result = found.orientation
     if result is not given:
-        behind = ~in_front_of_cameras(result.elements, result.pairs)
+        behind = ~rays_meet_in_front(*result.rays)
     result, dropped = _drop_behind(result, behind)
     return result, [*found.removed, *dropped]
 
