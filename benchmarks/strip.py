@@ -5,7 +5,8 @@ process is timed in seconds of computing, reading and writing included, by a sma
 of this program counts for it. The unit is L, a bare ``import numpy, yaml, pyproj``, timed in turn with the rows: a busy
 machine makes both slower. Of several repetitions the fastest counts.
 
-Usage: python benchmarks/strip.py [--rows NAME ...] [--photos N] [--sizes N ...] [--adjustment METHOD] [--repeat N]
+Usage: python benchmarks/strip.py [--rows NAME ...] [--photos N] [--sizes N ...] [--folds] [--adjustment METHOD]
+       [--repeat N]
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import sys
 import tempfile
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial, wraps
 from importlib import import_module
 from io import StringIO
@@ -69,6 +70,8 @@ UNIT = "import numpy, yaml, pyproj"
 EXPONENT = 1.05  # at most, of whole runs from the first to the last of the sizes
 GROWTH_SCALE = 1500.0  # of the strips that grow: 10 000 photos are 1300 km
 FAILED = 1  # exit code of a run whose verdict is that: all work is done
+MANY_CONTROL = 1300  # points, of which each belongs to one of ten groups left out
+METHODS = ("polynomial", "covariance", "bundle")
 POINT_KB = 2.0  # at most, for one more check point
 
 LAUNCHER = """
@@ -92,6 +95,7 @@ class Row:
     megabytes: float | None = None  # at most
     command: str = "run"
     adjustment: str = "polynomial"
+    options: tuple[str, ...] = ()
 
 
 def strip_spec(photos: int, every: int, *, check: int | None = None, extra: int = 6, scale: float = 5000.0) -> Spec:
@@ -171,7 +175,7 @@ def process(arguments: Sequence[str]) -> tuple[float, float]:
 
 def whole_run(project: Path, row: Row, repeat: int) -> Spent:
     """Run the command as processes of their own, in turn with the unit; the fastest of each counts."""
-    arguments = ["-m", "photostrip", row.command, str(project)]
+    arguments = ["-m", "photostrip", row.command, str(project), *row.options]
     if row.command == "run":
         arguments += ["-o", str(project.parent / "result"), f"--set=processing.adjustment={row.adjustment}"]
     units, found = [process(["-c", UNIT])[0]], []
@@ -437,14 +441,31 @@ def print_growth(folder: Path, sizes: Sequence[int], repeat: int, adjustment: st
         line(name, f"{value:.2f}", f"{EXPONENT}", value / EXPONENT)
 
 
+def print_folds(folder: Path, repeat: int) -> None:
+    """Print what a run takes more with every given point left out in turn."""
+    specs = {f"{photos} photos": strip_spec(photos, 5) for photos in (20, 100, 300)}
+    many = Control(layout="random", count=MANY_CONTROL, check=6)
+    specs[f"6 photos, {MANY_CONTROL} control points"] = replace(strip_spec(6, 5, extra=MANY_CONTROL // 3), control=many)
+    print(f"{'with --cross-validate':<44}{'method':>12}{'L':>8}{'without':>9}{'ratio':>8}")
+    for title, spec in specs.items():
+        project = write_project(folder / title, spec)
+        for method in METHODS:
+            with_folds, without = (
+                whole_run(project, Row("", spec, adjustment=method, options=options), repeat).units
+                for options in (("--cross-validate",), ())
+            )
+            print(f"{title:<44}{method:>12}{with_folds:>8.1f}{without:>9.1f}{with_folds / without:>8.2f}", flush=True)
+    print()
+
+
 def main() -> None:
     """Read the options and print the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
     parser.add_argument("--rows", nargs="*", choices=ROWS, default=list(ROWS), help="whole processes (default all)")
     parser.add_argument("--photos", type=int, default=1000, help="photos of the strip of the parts (default 1000)")
     parser.add_argument("--sizes", type=int, nargs="*", default=[300, 1000, 3000], help="sizes for the growth")
-    methods = ("polynomial", "covariance", "bundle")
-    parser.add_argument("--adjustment", choices=methods, default=methods[0], help="method of the strips that grow")
+    parser.add_argument("--folds", action="store_true", help="print what --cross-validate takes beside a plain run")
+    parser.add_argument("--adjustment", choices=METHODS, default=METHODS[0], help="method of the strips that grow")
     parser.add_argument("--repeat", type=int, default=3, help="repetitions, of which the fastest counts (default 3)")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -461,6 +482,8 @@ def main() -> None:
             line("    of it the iteration", f"{inner:.0f} us")
             line("    the same one pair after the other", f"{alone:.0f} us")
             print()
+        if options.folds:
+            print_folds(folder, options.repeat)
         if options.sizes:
             print_growth(folder, options.sizes, options.repeat, options.adjustment)
 

@@ -10,14 +10,11 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
-from photostrip.triangulation.covariance_adjustment.block_tridiagonal import Factors
 from photostrip.triangulation.covariance_adjustment.columns import Columns
 from photostrip.triangulation.covariance_adjustment.system import SameImages
 from photostrip.triangulation.error_propagation.covariances import NearImages
@@ -25,35 +22,32 @@ from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, E
 
 
 def are_dense(columns: Columns) -> bool:
-    """Whether this takes fewer multiplications than a product with the inverse for each row.
+    """Whether this takes fewer multiplications than five products with blocks of the inverse for each row.
 
-    With n rows and r columns B in a block of height b: 10 n b^2 there, 18 r b^2 + 6 b^3 here.
+    Here it is seven for each of the shared columns.
     """
-    layout = columns.found.layout
-    in_block = np.bincount(columns.rows.first // layout.width).max(initial=0) * columns.rows.by_similarity.shape[1]
-    shared = layout.width * _coefficients(columns, slice(0, 1)).shape[2]
-    return bool(10 * in_block > 18 * shared + 6 * layout.height)
+    layout, size = columns.found.layout, columns.rows.by_similarity.shape[1]
+    in_block = size * np.bincount(columns.rows.first // layout.width).max(initial=0)
+    return bool(5 * in_block > 7 * layout.width * _coefficients(columns, slice(0, 1)).shape[2])
 
 
 def explained(columns: Columns) -> Floats:
     """Give what the conditions explain of the covariances of rows, b^T K^-1 b, shape (n, d, d)."""
-    found, rows = columns.found, columns.rows
-    layout, models = found.layout, found.errors.models
-    sparse = _Sparse.of(columns)
-    ends = np.searchsorted(rows.first, np.arange(models + 1)).tolist()
+    found, rows, sparse = columns.found, columns.rows, _Sparse.of(columns)
+    ends = np.searchsorted(rows.first, np.arange(found.errors.models + 1)).tolist()
     result = np.empty((*rows.by_similarity.shape[:2], rows.by_similarity.shape[1]))
-    blocks = _shared_columns(columns).blocks(columns.held)
-    for (number, some, values), inverse in zip(blocks, _inverses_around(found.factors, columns.held), strict=True):
-        by_model = np.split(values.reshape(3 * layout.height, -1), some.stop - some.start, axis=1)
-        for model, shared in enumerate(by_model, some.start):
+    for number, some, values in _shared_columns(columns).blocks(columns.held):
+        through = found.factors.solve_near(number, values)
+        by_model = (np.split(each, some.stop - some.start, axis=2) for each in (values, through))
+        for model, (shared, solved) in enumerate(zip(*by_model, strict=True), some.start):
             part = slice(ends[model], ends[model + 1])
             if part.start == part.stop:
                 continue
-            through = inverse @ shared
-            a, c, place = _coefficients(columns, part), sparse.value[part], sparse.place(part, layout.height, number)
-            of_a = (a.reshape(-1, shared.shape[1]) @ (shared.T @ through)).reshape(a.shape)
-            mixed = c.transpose(0, 2, 1) @ through[place] @ a.transpose(0, 2, 1)
-            alone = c.transpose(0, 2, 1) @ inverse[place[:, :, None], place[:, None, :]] @ c
+            a, c = _coefficients(columns, part), sparse.value[part]
+            block, position = sparse.block[part], sparse.position[part]
+            of_a = np.tensordot(a, np.tensordot(shared, solved, ((0, 1), (0, 1))), 1)
+            mixed = c.transpose(0, 2, 1) @ solved[block - number + 1, position] @ a.transpose(0, 2, 1)
+            alone = c.transpose(0, 2, 1) @ found.factors.entries_of_inverse(block, position) @ c
             result[part] = of_a @ a.transpose(0, 2, 1) + mixed + mixed.transpose(0, 2, 1) + alone
     return result
 
@@ -106,27 +100,3 @@ class _Sparse(NamedTuple):
         position[shared.first, place] = layout.position[shared.second]
         value[shared.first, place] = shared.value
         return cls(block, position, value)
-
-    def place(self, part: slice, height: int, number: int) -> Numbers:
-        """Place of some of them in the block of a number and those beside it."""
-        return np.asarray((self.block[part] - number + 1) * height + self.position[part], np.intp)
-
-
-def _inverses_around(factors: Factors, numbers: range) -> Iterator[Floats]:
-    """Blocks of the inverse (3 b, 3 b) before, at and after each number: Z_ij = -P_i^-1 B_i Z_(i+1)j for i < j."""
-    later, shares = factors.diagonal_of_inverse, factors.shares
-    count, height, _ = later.shape
-    before = -shares[numbers.start - 1] @ later[numbers.start] if numbers.start else None
-    for number in numbers:
-        result = np.zeros((3, height, 3, height))
-        for place in range(max(1 - number, 0), min(count - number + 1, 3)):
-            result[place, :, place] = later[number - 1 + place]
-        after = -shares[number] @ later[number + 1] if number + 1 < count else None
-        for row, column, block in ((0, 1, before), (1, 2, after)):
-            if block is not None:
-                result[row, :, column], result[column, :, row] = block, block.T
-        if before is not None and after is not None:
-            result[0, :, 2] = -shares[number - 1] @ after
-            result[2, :, 0] = result[0, :, 2].T
-        before = after
-        yield result.reshape(3 * height, 3 * height)

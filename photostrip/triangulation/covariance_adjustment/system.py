@@ -227,7 +227,8 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     matrix.diagonal[layout.block, layout.position, layout.position] += wanted.noise / factor
     blocks, places = layout.empty()
     matrix.diagonal[blocks, places, places] = 1.0
-    factors = block_tridiagonal.eliminate(matrix.diagonal, matrix.beside)
+    cuts = [layout.start[low + 1 : low + layout.width].tolist() for low in range(0, errors.models, layout.width)]
+    factors = block_tridiagonal.eliminate(matrix.diagonal, matrix.beside, cuts)
     return System(
         errors=errors,
         conditions=wanted,

@@ -122,26 +122,35 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     assert joint == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
 
 
-def test_blocks_are_eliminated_like_any_system() -> None:
-    """Indefinite blocks of random numbers, against the dense inverse."""
-    rng = np.random.default_rng(8)
-    diagonal, beside = rng.normal(size=(5, 4, 4)), rng.normal(size=(5, 4, 4))
-    diagonal = diagonal + diagonal.transpose(0, 2, 1) + np.diag([9.0, 9.0, -9.0, -9.0])
+@pytest.mark.parametrize("large", [1, 100])
+def test_blocks_are_eliminated_like_any_system(large: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Indefinite blocks of random numbers, inverted by parts and at once, against the dense inverse."""
+    monkeypatch.setattr(block_tridiagonal, "LARGE", large)
+    rng, count, height = np.random.default_rng(8), 5, 6
+    diagonal, beside = rng.normal(size=(count, height, height)), rng.normal(size=(count, height, height))
+    diagonal = diagonal + diagonal.transpose(0, 2, 1) + np.diag([9.0, 9.0, -9.0, 9.0, -9.0, -9.0])
     beside[-1] = 0.0
-    dense = np.zeros((20, 20))
-    for number in range(5):
-        rows = slice(4 * number, 4 * number + 4)
-        dense[rows, rows] = diagonal[number]
-        if number < 4:
-            after = slice(4 * number + 4, 4 * number + 8)
-            dense[rows, after], dense[after, rows] = beside[number], beside[number].T
-    factors = block_tridiagonal.eliminate(diagonal, beside)
-    right = rng.normal(size=(5, 4, 3))
-    assert factors.solve(right).reshape(20, 3) == pytest.approx(np.linalg.solve(dense, right.reshape(20, 3)), rel=1e-9)
-    inverse = np.linalg.inv(dense)
+    dense = np.zeros((count, height, count, height))
+    for number in range(count):
+        dense[number, :, number] = diagonal[number]
+        if number + 1 < count:
+            dense[number, :, number + 1], dense[number + 1, :, number] = beside[number], beside[number].T
+    whole = dense.reshape(count * height, count * height)
+    inverse = np.linalg.inv(whole).reshape(dense.shape)
+    factors = block_tridiagonal.eliminate(diagonal, beside, [[], [1], [2, 3], [1, 2, 5], [3]])
+
+    right = rng.normal(size=(count, height, 3))
+    expected = np.linalg.solve(whole, right.reshape(-1, 3)).reshape(right.shape)
+    assert factors.solve(right) == pytest.approx(expected, rel=1e-9)
     for number, block in nonempty(enumerate(factors.diagonal_of_inverse)):
-        rows = slice(4 * number, 4 * number + 4)
-        assert block == pytest.approx(inverse[rows, rows], abs=1e-9)
+        assert block == pytest.approx(inverse[number, :, number], abs=1e-9)
+    for number in nonempty(range(1, count - 1)):
+        near = slice(number - 1, number + 2)
+        expected = np.einsum("iajb,jbk->iak", inverse[near, :, near], right[near])
+        assert factors.solve_near(number, right[near]) == pytest.approx(expected, abs=1e-9)
+    block, position = np.array([[0, 1, 0], [4, 4, 4], [3, 2, 2]]), np.array([[3, 0, 1], [5, 5, 0], [2, 2, 4]])
+    entries = inverse[block[:, :, None], position[:, :, None], block[:, None], position[:, None]]
+    assert factors.entries_of_inverse(block, position) == pytest.approx(entries, abs=1e-9)
 
 
 @pytest.mark.parametrize("lap", [60.0, 80.0])
