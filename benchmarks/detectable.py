@@ -29,7 +29,7 @@ limit_threads()  # as the command does, before numpy is imported
 import numpy as np  # noqa: E402
 
 from benchmarks.gross_errors import STRIP, adjusted, pair_of_projects  # noqa: E402
-from photostrip.triangulation.gross_errors.rays import point_decisions, snooping, strip_network  # noqa: E402
+from photostrip.triangulation.gross_errors.rays import point_decisions, ray_decisions, snooping, strip_network  # noqa: E402
 
 KINDS = (
     "two photos, along the base",
@@ -87,11 +87,11 @@ def missed(found: snooping.ScreenedBundle, search: Any, row: int, axis: int, siz
     row: of the image points of the project; all of them stand in a pair, and so in the network of the strip.
     """
     point = int(search.problem.images.point[row])
-    rows = search.rays_of(point)
+    rows = search.rays_of(np.array([point]))
     placed = found.selection.images[rows].sum() > 1
     place = np.where(placed, found.solution.points[[point]], np.nan)
-    with patch.object(snooping, "decide", wraps=point_decisions.decide) as decide:
-        search._decided(found, [rows], found.limit, place)  # noqa: SLF001
+    with patch.object(ray_decisions, "decide", wraps=point_decisions.decide) as decide:
+        search._decided(found, rows, place)  # noqa: SLF001
     _, (weight,), (basis,) = point_decisions._misclosures(decide.call_args.args[0])  # noqa: SLF001
     effect = basis[2 * rows.tolist().index(row) + axis]
     shift = size * np.sqrt(max(effect @ weight @ effect, 0.0)) / found.limit.unit

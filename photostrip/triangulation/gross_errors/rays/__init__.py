@@ -1,7 +1,7 @@
 """Gross errors of rays: measurements that a strip or block as a whole contradicts.
 
 ``strip_network`` makes a bundle of all rays of a formed strip, ``snooping`` adjusts and tests a bundle,
-``point_decisions`` finds the fewest rays of a point without which the others agree, ``shifted_photo`` asks whether a
-photo is shifted as a whole; ``strip_rays`` is what comes in. Source: [Baarda 1968], [Pope 1976]; the decisions are
-derived, see docs/sources.md.
+``ray_decisions`` linearises points for ``point_decisions``, which finds the fewest rays of a point without which the
+others agree; ``ray_log`` keeps what was said of them. ``shifted_photo`` asks whether a photo is shifted as a whole;
+``strip_rays`` is what comes in. Source: [Baarda 1968], [Pope 1976]; the decisions are derived, see docs/sources.md.
 """

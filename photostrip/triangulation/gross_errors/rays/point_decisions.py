@@ -11,11 +11,12 @@ Source: [Baarda 1968] for the test; deletion derived, as for pairs; see docs/sou
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY
 from photostrip.statistics import chi2_quantile
@@ -24,6 +25,7 @@ from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST_SET, su
 from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
 
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
+TWO = 2  # rays
 REGULARISATION = 1e-9  # keeps a point that holds its photos alone from stopping the others
 
 
@@ -38,30 +40,40 @@ class PointRays:
     inside: Flags  # (m, n): rows that took part in their adjustment
 
 
+CAUSES = ("", WRONG_RAY, TWO_RAYS, SEVERAL_RAYS)
+AGREE, WRONG, PAIR, SEVERAL = range(len(CAUSES))
+
+
 @dataclass(frozen=True, eq=False)
-class Decision:
-    """What was decided about a point."""
+class Decisions:
+    """What was decided about m points of r rays."""
 
-    out: Flags  # (r,): rays that must not be used
-    cause: str  # ``WRONG_RAY``, ``TWO_RAYS`` or ``SEVERAL_RAYS``; empty when all rays agree
-    value: float  # largest standardised residual of a coordinate of the point
-    size: Floats  # (r, 2): estimated errors of the coordinates in standard deviations; NaN where nothing can be said
-
-
-def undecided(rays: int) -> Decision:
-    """Leave out all rays of a point, which meet nowhere."""
-    unknown = np.full((rays, 2), np.nan)
-    return Decision(out=np.ones(rays, bool), cause=cause_of_all(rays), value=float("nan"), size=unknown)
+    out: Flags  # (m, r): rays that must not be used
+    cause: Numbers  # (m,): places in ``CAUSES``
+    value: Floats  # (m,): largest standardised residual of a coordinate of the point
+    size: Floats  # (m, r, 2): estimated errors of the coordinates in standard deviations; NaN where nothing can be said
 
 
-def alike(sizes: Sequence[tuple[int, int]]) -> Iterator[Numbers]:
-    """Places of points with as many rays and given coordinates, to be decided on together."""
-    for size in dict.fromkeys(sizes):
-        places = np.array([place for place, each in enumerate(sizes) if each == size])
+def without_place(decided: Decisions, nowhere: Flags) -> Decisions:
+    """Leave out all rays of the points that meet nowhere (m,)."""
+    m, r = decided.out.shape
+    return Decisions(
+        out=decided.out | nowhere[:, None],
+        cause=np.where(nowhere, cause_of_all(np.full(m, r)), decided.cause),
+        value=np.where(nowhere, np.nan, decided.value),
+        size=np.where(nowhere[:, None, None], np.nan, decided.size),
+    )
+
+
+def alike(rays: Numbers, known: Numbers) -> Iterator[Numbers]:
+    """Places of points with as many rays and given coordinates (n,), to be decided on together."""
+    size = rays * (known.max(initial=0) + 1) + known
+    for each in distinct(size):
+        places = np.flatnonzero(size == each)
         yield from np.split(places, range(AT_ONCE, len(places), AT_ONCE))
 
 
-def decide(points: PointRays, limit: Limit) -> list[Decision]:
+def decide(points: PointRays, limit: Limit) -> Decisions:
     """Test points, and find the wrong rays of those with a coordinate beyond the limit."""
     gap, weight, basis = _misclosures(points)
     (m, freedom), r, unit = gap.shape, points.rays, limit.unit**2
@@ -76,31 +88,47 @@ def decide(points: PointRays, limit: Limit) -> list[Decision]:
     for count in range(1, min(r, LARGEST_SET) + 1):
         if not len(left_over) or (count > 1 and freedom - 2 * count < 1):
             break
-        left, sets, errors = _without(total[left_over], pulled[left_over], normal[left_over], subsets(r, count))
+        sets = ray_sets(r, count)
+        left, errors = _without(total[left_over], pulled[left_over], normal[left_over], sets.rays)
         rows = np.arange(len(left))
-        for likelier in np.argsort(-left, axis=1, kind="stable").T:  # the likeliest set with each ray says its error
-            size[left_over[:, None], sets[likelier]] = errors[rows, likelier]
+        likeliest = left[:, sets.of_ray].argmin(axis=2)  # of the sets with each ray: says its error
+        ray = np.arange(r)
+        size[left_over] = errors[rows[:, None], sets.of_ray[ray, likeliest], sets.place[ray, likeliest]]
         if freedom - 2 * count < 1:
             break  # nothing would check the rays that are left
         best = left.argmin(axis=1)
         least, bound = left[rows, best], chi2_quantile(1 - limit.alpha, freedom - 2 * count) * unit
         rivals = (left <= np.minimum(bound, least + LIKELIER * unit)[:, None]).sum(axis=1)
-        for row in np.flatnonzero((least <= bound) & (rivals == 1)):
-            wrong = np.isin(np.arange(r), sets[best[row]])
-            told[left_over[row]], out[left_over[row]] = True, wrong
-            size[left_over[row], ~wrong] = np.nan
+        only = (least <= bound) & (rivals == 1)
+        sure, wrong = left_over[only], (sets.of_ray == best[only, None, None]).any(axis=2)
+        told[sure], out[sure] = True, wrong
+        size[sure] = np.where(wrong[:, :, None], size[sure], np.nan)
         left_over = left_over[~(least <= bound)]
     if r == 2 and freedom == 1:  # half of the y parallax each
         rows = np.flatnonzero(out[:, 0])
         size[rows] = np.stack([np.zeros((len(rows), 2)), 0.5 * pulled[rows, 1::2] / share[rows, 1::2]], axis=2)
-    cause = np.where(told, WRONG_RAY, np.where(out[:, 0], cause_of_all(r), ""))
-    found = zip(out, cause.tolist(), value.tolist(), size, strict=True)
-    return [Decision(out=each, cause=why, value=most, size=by) for each, why, most, by in found]
+    cause = np.where(told, WRONG, np.where(out[:, 0], cause_of_all(np.full(m, r)), AGREE))
+    return Decisions(out=out, cause=cause, value=value, size=size)
 
 
-def cause_of_all(rays: int) -> str:
-    """Why all rays of a point go; the only one, against the control of its point, is the wrong one."""
-    return {1: WRONG_RAY, 2: TWO_RAYS}.get(rays, SEVERAL_RAYS)
+def cause_of_all(rays: Numbers) -> Numbers:
+    """Why all rays of points go; the only one, against the control of its point, is the wrong one."""
+    return np.where(rays == 1, WRONG, np.where(rays == TWO, PAIR, SEVERAL))
+
+
+class RaySets(NamedTuple):
+    """All sets of as many of r rays."""
+
+    rays: Numbers  # (s, k): rays of each set
+    of_ray: Numbers  # (r, t): sets with each ray
+    place: Numbers  # (r, t): which ray of the set it is
+
+
+@cache
+def ray_sets(rays: int, count: int) -> RaySets:
+    sets = subsets(rays, count)
+    by_ray = np.argsort(sets.ravel(), kind="stable").reshape(rays, -1)
+    return RaySets(rays=sets, of_ray=by_ray // count, place=by_ray % count)
 
 
 class _Misclosures(NamedTuple):
@@ -130,15 +158,14 @@ def _misclosures(point: PointRays) -> _Misclosures:
 
 class _Deleted(NamedTuple):
     left: Floats  # (m, s): sums of squares without each set
-    sets: Numbers  # (s, k): rays of each set
-    errors: Floats  # (m, s, k, 2): errors of their coordinates
+    errors: Floats  # (m, s, k, 2): errors of its coordinates
 
 
 def _without(total: Floats, pulled: Floats, normal: Floats, sets: Numbers) -> _Deleted:
-    """Take sets of as many rays each out."""
+    """Take sets (s, k) of as many rays each out."""
     rows = (2 * sets[:, :, None] + np.arange(2)).reshape(len(sets), -1)
     pull, part = pulled[..., rows], normal[..., rows[:, :, None], rows[:, None, :]]
     solved = np.linalg.solve(part + REGULARISATION * np.eye(rows.shape[1]), pull[..., None])
     error = np.asarray(solved[..., 0], float)
     left = total[..., None] - np.einsum("...i,...i->...", pull, error)
-    return _Deleted(left, sets, error.reshape(*error.shape[:-1], -1, 2))
+    return _Deleted(left, error.reshape(*error.shape[:-1], -1, 2))

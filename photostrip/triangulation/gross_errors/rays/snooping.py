@@ -17,7 +17,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
-from photostrip.rejection import SEVERAL_RAYS, Rejection
+from photostrip.rejection import Rejection
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up
 from photostrip.triangulation.bundle.normal_equations.defects import refuse_endless
@@ -25,22 +25,14 @@ from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
 from photostrip.triangulation.bundle.quality.reliability import CONTROL, IMAGE, Limit
-from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.pairs.pair_search import OUT_TO_ONE_MORE
-from photostrip.triangulation.gross_errors.rays.point_decisions import (
-    Decision,
-    PointRays,
-    alike,
-    cause_of_all,
-    decide,
-    undecided,
-)
-from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
-from photostrip.triangulation.resection.ray_intersection import two_that_meet
+from photostrip.triangulation.gross_errors.rays.point_decisions import cause_of_all
+from photostrip.triangulation.gross_errors.rays.ray_decisions import Adjusted, RayDecisions, decide_rays
+from photostrip.triangulation.gross_errors.rays.ray_log import ROBUST, START, RayLog, WrongRays
 
 RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
@@ -121,22 +113,26 @@ class _Search:
         self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates not put in yet
         self.begin = begin.images
         self.control = begin.control.copy()  # those that were put in, and that nothing has rejected
-        self.out: dict[tuple[str, int, int], Rejection] = {}
-        nothing = partial(Rejection, test="start", value=float("nan"), limit=float("nan"))
+        # what tests took out, in order; what they said of rays stands in the columns of the log
+        self.out: dict[tuple[str, int, int], Rejection | None] = {}
         rays, given = np.flatnonzero(~begin.images).tolist(), np.argwhere(self.waiting).tolist()
-        self.began = {(IMAGE, row, 0): nothing(kind=IMAGE, row=row, cause=SEVERAL_RAYS) for row in rays}
-        self.began |= {(CONTROL, row, axis): nothing(kind=CONTROL, row=row, axes=(axis,)) for row, axis in given}
-        self.latest: dict[int, Rejection] = {}  # what was last said of rays outside
-        self.back: set[int] = set()  # points that came back; what must go again stays out
+        nothing = partial(Rejection, kind=CONTROL, test=START, value=float("nan"), limit=float("nan"))
+        self.began: dict[tuple[str, int, int], Rejection | None] = {(IMAGE, row, 0): None for row in rays}
+        self.began |= {(CONTROL, row, axis): nothing(row=row, axes=(axis,)) for row, axis in given}
+        self.rays = RayLog(begin.images)
+        self.back = np.zeros(problem.points, bool)  # points that came back; what must go again stays out
         self.decided = Selection.everything(problem)  # what took part when rays outside were decided on
         self.beyond = np.full(problem.points, np.inf)  # test values of points with a ray outside, when decided on
         self.rounds = self.failed = 0
         self.common: list[CommonError] = []
         self.next_trial = 0  # given coordinates that are out when a common error, tried in vain, is tried again
 
-    def rays_of(self, point: int) -> Numbers:
-        """Rows of the rays of a point, in the order of the photos."""
-        return self.by_point[self.first[point] : self.first[point + 1]]
+    def rays_of(self, points: Numbers, among: Flags | None = None) -> Numbers:
+        """Rows of all rays of points, or of those `among` them (n,), by point, then photo."""
+        wanted = np.zeros(self.problem.points, bool)
+        wanted[points] = True
+        row = self.by_point[wanted[self.problem.images.point[self.by_point]]]
+        return row if among is None else row[among[row]]
 
     def adjust(self, selection: Selection) -> ScreenedBundle:
         """Adjust a selection, and start from there the next time."""
@@ -151,25 +147,31 @@ class _Search:
         solution, weight = robust.adjust_robustly(chosen)
         self.problem = restarted(self.problem, solution)
         self.rounds += robust.REWEIGHTINGS
-        rows, unknown = np.flatnonzero(selection.images)[weight < robust.NO_WEIGHT], float("nan")
+        rows = np.flatnonzero(selection.images)[weight < robust.NO_WEIGHT]
         rows = rows[~self.spared[self.problem.images.point[rows]]]
         images = selection.images.copy()
         images[rows] = False
-        for row in rows.tolist():
-            self.out[IMAGE, row, 0] = Rejection(kind=IMAGE, row=row, test="robust", value=unknown, limit=unknown)
+        self.out |= {(IMAGE, row, 0): None for row in rows.tolist()}
+        self.rays.test[rows] = ROBUST
         return supported(self.problem, replace(selection, images=images))
 
     def clean(self, selection: Selection) -> ScreenedBundle:
         """Test and take out until nothing is beyond the limit."""
         done = self.adjust(selection)
-        while (worst := self._worst(done)) or reliability.sigma0_test(done.solution).too_large:
-            if (not worst or worst[0].kind != IMAGE) and self._take_up_common(done, *worst[:1]):
+        while True:
+            worst = self._worst(done)
+            if isinstance(worst, WrongRays) and len(worst):
+                done = self._without_rays(done, worst)
+                continue
+            given = [] if isinstance(worst, WrongRays) else worst
+            if not given and not reliability.sigma0_test(done.solution).too_large:
+                return done
+            if self._take_up_common(done, *given[:1]):
                 done = self.adjust(supported(self.problem, done.selection))
                 continue
-            if not worst:
-                break
-            done = self._without(done, worst)
-        return done
+            if not given:
+                return done
+            done = self._without_given(done, given)
 
     def _take_up_common(self, done: ScreenedBundle, worst: Rejection | None = None) -> bool:
         """Take up what a group of observations shares, where that explains more than the worst given coordinate."""
@@ -183,11 +185,41 @@ class _Search:
         self.problem = taken_up(self.problem, found)
         return True
 
-    def _without(self, done: ScreenedBundle, worst: list[Rejection]) -> ScreenedBundle:
-        """Take observations out; points without which nothing would hold some photos stay, whatever the tests say."""
-        selection, axes = done.selection, [0 if each.kind == IMAGE else each.axes[0] for each in worst]
-        for each, axis in zip(worst, axes, strict=True):
-            selection = selection.without(each.kind, each.row, axis)
+    def _without_rays(self, done: ScreenedBundle, worst: WrongRays) -> ScreenedBundle:
+        """Take rays out; points without which nothing would hold some photos stay, whatever the tests say."""
+        images = done.selection.images.copy()
+        images[worst.row] = False
+        found = self._tried(replace(done.selection, images=images))
+        if found is not None:
+            self.out |= {(IMAGE, row, 0): None for row in worst.row.tolist()}
+            self.rays.test[worst.row] = self.settings.test
+            self.rays.say(worst)
+            return found
+        points = self.problem.images.point[worst.row]
+        first = points <= np.sort(points)[(len(points) - 1) // 2]
+        if first.all():
+            self.spared[points] = True
+            return done
+        for half in (first, ~first):
+            done = self._without_rays(done, worst.take(np.flatnonzero(half)))
+        return done
+
+    def _without_given(self, done: ScreenedBundle, worst: list[Rejection]) -> ScreenedBundle:
+        """Take given coordinates out: the worst alone where the adjustment fails without all of them."""
+        selection = done.selection
+        for each in worst:
+            selection = selection.without(each.kind, each.row, each.axes[0])
+        found = self._tried(selection, last=len(worst) == 1)
+        if found is None:
+            return self._without_given(done, worst[:1])
+        for each in worst:
+            self.out[each.kind, each.row, each.axes[0]] = each
+            if each.kind == CONTROL:
+                self.control[each.row, each.axes[0]] = False
+        return found
+
+    def _tried(self, selection: Selection, *, last: bool = False) -> ScreenedBundle | None:
+        """Adjust a selection; None where that fails, unless it is the last that can be tried."""
         before = self.problem
         try:
             found = self.adjust(supported(self.problem, selection))
@@ -195,28 +227,12 @@ class _Search:
         except GeometryError:
             self.problem, self.failed = before, self.failed + 1
             refuse_endless(before, [row for kind, row, _ in self.out if kind == IMAGE], self.rounds, self.failed)
-            if worst[0].kind != IMAGE:
-                if len(worst) > 1:
-                    return self._without(done, worst[:1])
+            if last:
                 raise
-            points = self.problem.images.point[[each.row for each in worst]]
-            first = points <= np.sort(points)[(len(points) - 1) // 2]
-            if first.all():
-                self.spared[points] = True
-                return done
-            halves = ([each for each, take in zip(worst, some, strict=True) if take] for some in (first, ~first))
-            for half in halves:
-                done = self._without(done, half)
-            return done
-        for each, axis in zip(worst, axes, strict=True):
-            self.out[each.kind, each.row, axis] = each
-            if each.kind == IMAGE:
-                self.latest[each.row] = each
-            elif each.kind == CONTROL:
-                self.control[each.row, axis] = False
+            return None
         return found
 
-    def _worst(self, done: ScreenedBundle) -> list[Rejection]:
+    def _worst(self, done: ScreenedBundle) -> list[Rejection] | WrongRays:
         """Return the worst rays of every neighbourhood, or the worst given coordinates where they are worse.
 
         The more of these are out, the more go at a time: the work grows with the logarithm of their number.
@@ -266,76 +282,33 @@ class _Search:
         wait = point[order[worse > more[photo[order]]]]
         return np.asarray((value > 0.0) & ~np.isin(np.arange(len(value)), wait), bool)
 
-    def _wrong_rays(self, done: ScreenedBundle, points: Numbers, limit: Limit) -> list[Rejection]:
+    def _wrong_rays(self, done: ScreenedBundle, points: Numbers, limit: Limit) -> WrongRays:
         """Return the rays of points that must go; all of a point where none of them alone does it."""
-        rows, found = [each[done.selection.images[each]] for each in map(self.rays_of, points.tolist())], []
-        for each, decision in zip(rows, self._decided(done, rows, limit, done.solution.points[points]), strict=True):
-            all_go = replace(decision, out=np.ones(len(each), bool), cause=cause_of_all(len(each)))
-            found += self._rejected(each, decision if decision.out.any() else all_go, limit)  # within rounding of it
-        return found
+        decided = self._decided(done, self.rays_of(points, done.selection.images), done.solution.points[points])
+        stays = (np.bincount(decided.place, decided.out, len(points)) == 0)[decided.place]  # within rounding of it
+        cause = np.where(stays, cause_of_all(decided.rays), decided.cause)
+        return self._rejected(replace(decided, out=decided.out | stays, cause=cause), limit)
 
-    def _rejected(self, rows: Numbers, decision: Decision, limit: Limit) -> list[Rejection]:
-        if not decision.out.any():
-            return []
-        size = decision.size * self.problem.images.sigma[rows]
-        axis = np.fmax(np.abs(size), 0.0).argmax(axis=1)
-        return [
-            Rejection(
-                kind=IMAGE,
-                row=int(rows[place]),
-                axes=(int(axis[place]),),
-                test=self.settings.test,
-                value=decision.value / limit.unit,
-                limit=float(limit.of(len(rows))),
-                size=tuple(size[place].tolist()),
-                cause=decision.cause,
-            )
-            for place in np.flatnonzero(decision.out).tolist()
-        ]
-
-    def _decided(self, done: ScreenedBundle, rows: list[Numbers], limit: Limit, xyz: Floats) -> list[Decision]:
-        """Decide on the rays of points, linearised at places near them; what is NaN becomes where they meet."""
-        given, axis = np.nonzero(self.control & np.isfinite(self.problem.control.sigma))
-        owner, point = self.problem.control.point[given], self.problem.images.point
-        known = [np.flatnonzero(owner == point[each[0]]) for each in rows]
-        found = [undecided(0)] * len(rows)
-        for some in alike(list(zip(map(len, rows), map(len, known), strict=True))):
-            rays, at = np.array([rows[each] for each in some]), np.array([known[each] for each in some], np.intp)
-            place = xyz[some]
-            for number, each in zip(some, self._alike(done, rays, (given[at], axis[at]), place, limit), strict=True):
-                found[number] = each
-            xyz[some] = place
-        return found
-
-    def _alike(
-        self, done: ScreenedBundle, rows: Numbers, given: tuple[Numbers, Numbers], xyz: Floats, limit: Limit
-    ) -> list[Decision]:
-        """Decide on the r rays of each of m points with as many given coordinates."""
-        images, control, cameras = self.problem.images, self.problem.control, self.problem.cameras
-        photos = KnownPhotos(done.solution.centers, done.solution.rotations, cameras.focal[cameras.of_photo])
-        (m, r), photo, sigma = rows.shape, images.photo[rows], images.sigma[rows][..., None]
-        flat, own = images.xy[rows].reshape(-1, 2), photo.ravel()
-        xy = (flat + image_shift(self.problem, done.solution.common, flat, own)).reshape(m, r, 2)
-        if r >= LEAST_RAYS and (nowhere := np.isnan(xyz[:, 0])).any():
-            xyz[nowhere] = two_that_meet(xy[nowhere], sigma[nowhere, :, :, 0], photo[nowhere], photos)
-        place = np.repeat(xyz, r, axis=0)
-        by_photo, by_point = (each.reshape(m, r, 2, -1) for each in derivatives(place, photos, own))
-        off = xy - project(place, photos, own).reshape(m, r, 2)
-        sound = np.asarray(np.isfinite(np.concatenate([off[..., None], by_photo], axis=3)).all(axis=(1, 2, 3)))
-        for each in (off, by_photo, by_point):
-            each[~sound] = 0.0
-        spread, axes = control.sigma[given], control.axes[given]
-        of_photos = np.zeros((m, 2 * r + spread.shape[1], 2 * r + spread.shape[1]))
-        of_photos[:, : 2 * r, : 2 * r] = done.joint.of(photo, by_photo / sigma)
-        to_given = np.einsum("mci,mci->mc", axes, control.xyz[given[0]] - xyz[:, None]) / spread
-        rays = PointRays(
-            rays=r,
-            misfit=np.hstack([(off / sigma[..., 0]).reshape(m, -1), np.where(sound[:, None], to_given, 0.0)]),
-            by_point=np.hstack([(by_point / sigma).reshape(m, -1, 3), axes / spread[..., None]]),
-            of_photos=of_photos,
-            inside=np.hstack([np.repeat(done.selection.images[rows], 2, axis=1), done.selection.control[given]]),
+    def _rejected(self, decided: RayDecisions, limit: Limit) -> WrongRays:
+        """Say of the rays that must go what was decided."""
+        out = decided.out
+        return WrongRays(
+            row=decided.row[out],
+            value=decided.value[out] / limit.unit,
+            limit=limit.of(decided.rays[out]),
+            size=decided.size[out] * self.problem.images.sigma[decided.row[out]],
+            cause=decided.cause[out],
         )
-        return [each if meets else undecided(r) for each, meets in zip(decide(rays, limit), sound, strict=True)]
+
+    def _decided(self, done: ScreenedBundle, rows: Numbers, xyz: Floats) -> RayDecisions:
+        adjusted = Adjusted(
+            problem=self.problem,
+            selection=done.selection,
+            control=self.control,
+            solution=done.solution,
+            joint=done.joint,
+        )
+        return decide_rays(adjusted, rows, xyz, done.limit)
 
     def fitting(self, done: ScreenedBundle) -> Selection | None:
         """Put back what fits the adjustment without it; None when there is nothing new."""
@@ -344,19 +317,22 @@ class _Search:
         changed = np.full(self.problem.photos, done.selection.given != self.decided.given)
         changed[self.problem.images.photo[images != self.decided.images]] = True
         self.decided = done.selection
-        within = self.beyond <= limit.of(np.diff(self.first))  # the limit rises where less is established
+        rays = np.bincount(point, minlength=len(xyz))
+        within = self.beyond <= limit.of(rays)  # the limit rises where less is established
         numbers = distinct(point[~images & (changed[self.problem.images.photo] | within[point])])
-        rows, single = list(map(self.rays_of, numbers.tolist())), np.diff(self.first)[numbers, None] < LEAST_RAYS
         placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] > 1
-        place = np.where(single, xyz[numbers], np.where(placed, done.solution.points[numbers], np.nan))
-        decisions = self._decided(done, rows, limit, place)
-        for number, rays, decision, at in zip(numbers.tolist(), rows, decisions, place, strict=True):
-            self.latest |= {each.row: each for each in self._rejected(rays, decision, limit)}
-            self.beyond[number] = decision.value / limit.unit
-            if number not in self.back and (~decision.out & ~images[rays]).any():
-                self.back.add(number)
-                xyz[number] = at
-                images[rays] = ~decision.out | (images[rays] & self.spared[number])
+        place = np.where(placed, done.solution.points[numbers], np.nan)
+        place = np.where(rays[numbers, None] < LEAST_RAYS, xyz[numbers], place)
+        decided = self._decided(done, self.rays_of(numbers), place)
+        self.rays.say(self._rejected(decided, limit))
+        row, number = decided.row, numbers[decided.place]
+        self.beyond[number] = decided.value / limit.unit
+        fit = np.bincount(decided.place, ~decided.out & ~images[row], len(numbers)) > 0
+        fit &= ~self.back[numbers]
+        self.back[numbers[fit]] = True
+        xyz[numbers[fit]] = place[fit]
+        again = fit[decided.place]
+        images[row[again]] = (~decided.out | (images[row] & self.spared[number]))[again]
         fits = self._given(done, limit.value * limit.unit)
         self.control, self.waiting = self.control | fits, self.waiting & ~fits
         self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))
@@ -376,12 +352,15 @@ class _Search:
     def log(self, done: ScreenedBundle) -> Iterator[Rejection]:
         """Return every observation that a test took out at some time, and those that began outside and stay there."""
         holds = done.selection.holds
-        began = {key: each for key, each in self.began.items() if key not in self.out and not holds(*key)}
-        for (kind, row, axis), each in (self.out | began).items():
+        every = self.out | {key: each for key, each in self.began.items() if key not in self.out and not holds(*key)}
+        rows = np.array([row for kind, row, _ in every if kind == IMAGE], np.intp)
+        of_rays = self.rays.records(rows, done.selection.images)
+        for (kind, row, axis), each in every.items():
+            if each is None:
+                yield of_rays[row]
+                continue
             found = each
-            if kind == IMAGE:
-                found = replace(self.latest.get(row, each), test=each.test)
-            elif np.isnan(each.value):
+            if np.isnan(each.value):
                 size = tuple((-done.solution.control_residuals[row]).tolist())
                 found = replace(each, limit=done.limit.value, size=size)
             yield replace(found, readmitted=holds(kind, row, axis))

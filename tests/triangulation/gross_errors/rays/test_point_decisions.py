@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pytest
@@ -17,12 +19,16 @@ from photostrip.triangulation.bundle.quality.reliability import Limit
 from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
 from photostrip.triangulation.gross_errors.rays import point_decisions
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
+    CAUSES,
     LIKELIER,
-    Decision,
+    Decisions,
     PointRays,
 )
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives
 from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from photostrip.arrays import Flags, Floats
 
 SIGMA = 0.005  # mm
 ALPHA = 0.01
@@ -50,9 +56,24 @@ def a_point(seed: int, rays: int = 3) -> PointRays:
     )
 
 
+class Decision(NamedTuple):
+    """What is decided about one point."""
+
+    out: Flags
+    cause: str
+    value: float
+    size: Floats
+
+
+def each_of(decided: Decisions) -> list[Decision]:
+    columns = (decided.out, [CAUSES[cause] for cause in decided.cause], decided.value, decided.size)
+    return list(map(Decision, *columns))
+
+
 def decide(point: PointRays, limit: Limit) -> Decision:
     """Decide on one point."""
-    return point_decisions.decide(together(point), limit)[0]
+    (found,) = each_of(point_decisions.decide(together(point), limit))
+    return found
 
 
 def together(*points: PointRays) -> PointRays:
@@ -106,7 +127,7 @@ def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() ->
     point = a_point(3, 5)
     gap, weight, basis = point_decisions._misclosures(point)
     sets = [(0,), (3,), (4,)]
-    left, _, errors = point_decisions._without(
+    left, errors = point_decisions._without(
         np.array(gap @ weight @ gap), basis @ weight @ gap, basis @ weight @ basis.T, np.array(sets)
     )
     for value, (ray,), ((error,),) in nonempty(zip(left, sets, [each[None] for each in errors], strict=True)):
@@ -226,7 +247,7 @@ def test_points_are_decided_on_together_as_one_by_one() -> None:
     points = [
         replace(each, of_photos=root @ root.T, inside=np.arange(10) < size) for size, each in enumerate(points, 2)
     ]
-    decided = point_decisions.decide(together(*points), limit())
+    decided = each_of(point_decisions.decide(together(*points), limit()))
     for found, point in nonempty(zip(decided, points, strict=True)):
         alone = decide(point, limit())
         assert (found.out.tolist(), found.cause) == (alone.out.tolist(), alone.cause)
@@ -237,15 +258,44 @@ def test_points_are_decided_on_together_as_one_by_one() -> None:
 
 def test_points_with_as_many_rays_are_taken_some_at_a_time() -> None:
     sizes = [(2, 0), (3, 0), (2, 3), (3, 0)] * AT_ONCE
-    found = [each.tolist() for each in point_decisions.alike(sizes)]
+    rays, known = np.array(sizes).T
+    found = [each.tolist() for each in point_decisions.alike(rays, known)]
     assert [len(each) for each in found] == [AT_ONCE] * 4
     assert sorted(place for each in found for place in each) == list(range(len(sizes)))
     assert all(len({sizes[place] for place in each}) == 1 for each in nonempty(found))
 
 
-def test_rays_that_meet_nowhere_are_left_out() -> None:
-    assert point_decisions.undecided(2).cause == TWO_RAYS
-    assert point_decisions.undecided(3).out.tolist() == [True, True, True]
+@pytest.mark.parametrize(("rays", "cause"), [(2, TWO_RAYS), (3, SEVERAL_RAYS)])
+def test_rays_that_meet_nowhere_are_left_out(rays: int, cause: str) -> None:
+    decided = point_decisions.decide(together(*(spoiled(a_point(seed, rays), {}) for seed in (1, 2))), limit())
+    good, nowhere = each_of(point_decisions.without_place(decided, np.array([False, True])))
+    assert not good.cause
+    assert not good.out.any()
+    assert good.value == decided.value[0]
+    assert nowhere.cause == cause
+    assert nowhere.out.all()
+    assert np.isnan([nowhere.value, *nowhere.size.ravel()]).all()
+
+
+@pytest.mark.parametrize(("rays", "count"), [(2, 1), (5, 2), (6, 3)])
+def test_every_ray_knows_the_sets_that_it_is_in(rays: int, count: int) -> None:
+    sets = point_decisions.ray_sets(rays, count)
+    assert sets.of_ray.shape == (rays, math.comb(rays - 1, count - 1))
+    assert (sets.rays[sets.of_ray, sets.place] == np.arange(rays)[:, None]).all()
+    assert all(len(set(each)) == len(each) for each in nonempty(sets.of_ray.tolist()))
+
+
+def test_the_likeliest_set_with_a_ray_says_its_error() -> None:
+    """Four of nine wrong: no set of three is enough, and all rays go, each with the error it would have."""
+    point = spoiled(a_point(11, 9), {(ray, 1): 200.0 * (1 + ray) * (-1) ** ray for ray in range(4)})
+    found, (gap, weight, basis) = decide(point, limit()), point_decisions._misclosures(point)
+    sets = point_decisions.ray_sets(9, 3).rays
+    left, errors = point_decisions._without(
+        np.array(gap @ weight @ gap), basis @ weight @ gap, basis @ weight @ basis.T, sets
+    )
+    for ray, size in nonempty(enumerate(found.size)):
+        best = min((value, row) for row, value in enumerate(left) if ray in sets[row])[1]
+        assert size == pytest.approx(errors[best, sets[best].tolist().index(ray)], rel=1e-9)
 
 
 def test_a_point_that_holds_its_photos_alone_tests_nothing() -> None:

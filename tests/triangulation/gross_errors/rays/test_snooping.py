@@ -13,11 +13,13 @@ from photostrip.rejection import WRONG_RAY, Rejection
 from photostrip.simulation import Flight, Points, Spec
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle.normal_equations.defects import MOST_FAILED
-from photostrip.triangulation.bundle.quality.reliability import CONTROL, IMAGE, require_regular
+from photostrip.triangulation.bundle.quality.reliability import CONTROL, require_regular
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.bundle.solve import solve as solve_once
 from photostrip.triangulation.gross_errors.rays import snooping, strip_network
+from photostrip.triangulation.gross_errors.rays.point_decisions import WRONG
+from photostrip.triangulation.gross_errors.rays.ray_log import WrongRays
 from tests.pipeline.blocks import adjusted, simulate
 
 if TYPE_CHECKING:
@@ -141,6 +143,7 @@ def test_of_given_coordinates_one_more_goes_at_a_time_for_every_eight_that_went(
     gone = (Rejection(kind=CONTROL, row=row, test="tau", value=9.0, limit=3.0) for row in range(out))
     search.out = {(CONTROL, each.row, 0): each for each in gone}
     worst = search._worst(done)
+    assert isinstance(worst, list)
     assert [each.kind for each in worst] == [CONTROL] * (1 + more)
 
 
@@ -171,9 +174,12 @@ def test_a_search_ends_where_eight_adjustments_fail(problem: BundleProblem, monk
             raise GeometryError("does not converge")
         return solve_once(chosen, rough=rough)
 
-    def worst(search: snooping._Search, _: snooping.ScreenedBundle) -> list[Rejection]:
-        left = [row for row in rows if not search.spared[problem.images.point[row]]]
-        return [Rejection(kind=IMAGE, row=row, test="tau", value=9.0, limit=4.0) for row in left]
+    def worst(search: snooping._Search, _: snooping.ScreenedBundle) -> WrongRays:
+        left = np.array([row for row in rows if not search.spared[problem.images.point[row]]])
+        n = len(left)
+        return WrongRays(
+            row=left, value=np.full(n, 9.0), limit=np.full(n, 4.0), size=np.zeros((n, 2)), cause=np.full(n, WRONG)
+        )
 
     monkeypatch.setattr(snooping, "solve", solve)
     monkeypatch.setattr(snooping._Search, "_worst", worst)
@@ -202,6 +208,7 @@ def test_one_given_coordinate_more_goes_at_a_time_for_every_eight_that_are_out(p
     for out, together in ((0, 1), (7, 1), (8, 2), (15, 2), (16, 3)):
         search.out = {(CONTROL, row, 0): gone for row in range(out)}
         worst = search._worst(done)
+        assert isinstance(worst, list)
         assert [each.kind for each in worst] == [CONTROL] * together
         assert sorted(worst, key=lambda each: -each.value) == worst
 

@@ -13,7 +13,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.result.document import document_of
-from photostrip.triangulation.gross_errors.rays import point_decisions, snooping, strip_network
+from photostrip.triangulation.gross_errors.rays import point_decisions, ray_decisions, strip_network
 from photostrip.triangulation.strip_formation import non_neighbours
 from tests.strips import MICROMETRE, control_points, fly, project
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline.results import Result
     from photostrip.triangulation.bundle.quality.reliability import Limit
-    from photostrip.triangulation.gross_errors.rays.point_decisions import Decision, PointRays
+    from photostrip.triangulation.gross_errors.rays.point_decisions import Decisions, PointRays
     from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from tests.strips import Flown
@@ -120,11 +120,11 @@ def test_an_error_along_the_base_takes_the_place_and_leaves_the_parallaxes() -> 
 def test_a_point_within_rounding_of_the_limit_goes_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test of the whole adjustment and that of the point alone may differ in the last digit."""
 
-    def never(points: PointRays, limit: Limit) -> list[Decision]:
+    def never(points: PointRays, limit: Limit) -> Decisions:
         decided = point_decisions.decide(points, limit)
-        return [replace(each, out=np.zeros(points.rays, bool), cause="") for each in decided]
+        return replace(decided, out=np.zeros_like(decided.out), cause=np.zeros_like(decided.cause))
 
-    monkeypatch.setattr(snooping, "decide", never)
+    monkeypatch.setattr(ray_decisions, "decide", never)
     strip = spoiled(flown(), {("105", "p4_1"): (0.0, 0.4)})
     result = adjusted(strip)
     assert set(found_in(strip, result).values()) == {SEVERAL_RAYS}
