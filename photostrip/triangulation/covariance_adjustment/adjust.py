@@ -43,7 +43,9 @@ class CovarianceAdjustment:
     sigma: float  # standard deviation of an image coordinate of weight one, mm
     system: strip_system.System  # the solved system, with the rows of the strip and the conditions
     formations: int  # how often the strip was formed
-    left_out: Without | None = None  # control of the system that takes no part, when it was left out afterwards
+    # left_out, whole: control of the system that takes no part, when it was left out afterwards; the adjustment with it
+    left_out: Without | None = None
+    whole: CovarianceAdjustment | None = None
 
     @cached_property
     def points(self) -> Floats:
@@ -53,11 +55,10 @@ class CovarianceAdjustment:
     def of_points(self, points: Numbers) -> Floats:
         """Covariances (n, 3, 3) of some of the points, metres^2."""
         rows = self.system.errors.points.take(points)
-        covariances = prediction.covariances(self.system, rows)
-        if self.left_out is not None:
-            explained = self.left_out.explained(rows)
-            covariances += explained @ explained.transpose(0, 2, 1)
-        return covariances * self.factor
+        if self.left_out is None or self.whole is None:
+            return prediction.covariances(self.system, rows) * self.factor
+        explained = self.left_out.explained(rows)
+        return self.whole.points[points] + explained @ explained.transpose(0, 2, 1) * self.factor
 
     def joint_covariance(self, rows: ErrorRows) -> Floats:
         """Covariances (n, n) of rows with d = 1, metres^2."""
@@ -102,6 +103,7 @@ class CovarianceAdjustment:
             centers=self.centers - photos[:, :3],
             rotations=from_vector(-photos[:, 3:]) @ self.rotations,
             left_out=left_out,
+            whole=self,
         )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass, replace
-from photostrip.triangulation.covariance_adjustment.prediction import influence
+from photostrip.triangulation.covariance_adjustment.prediction import with_columns
 from photostrip.triangulation.covariance_adjustment.system import System
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
@@ -73,11 +73,11 @@ class Without:
         """Return the part of the influence (n, d, k) of conditions that goes through what is left out."""
         layout = self.system.layout
         by_them = self.columns[layout.block[conditions], layout.position[conditions]]
-        return np.asarray(influence(self.system, rows, self.rows) @ (self.inverse @ by_them.T), float)
+        return np.asarray(with_columns(self.system, rows, self.columns) @ (self.inverse @ by_them.T), float)
 
     def explained(self, rows: ErrorRows) -> Floats:
         """Return what of rows (n, d) they alone explain, s: (n, d, c), and s s^T adds to their covariances."""
-        return np.asarray(influence(self.system, rows, self.rows) @ np.linalg.cholesky(self.inverse), float)
+        return np.asarray(with_columns(self.system, rows, self.columns) @ np.linalg.cholesky(self.inverse), float)
 
 
 def _predicted(cofactors: Floats, correlates: Floats) -> LeftOut:

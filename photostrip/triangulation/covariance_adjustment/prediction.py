@@ -135,22 +135,25 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
     The system is solved for the columns of the n rows or for the unit vectors of the c conditions, whichever are fewer.
     """
     layout, size = found.layout, rows.by_similarity.shape[1]
+    if len(rows.first) * size >= len(chosen):
+        return with_columns(found, rows, found.columns_of_inverse(chosen))
     order = np.argsort(rows.first, kind="stable")
-    columns = Columns.of(found, rows.take(order))
-    block, position = layout.block[chosen], layout.position[chosen]
-    result = np.zeros((len(order), size, len(chosen)))
-    if len(order) * size < len(chosen):
-        right = np.zeros((layout.blocks + 2, layout.height, len(order), size))
-        for number, at, values in columns.blocks(range(layout.blocks)):
-            right[number : number + 3, :, order[at]] = values.reshape(*values.shape[:2], -1, size)
-        solved = found.factors.solve(right[1:-1].reshape(layout.blocks, layout.height, -1))
-        result[:] = solved[block, position].T.reshape(result.shape)
-        return result
-    solved = np.zeros((layout.blocks + 2, layout.height, len(chosen)))
-    solved[1:-1] = found.columns_of_inverse(chosen)
-    for number, at, values in columns.blocks(range(layout.blocks)):
-        near = solved[number : number + 3].reshape(3 * layout.height, -1)
-        result[order[at]] = (values.reshape(len(near), -1).T @ near).reshape(-1, size, len(chosen))
+    right = np.zeros((layout.blocks + 2, layout.height, len(order), size))
+    for number, at, values in Columns.of(found, rows.take(order)).blocks(range(layout.blocks)):
+        right[number : number + 3, :, order[at]] = values.reshape(*values.shape[:2], -1, size)
+    solved = found.factors.solve(right[1:-1].reshape(layout.blocks, layout.height, -1))
+    return np.asarray(solved[layout.block[chosen], layout.position[chosen]].T.reshape(len(order), size, -1), float)
+
+
+def with_columns(found: system.System, rows: ErrorRows, columns: Floats) -> Floats:
+    """Multiply columns of rows with others by blocks (g, b, c): b^T times those, shape (n, d, c)."""
+    order, (blocks, height, count) = np.argsort(rows.first, kind="stable"), columns.shape
+    around = np.zeros((blocks + 2, height, count))
+    around[1:-1] = columns
+    result = np.zeros((len(order), rows.by_similarity.shape[1], count))
+    for number, at, values in Columns.of(found, rows.take(order)).blocks(range(blocks)):
+        near = around[number : number + 3].reshape(-1, count)
+        result[order[at]] = (values.reshape(len(near), -1).T @ near).reshape(-1, *result.shape[1:])
     return result
 
 
