@@ -63,18 +63,21 @@ class Targets:
     control: ControlPoints  # the points, none of them a check point
     frames: Sequence[GroundFrame]  # ground frames the points refer to
     intermediate: IntermediateFrame  # the frame in which the strip is oriented
+    known: Floats | None = None  # (n, 3): ``of_full`` of these points, where they are some of others that have it
 
     def of(self, xyz: Floats) -> Floats:
         """Targets of the control points: their present positions, with all given coordinates put in."""
-        result = self._of_full.copy()
+        result = self.of_full.copy()
         partly = np.flatnonzero(~self.control.use.all(axis=1))
         if len(partly):
             result[partly] = self._put_in(partly, self.intermediate.cartesian_from_intermediate(xyz[partly]))
         return self.intermediate.intermediate_from_cartesian(result)
 
     @cached_property
-    def _of_full(self) -> Floats:
+    def of_full(self) -> Floats:
         """Cartesian targets (n, 3) of the points whose three coordinates count, wherever the strip stands."""
+        if self.known is not None:
+            return self.known
         result = np.zeros((len(self.control), 3))
         full = np.flatnonzero(self.control.use.all(axis=1))
         result[full] = self._put_in(full, None)
@@ -125,8 +128,7 @@ class Targets:
 
     def misclosures(self, xyz: Floats) -> Floats:
         """Present minus given coordinates, along the ground axes; 0 where a coordinate does not count."""
-        difference = np.einsum("nij,nj->ni", self.axes(xyz), xyz - self.of(xyz))
-        return np.where(self.control.use, difference, 0.0)
+        return np.where(self.control.use, np.einsum("nij,nj->ni", self.axes(xyz), xyz - self.of(xyz)), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,9 +352,8 @@ def _motion(reach: Floats | None, center: Floats, half: float) -> Floats:
     middle, moments = arm.mean(axis=0), arm.T @ arm / len(arm)
     square = np.eye(PARAMETERS)  # of the derivatives by shift, rotation and scale: 1, -[a], a
     square[3:6, :3], square[6, :3] = cross_matrix(middle), middle
-    square[3:6, 3:6] *= np.trace(moments)
+    square[3:, 3:] *= np.trace(moments)
     square[3:6, 3:6] -= moments
-    square[6, 6] = np.trace(moments)
     # takes what lies below the diagonal
     return np.asarray(np.linalg.cholesky(square + 1e-15 * np.eye(PARAMETERS)), float)
 

@@ -111,14 +111,17 @@ class FormedPhotos:
     def control_rays(self, oriented: Oriented) -> list[ControlRay]:
         rays = self._rays_in_use()
         point = np.searchsorted(self.formed.point, self.observations.point[rays.rows])
-        found = []
-        for row, place in enumerate(oriented.control_rows.tolist()):
-            pair = rays.photo[point == place]
-            if len(pair) == 2:
-                for along, other in (pair.tolist(), pair[::-1].tolist()):
-                    ray = self.formed.xyz[place] - self.formed.centers[along]
-                    found.append(ControlRay(row, other, ray / np.linalg.norm(ray)))
-        return found
+        order = np.argsort(point, kind="stable")
+        low = np.searchsorted(point[order], oriented.control_rows)
+        twice = np.flatnonzero(np.bincount(point, minlength=len(self.formed.point))[oriented.control_rows] == 2)
+        both = rays.photo[order[low[twice, None] + np.arange(2)]]
+        ray = self.formed.xyz[oriented.control_rows[twice], None] - self.formed.centers[both]
+        ray /= np.linalg.norm(ray, axis=2)[:, :, None]
+        return [
+            ControlRay(row, other, along)
+            for row, others, directions in zip(twice.tolist(), both[:, ::-1].tolist(), ray, strict=True)
+            for other, along in zip(others, directions, strict=True)
+        ]
 
     def without_images(self, wrong: Mapping[str, Rejection]) -> FormedPhotos:
         o, photo = self.observations, self.strip.positions(self.observations)

@@ -49,6 +49,12 @@ class StripAtControl:
         """The control points in the intermediate frame (n, 3), metres."""
         return self.similarity(self.xyz)
 
+    @cached_property
+    def joint_covariance(self) -> Floats:
+        """Covariance of all misclosures (w, w), metres^2."""
+        return self.covariance(np.arange(len(self.coordinates.point)))
+
+    @cached_property
     def sections(self) -> list[tuple[Numbers, StripAtControl]]:
         """Cut the control along the strip into parts of equal size; rows of each, and the strip there."""
         order = np.argsort(self.placed[:, 0], kind="stable")
@@ -60,12 +66,12 @@ class StripAtControl:
 
     def _section(self, rows: Numbers) -> StripAtControl:
         """Return the strip at some of its control points, numbered anew; covariances stay those of the whole strip."""
-        place = np.full(len(self.control), -1)
+        place, targets = np.full(len(self.control), -1), self.targets
         place[rows] = np.arange(len(rows))
         inside = np.flatnonzero(place[self.coordinates.point] >= 0)
         return replace(
             self,
-            targets=replace(self.targets, control=self.control.take(rows)),
+            targets=replace(targets, control=targets.control.take(rows), known=targets.of_full[rows]),
             xyz=self.xyz[rows],
             weight=self.weight[rows],
             rays=[ray._replace(point=int(place[ray.point])) for ray in self.rays if place[ray.point] >= 0],
@@ -85,12 +91,12 @@ class StripAtControl:
         axes[found.point, found.axis] = found.direction  # PROJ would take half of the time of the screening for them
         targets = self.targets
         if kept is not self.control.use:
-            targets = replace(targets, control=replace(self.control, use=kept))
+            targets = replace(targets, control=replace(self.control, use=kept), known=None)
         laid = absolute_orientation.lay(self.xyz, targets, np.where(kept, self.weight, 0.0), known=axes)
         return replace(self, similarity=laid.similarity)
 
     def misclosures(self, control: ControlPoints | None = None) -> Floats:
         """Strip minus given (w,), metres along the ground axes; control: other coordinates than the given ones."""
-        given = (replace(self.targets, control=control) if control else self.targets).of(self.placed)
+        given = (replace(self.targets, control=control, known=None) if control else self.targets).of(self.placed)
         found = self.coordinates
         return np.asarray(np.einsum("wi,wi->w", found.direction, (self.placed - given)[found.point]), float)

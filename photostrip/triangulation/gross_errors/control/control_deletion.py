@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, distinct
+from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.statistics import chi2_quantile, f_p_value
@@ -135,16 +135,21 @@ class JointAdjustment:
         rows = list(columns)
         return np.asarray(np.linalg.pinv(self.matrix[np.ix_(rows, rows)], hermitian=True), float)
 
-    def deletions(self, sets: Iterable[Columns]) -> list[Deletion]:
-        """Delete each set by itself."""
+    def gains(self, sets: Sequence[Columns]) -> Floats:
+        """Say what the sum of squares loses without each of k sets of one size, (k,)."""
+        return gains(self.pull[None], self.matrix[None], np.array(sets, np.intp), ROUNDING)[0]
+
+    def deletions(self, sets: Iterable[Columns], level: float = 1.0) -> list[Deletion]:
+        """Delete each set by itself; below a level of 1 only those are told that chi-square alone finds significant."""
         found = []
         chosen = list(sets)
         for count in sorted({len(each) for each in chosen}):
             same = [each for each in chosen if len(each) == count]
-            gain = gains(self.pull[None], self.matrix[None], np.array(same, np.intp), ROUNDING)[0]
+            least = chi2_quantile(1 - level, count) if level < 1.0 else None
             found += [
                 Deletion(columns=columns, gain=value, squares=self.squares, freedom=self.freedom)
-                for columns, value in zip(same, gain.tolist(), strict=True)
+                for columns, value in zip(same, self.gains(same).tolist(), strict=True)
+                if least is None or value > least
             ]
         return found
 
@@ -159,7 +164,7 @@ class JointAdjustment:
         left = self.without(out)
         found = [
             each
-            for each in left.deletions(self.hypotheses)
+            for each in left.deletions(self.hypotheses, self.level)
             # F needs more than chi-square does
             if each.gain > chi2_quantile(1 - self.level, len(each.columns)) * each.spread
         ]
@@ -241,13 +246,16 @@ def adjust(strip: StripAtControl, w: Floats, covariance: Floats, *, bends: bool 
     bent = (columns[found.point][:, :, None] * found.direction[:, None, :]).reshape(count, -1)
     rays = [(found.point == ray.point) * (found.direction @ turn @ ray.direction) for ray in strip.rays]
     errors = np.column_stack([np.eye(count), bent, *rays])
-    weight = np.einsum("ij,ij->j", errors, np.linalg.solve(covariance, errors))
-    if not (weight > 0.0).all():
-        raise GeometryError("the strip is too badly determined at its control to be tested against it")
-    size = np.sqrt(weight)
+    try:
+        free = independent(covariance)
+    except np.linalg.LinAlgError:
+        message = "the strip is too badly determined at its control to be tested against it"
+        raise GeometryError(message) from None
+    size = np.linalg.norm(free @ errors, axis=0)
     scaled = errors / size
-    projector = projected(covariance, strip.design)
-    points = [np.flatnonzero(found.point == point) for point in distinct(found.point)]
+    projector = projected(free, strip.design)
+    order = np.argsort(found.point, kind="stable")
+    points = np.split(order, np.flatnonzero(np.diff(found.point[order])) + 1)
     height = found.axis == HEIGHT
     parts = [rows[height[rows] == which] for rows in points for which in (False, True)]
     parts += [np.array([count + number]) for number in range(bent.shape[1])]
@@ -270,9 +278,16 @@ def adjust(strip: StripAtControl, w: Floats, covariance: Floats, *, bends: bool 
     )
 
 
-def projected(covariance: Floats, design: Floats) -> Floats:
-    """M: the weight matrix after a similarity has taken what it can; normal equations would lose half the digits."""
-    free = np.linalg.inv(np.linalg.cholesky(covariance))  # makes misclosures independent
+def independent(covariance: Floats) -> Floats:
+    """Give the inverse of the triangular root of a covariance (w, w), which makes misclosures independent."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), float)
+
+
+def projected(free: Floats, design: Floats) -> Floats:
+    """M: the weight matrix after a similarity has taken what it can; normal equations would lose half the digits.
+
+    free: (w, w), as ``independent`` gives it.
+    """
     taken, size, _ = np.linalg.svd(free @ (design / (np.abs(design).max(axis=0) + 1e-300)), full_matrices=False)
     left = free - (taken := taken[:, size > ROUNDING * size[0]]) @ (taken.T @ free)
     return np.asarray(left.T @ left, float)

@@ -65,7 +65,9 @@ def control_rejections(strip: StripAtControl, found: FoundErrors, rows: Numbers)
         size[place.axis[list(point)]] = -others.estimate(point)
         deviation = np.sqrt(tested.spread * others.cofactor(part).diagonal()) / others.size[list(part)]
         single = np.abs(others.estimate(part)) / deviation
-        beyond = [column for column, value in zip(part, single, strict=True) if value > _limit(tested, found.whole, 1)]
+        beyond = [
+            column for column, value in zip(part, single, strict=True) if value > _limit(tested.freedom, found.whole, 1)
+        ]
         rejections.append(
             Rejection(
                 kind="control",
@@ -73,7 +75,7 @@ def control_rejections(strip: StripAtControl, found: FoundErrors, rows: Numbers)
                 test="left out",
                 axes=tuple(place.axis[beyond or list(part)].tolist()),
                 value=float(np.sqrt(tested.gain / tested.spread)),
-                limit=_limit(tested, found.whole, len(part)),
+                limit=_limit(tested.freedom, found.whole, len(part)),
                 size=tuple(size.tolist()),
                 cause=EXCHANGED if row in partner else cause,
                 other=int(rows[partner[row]]) if row in partner else photo,
@@ -94,20 +96,20 @@ def reliability(strip: StripAtControl, found: FoundErrors) -> tuple[Floats, Floa
     ]
     for others, columns in [(left, stay), *gone]:
         where = place.point[columns], place.axis[columns]
-        tested = others.deletions([(column,) for column in columns])
-        spread = np.array([each.spread if np.isfinite(each.gain) else np.inf for each in tested])
+        gain = others.gains([(column,) for column in columns])
         detectable[where] = np.inf
-        if np.isfinite(spread).any():
-            limit = _limit(tested[0], found.whole, 1) + normal_quantile(POWER)
+        if others.freedom > 1 and np.isfinite(gain).any():
+            limit = _limit(others.freedom, found.whole, 1) + normal_quantile(POWER)
             with np.errstate(divide="ignore", invalid="ignore"):  # where nothing checks the coordinate
                 deviation = np.sqrt(1.0 / others.matrix[columns, columns]) / others.size[columns]
-            detectable[where] = np.where(np.isfinite(spread), limit * np.sqrt(spread) * deviation, np.inf)
+            spread = np.maximum(1.0, (others.squares - gain) / (others.freedom - 1))
+            detectable[where] = np.where(np.isfinite(gain), limit * np.sqrt(spread) * deviation, np.inf)
     return redundancy, detectable
 
 
-def _limit(tested: Deletion, whole: JointAdjustment, count: int) -> float:
+def _limit(freedom: int, whole: JointAdjustment, count: int) -> float:
     """Critical value of the length of an error of some coordinates, in standard deviations."""
-    return float(np.sqrt(count * f_quantile(1 - whole.level, count, tested.freedom - count)))
+    return float(np.sqrt(count * f_quantile(1 - whole.level, count, freedom - count)))
 
 
 def _wrong_image(

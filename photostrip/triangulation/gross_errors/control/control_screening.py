@@ -18,7 +18,13 @@ from photostrip.frozen import dataclass, replace
 from photostrip.points import ControlPoints
 from photostrip.rejection import Rejection
 from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
-from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment, adjust, projected
+from photostrip.triangulation.gross_errors.control.control_deletion import (
+    Columns,
+    JointAdjustment,
+    adjust,
+    independent,
+    projected,
+)
 from photostrip.triangulation.gross_errors.control.control_rejections import (
     FoundErrors,
     control_rejections,
@@ -45,7 +51,7 @@ def screen_control(strip: StripAtControl) -> ScreenedControl:
     """Take wrong coordinates out of the control of a strip."""
     use, rejections = strip.control.use.copy(), []
     redundancy, detectable = np.full((2, *use.shape), np.nan)
-    for rows, section in strip.sections():
+    for rows, section in strip.sections:
         try:
             found = _searched(section)
         except (PhotostripError, np.linalg.LinAlgError):
@@ -74,10 +80,9 @@ def _searched(strip: StripAtControl) -> FoundErrors | None:
     count = len(strip.coordinates.point)
     if count <= strip.design.shape[1]:
         return None
-    covariance = strip.covariance(np.arange(count))
-    found = [_laid(strip, covariance)]
+    found = [_laid(strip)]
     if not found[0].left.explained:  # much may be wrong
-        found += [_laid(strip, covariance, much=True, bends=bends) for bends in (True, False)]
+        found += [_laid(strip, much=True, bends=bends) for bends in (True, False)]
     told = [
         each
         for each in found
@@ -93,12 +98,12 @@ def _searched(strip: StripAtControl) -> FoundErrors | None:
     return FoundErrors(best.whole, best.whole.completed(best.out)) if best is found[0] else best
 
 
-def _laid(strip: StripAtControl, covariance: Floats, *, much: bool = False, bends: bool = False) -> FoundErrors:
+def _laid(strip: StripAtControl, *, much: bool = False, bends: bool = False) -> FoundErrors:
     """Search, lay the strip on what is kept, and search from what was found, until the same is found."""
     kept, out = strip.control.use, None
     for _ in strip.coordinates.point:
         laid = strip.laid if kept is strip.control.use else strip.laid_on(kept)
-        whole = adjust(laid, laid.misclosures(), covariance, bends=bends)
+        whole = adjust(laid, laid.misclosures(), strip.joint_covariance, bends=bends)
         if out is None:
             out = candidates(whole) if much else ()
         out = whole.shrunk(whole.grown(whole.shrunk(out)))
@@ -125,7 +130,7 @@ def candidates(whole: JointAdjustment) -> Columns:
     variance = np.full(len(whole.parts), float(np.abs(whole.w).max() ** 2 + whole.covariance.max()))
     for _ in whole.parts:
         covariance = whole.covariance + (errors * variance[part]) @ errors.T
-        projector = projected(covariance, whole.design)
+        projector = projected(independent(covariance), whole.design)
         squares = np.bincount(part, (errors.T @ (projector @ whole.w)) ** 2)
         expected = np.bincount(part, np.einsum("ij,ij->j", errors, projector @ errors))
         # of what nothing checks, rounding leaves less than nothing

@@ -49,15 +49,14 @@ class ShiftedList(NamedTuple):
 
 def find_shared(strip: StripAtControl) -> StretchedHeights | ShiftedList | None:
     """Find what all control of a strip, or of a list, shares; None where nothing says so, or single points say more."""
-    sections = strip.sections()
-    if len(sections) > 1:  # the one with most relief says most
-        _, strip = max(sections, key=lambda each: float(np.std(each[1].placed[:, HEIGHT])))
+    if len(strip.sections) > 1:  # the one with most relief says most
+        _, strip = max(strip.sections, key=lambda each: float(np.std(each[1].placed[:, HEIGHT])))
     count = len(strip.coordinates.point)
     if count <= strip.design.shape[1] + 1:
         return None
     try:
         laid = strip.laid
-        whole = adjust(laid, laid.misclosures(), strip.covariance(np.arange(count)), bends=False)
+        whole = adjust(laid, laid.misclosures(), strip.joint_covariance, bends=False)
     except PhotostripError:
         return None
     alone = max((each.gain for each in whole.deletions(whole.points) if np.isfinite(each.gain)), default=0.0)

@@ -144,7 +144,7 @@ def test_good_control_is_called_wrong_no_more_often_than_the_level_says(worse: f
 
 def test_sections_share_the_level() -> None:
     level = 0.0
-    for _, part in nonempty(drawn(1, points=67).sections()):
+    for _, part in nonempty(drawn(1, points=67).sections):
         count = np.arange(len(part.design))
         whole = adjust(part, np.zeros(len(count)), part.covariance(count))
         level += whole.level * len(whole.hypotheses)
@@ -222,7 +222,7 @@ def test_a_share_below_half_the_digits_is_rounding() -> None:
 @pytest.mark.parametrize(("points", "sections"), [(33, 1), (34, 2), (66, 2), (67, 3)])
 def test_long_strips_are_cut_in_sections_of_a_hundred_coordinates(points: int, sections: int) -> None:
     strip = drawn(1, points=points)
-    parts, whole = strip.sections(), strip.covariance(np.arange(3 * points))
+    parts, whole = strip.sections, strip.covariance(np.arange(3 * points))
     assert len(parts) == sections
     assert sorted(np.concatenate([rows for rows, _ in parts]).tolist()) == list(range(points))
     for rows, part in nonempty(parts):
