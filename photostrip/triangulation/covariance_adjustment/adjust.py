@@ -93,9 +93,9 @@ class CovarianceAdjustment:
         """
         left_out = Without.of(self.system, coordinates)
         errors, change = self.system.errors, left_out.change
-        known = np.zeros((len(errors.images.row), 2))
+        images = relinearisation.image_errors(change)
         points, photos = (
-            prediction.errors(change, rows, known) for rows in (errors.points, prediction.photo_rows(errors))
+            prediction.errors(change, rows, images) for rows in (errors.points, prediction.photo_rows(errors))
         )
         return replace(
             self,
@@ -144,8 +144,9 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
         turn = relinearisation.largest_turn(one.system)
         formations, rate = formations + 1, turn if fresh else rate
     errors, formed = one.strip.errors, one.strip.formed
+    images = relinearisation.image_errors(one.system) - one.images
     points, photos = (
-        prediction.errors(one.system, rows, one.images) for rows in (errors.points, prediction.photo_rows(errors))
+        prediction.errors(one.system, rows, images) for rows in (errors.points, prediction.photo_rows(errors))
     )
     similarity = one.strip.absolute.similarity
     return CovarianceAdjustment(

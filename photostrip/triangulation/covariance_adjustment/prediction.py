@@ -51,15 +51,15 @@ class AdjustmentTest:
         return beyond[np.argsort(-np.abs(self.normalised[beyond]), kind="stable")]
 
 
-def errors(found: system.System, rows: ErrorRows, known: Floats) -> Floats:
+def errors(found: system.System, rows: ErrorRows, images: Floats) -> Floats:
     """Predict the errors (n, d) of points and photos, to be subtracted.
 
     e = b^T [lambda; y], with b as in ``covariances``: what the errors of the image coordinates displace, and the
     similarity of the first model.
 
-    known: (k, 2), errors of the image coordinates of which the rows are free already, in their standard deviations.
+    images: (k, 2), errors of the image coordinates of which the rows are not free yet, in their standard deviations.
     """
-    by_images = relinearisation.displacements(found.errors, rows, relinearisation.image_errors(found) - known)
+    by_images = relinearisation.displacements(found.errors, rows, images)
     by_unknowns = rows.by_similarity @ found.conditions.local.to_common[rows.first]
     return np.asarray(by_images + (by_unknowns @ found.unknowns[rows.first, :, None])[:, :, 0], float)
 

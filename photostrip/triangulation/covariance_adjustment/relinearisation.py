@@ -12,7 +12,6 @@ Source: derived; see docs/precision.md, eq. 3 and 7.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from photostrip.frozen import replace
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.covariance_adjustment.system import System
 from photostrip.triangulation.error_propagation.covariances import by_images
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows, add_rows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, y_parallaxes
@@ -43,17 +42,17 @@ def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Float
 
     The first model of each row is held fast: dX = sum K(s) u(first + s) + D v (eq. 3).
     """
-    points = errors.images
-    ends = np.searchsorted(points.photo, np.arange(errors.models + 2)).tolist()
+    points, photos = errors.images, errors.models + 1
+    moved = np.zeros((photos, SPAN, COMPONENTS))
+    add_rows(moved, points.photo, np.einsum("ni,nisc->nsc", images, points.components))
     components = np.zeros((SHARING + errors.models + rows.by_component.shape[1], COMPONENTS))  # from model -SHARING on
-    for photo, (start, stop) in enumerate(pairwise(ends)):
-        moved = images[start:stop].ravel() @ points.components[start:stop].reshape(-1, SPAN * COMPONENTS)
-        components[photo : photo + SPAN] += moved.reshape(SPAN, COMPONENTS)
+    for slot in range(SPAN):
+        components[slot : slot + photos] += moved[:, slot]
     components = components[SHARING:]
     result = np.zeros(rows.by_similarity.shape[:2])
     for slot in range(rows.by_component.shape[1]):
-        result += (rows.by_component[:, slot] @ components[rows.first + slot, :, None])[:, :, 0]
-    np.add.at(result, rows.item, (rows.by_image @ images[rows.image, :, None])[:, :, 0])
+        result += np.einsum("ndc,nc->nd", rows.by_component[:, slot], components[rows.first + slot])
+    add_rows(result, rows.item, np.einsum("edi,ei->ed", rows.by_image, images[rows.image]))
     return result
 
 

@@ -174,7 +174,8 @@ class BlockMatrix:
             self.beside[block, rows, columns] += values
         else:
             self.diagonal[block, rows, columns] += values
-            self.diagonal[block, columns, rows] += values.T
+            if other != model:  # or the values have both sides
+                self.diagonal[block, columns, rows] += values.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +257,7 @@ def _add_covariances(matrix: BlockMatrix, padded: PaddedRows, rows: ErrorRows) -
     layout = matrix.layout
     inside = [slice(*bounds) for bounds in zip(layout.start.tolist(), layout.unknown.tolist(), strict=True)]
     for apart in range(min(layout.width, len(inside) - 1) + 1):
-        values = products(padded, padded, range(len(inside) - apart), apart) / (1 if apart else 2)
+        values = products(padded, padded, range(len(inside) - apart), apart)
         for model, (one, other, value) in enumerate(zip(inside, inside[apart:], values, strict=False)):
             part = value[: one.stop - one.start, : other.stop - other.start]
             matrix.add(model, one, model + apart, other, part)

@@ -113,8 +113,11 @@ def of_parameters(
 
 def by_images(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
     """Coefficients (k, 2) of all image coordinates in a weighted sum of rows with d = 1."""
-    by_component = _summed_components(errors, rows, weights[:, None])
-    result = _by_photo(errors, by_component)[:, :, 0]
+    images, by_component = errors.images, _summed_components(errors, rows, weights[:, None])[:, :, 0]
+    none = np.zeros((SHARING, COMPONENTS))
+    padded = np.concatenate([none, by_component, none])
+    around = np.stack([padded[slot : slot + errors.models + 1] for slot in range(SPAN)], axis=1)
+    result: Floats = np.einsum("nisc,nsc->ni", images.components, around[images.photo])
     add_rows(result, rows.image, rows.by_image[:, 0] * weights[rows.item][:, None])
     return result
 
@@ -173,20 +176,6 @@ def _summed_components(errors: StripErrors, rows: ErrorRows, weights: Floats) ->
         model = rows.first + slot
         inside = np.flatnonzero(model < models)
         add_rows(result, model[inside], rows.by_component[inside, slot, 0, :, None] * weights[inside, None, :])
-    return result
-
-
-def _by_photo(errors: StripErrors, by_component: Floats) -> Floats:
-    """Coefficients of all image coordinates in sums of components, shape (k, 2, t)."""
-    images, count = errors.images, by_component.shape[2]
-    none = np.zeros((SHARING, *by_component.shape[1:]))
-    padded = np.concatenate([none, by_component, none[:1]])
-    around = np.concatenate([padded[slot : slot + errors.models + 1] for slot in range(SPAN)], axis=1)
-    result = np.empty((len(images.row), 2, count))
-    ends = np.searchsorted(images.photo, np.arange(errors.models + 2)).tolist()
-    for nearby, (start, stop) in zip(around, pairwise(ends), strict=True):
-        components = images.components[start:stop].reshape(-1, SPAN * COMPONENTS)
-        result[start:stop] = (components @ nearby).reshape(-1, 2, count)
     return result
 
 

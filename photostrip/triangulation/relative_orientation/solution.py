@@ -59,8 +59,11 @@ def base_rays(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
 
 def y_parallaxes(elements: Floats, pairs: Pairs) -> Floats:
     """Residual y parallaxes q = y1 - y2 of the photos turned into the base frame, mm at photo scale, shape (m,)."""
-    left, right = base_rays(elements, pairs)
-    return np.asarray(-pairs.focal * (left[1] / left[2] - right[1] / right[2]), float)
+    return _parallaxes(*base_rays(elements, pairs), pairs.focal)
+
+
+def _parallaxes(left: Floats, right: Floats, focal: float) -> Floats:
+    return np.asarray(-focal * (left[1] / left[2] - right[1] / right[2]), float)
 
 
 def linearised_parallaxes(elements: Floats, pairs: Pairs) -> Linearised:
@@ -187,8 +190,8 @@ def solve_elements(pairs: Pairs) -> Solved:
     """
     start = start_values(pairs)
     best, converged, steps = iterate_elements(start, pairs)
-    best = _facing(best, pairs)
-    share, squares = _score(best, converged, pairs)
+    best, rays = _facing(best, pairs)
+    share, squares = _score(rays, converged, pairs)
     tolerable = (RETRY_RMS * pairs.focal) ** 2 * pairs.sums(pairs.weight)
     for turn in RETRY_AZIMUTHS:
         todo = np.flatnonzero((share < 1) | (squares > tolerable))
@@ -198,8 +201,8 @@ def solve_elements(pairs: Pairs) -> Solved:
         turned = start[todo]
         turned[:, [1, 4]] += turn
         elements, success, count = iterate_elements(turned, part)
-        elements = _facing(elements, part)
-        new_share, new_squares = _score(elements, success, part)
+        elements, rays = _facing(elements, part)
+        new_share, new_squares = _score(rays, success, part)
         more = new_share > share[todo] + 1e-9
         as_many = new_share > share[todo] - 1e-9
         better = more | (as_many & (new_squares < squares[todo]))
@@ -209,23 +212,27 @@ def solve_elements(pairs: Pairs) -> Solved:
     return Solved(best, converged, steps)
 
 
-def _facing(elements: Floats, pairs: Pairs) -> Floats:
-    """Turn the base of pairs round whose points lie behind both cameras: the same planes, the other side."""
-    to_left, to_right = _distances(*base_rays(elements, pairs))
+def _facing(elements: Floats, pairs: Pairs) -> tuple[Floats, tuple[Floats, Floats]]:
+    """Turn the base of pairs round whose points lie behind both cameras: the same planes, the other side; and rays."""
+    rays = base_rays(elements, pairs)
+    to_left, to_right = _distances(*rays)
     behind = (to_left < 0) & (to_right < 0) & (pairs.weight > 0)
     away = 2 * pairs.sums(behind.astype(float)) > pairs.sums((pairs.weight > 0).astype(float))
+    if not away.any():
+        return elements, rays
     result = elements.copy()
     result[away] *= [-1.0, 1.0, -1.0, -1.0, 1.0]
     result[away, 1] += np.pi
     result[away, 4] += np.pi
-    return reduced_angles(result)
+    result = reduced_angles(result)
+    return result, base_rays(result, pairs)
 
 
-def _score(elements: Floats, converged: Flags, pairs: Pairs) -> tuple[Floats, Floats]:
+def _score(rays: tuple[Floats, Floats], converged: Flags, pairs: Pairs) -> tuple[Floats, Floats]:
     """Share of the points in front (-1 where not converged) and weighted sum of squares, by pair."""
     used = pairs.weight > 0
     with np.errstate(all="ignore"):
-        front = pairs.sums((in_front_of_cameras(elements, pairs) & used).astype(float))
+        front = pairs.sums((rays_meet_in_front(*rays) & used).astype(float))
         share = front / np.maximum(pairs.sums(used.astype(float)), 1)
-        squares = pairs.sums(pairs.weight * y_parallaxes(elements, pairs) ** 2)
+        squares = pairs.sums(pairs.weight * _parallaxes(*rays, pairs.focal) ** 2)
     return np.where(converged, share, -1.0), np.where(np.isfinite(squares), squares, np.inf)

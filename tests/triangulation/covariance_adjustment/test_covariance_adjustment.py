@@ -96,7 +96,7 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     expected = by_images.T @ solution[: len(by_images)]
     assert images.ravel() == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
     for rows in nonempty(tables):
-        predicted = prediction.errors(solved, rows, np.zeros_like(images))
+        predicted = prediction.errors(solved, rows, images)
         covariances = prediction.covariances(solved, rows)
         own = written_out(rows.without_similarity(), errors)
         size = rows.by_similarity.shape[1]

@@ -28,8 +28,8 @@ def test_groups_are_predicted_as_without_them(photos: int, lap: float) -> None:
         rest = np.setdiff1d(np.arange(len(given)), rows)
         without = conditions.conditions(*parts, control.take(rest), given[rest])
         rest_alone, there = system.system(found.errors, without, FACTOR), control.take(rows).rows
-        none = np.zeros_like(relinearisation.image_errors(rest_alone))
-        error = given[rows] - prediction.errors(rest_alone, there, none)[:, 0]
+        images = relinearisation.image_errors(rest_alone)
+        error = given[rows] - prediction.errors(rest_alone, there, images)[:, 0]
         assert left_out.errors == pytest.approx(error, abs=1e-7)
         variance = prediction.covariances(rest_alone, there)[:, 0, 0] + control.variance[rows] / FACTOR
         if len(rows) == 1:

@@ -247,7 +247,8 @@ def lay_out(links: PhotoLinks, photos: int) -> Mosaic:
 
 def _grow(start: int, around: Sequence[Sequence[tuple[int, int]]], links: PhotoLinks, plane: Mosaic) -> None:
     """Place all photos that hang together with one, strongest links first; the rows of `plane` are filled in."""
-    rank = np.where(links.fits, -links.count, 0).tolist()
+    fits, links_mirrored = links.fits.tolist(), links.mirrored.tolist()
+    turns, shifts, rank = links.turn.tolist(), links.shift.tolist(), np.where(links.fits, -links.count, 0).tolist()
     queue = [(rank[row], row, start, other) for row, other in around[start]]
     heapq.heapify(queue)
     while queue:
@@ -255,7 +256,7 @@ def _grow(start: int, around: Sequence[Sequence[tuple[int, int]]], links: PhotoL
         if plane.part[new] >= 0:
             continue
         plane.part[new] = plane.part[known]
-        turn, shift, mirrored = complex(links.turn[row]), complex(links.shift[row]), bool(links.mirrored[row])
+        turn, shift, mirrored = turns[row], shifts[row], links_mirrored[row]
         if known < new:  # z_new = turn z_known + shift, so z_known = (z_new - shift) / turn
             turn, shift = (1.0 / turn, -shift / turn) if abs(turn) > TINY else (0j, 0j)
             if mirrored:
@@ -264,7 +265,7 @@ def _grow(start: int, around: Sequence[Sequence[tuple[int, int]]], links: PhotoL
         if plane.mirrored[known]:  # the plane takes conj(z_known)
             turn, shift = turn.conjugate(), shift.conjugate()
         plane.mirrored[new] = plane.mirrored[known] ^ mirrored
-        jumps = links.fits[row] and not 1 / SCALE_JUMP < abs(turn) < SCALE_JUMP
+        jumps = fits[row] and not 1 / SCALE_JUMP < abs(turn) < SCALE_JUMP
         plane.size[new] = plane.size[known] * (1 / max(abs(turn), TINY) if jumps else 1.0)
         plane.factor[new] = plane.factor[known] * turn
         plane.offset[new] = plane.factor[known] * shift + plane.offset[known]
