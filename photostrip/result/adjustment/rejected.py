@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photostrip.arrays import distinct
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result, StripResult
@@ -13,7 +14,7 @@ from photostrip.result.adjustment.bundle import GroupKind, kinds, names_of_obser
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
 from photostrip.result.numbers import natural, rounded
-from photostrip.result.quantities import DECIMALS_BY_UNIT, record
+from photostrip.result.quantities import DECIMALS_BY_UNIT, record, records
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.strip_formation.scale_transfer import depths
 from photostrip.units import MICROMETRES
@@ -72,52 +73,61 @@ def _entry(**values: object) -> Document:
     return record("rejected", EMPTY | values)
 
 
+def _entries(**columns: object) -> list[Document]:
+    """Make entries of columns; a text, a flag or None stands in each."""
+    return list(records("rejected", EMPTY | columns))
+
+
 def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]:
-    ids, oriented = observations.point_ids, strip.of_photos.orientation
+    ids, photos, oriented = observations.point_ids, strip.strip.photos, strip.of_photos.orientation
+    wrong_rays = {each.row for each in strip.of_photos.wrong_rays if each.cause == WRONG_RAY}
+    names = {point: natural(ids[point]) for point in distinct(oriented.point).tolist()}
+    pair, point, rays = oriented.pairs.pair.tolist(), oriented.point.tolist(), oriented.rows.tolist()
+    every = sorted(strip.of_photos.rejections, key=lambda each: (pair[each.row], names[point[each.row]]))
+    found: list[Document] = [{}] * len(every)
+    for unit, factor in (("um", MICROMETRES), ("", 1.0)):
+        places = [n for n, each in enumerate(every) if (each.test == "parallax") == (unit == "um")]
+        some = [every[place] for place in places]
+        rows = [each.row for each in some]
+        size = [each.worst * MICROMETRES for each in some]
+        blamed = [
+            []
+            if each.readmitted
+            else [observations.photo_ids[observations.photo[row]] for row in rays[each.row] if row in wrong_rays]
+            for each in some
+        ]
+        entries = _entries(
+            strip=[strip.strip.id] * len(some),
+            photo=[photos[pair[row]] for row in rows],
+            other_photo=[photos[pair[row] + 1] for row in rows],
+            point=[ids[point[row]] for row in rows],
+            stage="relative",
+            test=[each.test for each in some],
+            value=np.array([each.value for each in some]) * factor,
+            limit=np.array([each.limit for each in some]) * factor,
+            unit=[unit] * len(some),
+            parallax_um=np.array(size),
+            zone=strip.of_photos.screened.zone[rows],
+            size=np.array(size),
+            size_unit=["um"] * len(some),
+            readmitted=[each.readmitted for each in some],
+            blamed=blamed,
+            reason=list(map(_reason_of_pair, some, size, blamed)),
+        )
+        for place, entry in zip(places, entries, strict=True):
+            found[place] = entry
+    return found
 
-    def place(rejection: Rejection) -> tuple[int, object]:
-        return int(oriented.pairs.pair[rejection.row]), natural(ids[oriented.point[rejection.row]])
 
-    wrong = {each.row for each in strip.of_photos.wrong_rays if each.cause == WRONG_RAY}
-    return [_from_pair(strip, each, observations, wrong) for each in sorted(strip.of_photos.rejections, key=place)]
-
-
-def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoints, wrong: set[int]) -> Document:
-    oriented = strip.of_photos.orientation
-    pair = int(oriented.pairs.pair[rejection.row])
-    size = rejection.worst * MICROMETRES
-    factor = MICROMETRES if rejection.test == "parallax" else 1.0
-    blamed = [
-        observations.photo_ids[observations.photo[row]] for row in oriented.rows[rejection.row].tolist() if row in wrong
-    ]
+def _reason_of_pair(rejection: Rejection, size: float, blamed: list[str]) -> str:
     if rejection.readmitted:
-        blamed = []
-        reason = "taken back: the pair or the strip oriented on the other points predicts it, or the user keeps it"
-    elif rejection.test == "in front":
-        reason = "the rays do not meet in front of the cameras"
-    else:
-        reason = f"y parallax {size:.1f} µm in the pair oriented without it"
+        return "taken back: the pair or the strip oriented on the other points predicts it, or the user keeps it"
+    front = rejection.test == "in front"
+    reason = "the rays do not meet in front of the cameras"
+    reason = reason if front else f"y parallax {size:.1f} µm in the pair oriented without it"
     if blamed:
-        reason += f"; the wrong ray is that of photo {', '.join(blamed)}: the others of the point meet without it"
-    elif rejection.test != "in front" and not rejection.readmitted:
-        reason += "; which of its two rays is wrong cannot be told"
-    return _entry(
-        strip=strip.strip.id,
-        photo=strip.strip.photos[pair],
-        other_photo=strip.strip.photos[pair + 1],
-        point=observations.point_ids[oriented.point[rejection.row]],
-        stage="relative",
-        test=rejection.test,
-        value=rejection.value * factor,
-        limit=rejection.limit * factor,
-        unit="um" if rejection.test == "parallax" else "",
-        parallax_um=size,
-        zone=int(strip.of_photos.screened.zone[rejection.row]),
-        size=size,
-        readmitted=rejection.readmitted,
-        blamed=blamed,
-        reason=reason,
-    )
+        return f"{reason}; the wrong ray is that of photo {', '.join(blamed)}: the others of the point meet without it"
+    return reason if front else f"{reason}; which of its two rays is wrong cannot be told"
 
 
 def _from_junctions(strip: StripResult, observations: PhotoPoints) -> list[Document]:
