@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
-from photostrip.geometry.rotation import cross_matrix
 from photostrip.points import frozen
 
 SIMILARITY_PARAMETERS = 7  # shift, rotation, logarithm of the scale
@@ -104,8 +103,11 @@ def similarity_derivatives(xyz: Floats, origin: Floats) -> Floats:
     Returns (n, 3, 7), derivatives by shift t, rotation theta (radians) and logarithm of the scale lambda.
     """
     arm = xyz - origin
+    x, y, z = arm.T
     derivatives = np.zeros((len(arm), 3, SIMILARITY_PARAMETERS))
-    derivatives[:, :, :3] = np.eye(3)
-    derivatives[:, :, 3:6] = -cross_matrix(arm)
+    derivatives[:, range(3), range(3)] = 1.0
+    derivatives[:, 0, 4], derivatives[:, 0, 5] = z, -y
+    derivatives[:, 1, 3], derivatives[:, 1, 5] = -z, x
+    derivatives[:, 2, 3], derivatives[:, 2, 4] = y, -x
     derivatives[:, :, 6] = arm
     return derivatives

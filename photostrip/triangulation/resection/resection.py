@@ -15,7 +15,6 @@ from photostrip.triangulation.resection.collinearity import KnownPhotos, partial
 ITERATIONS = 20
 CONVERGED = 1e-10  # rad, and of the distance to the points; the next step would be its square
 UNKNOWNS = 6
-UPPER = np.triu_indices(UNKNOWNS)
 AT_A_TIME = 4096  # image points worked on together: what fits into the processor's cache
 SINGULAR = 1e-12  # reciprocal condition of a scaled normal matrix
 
@@ -106,23 +105,23 @@ def _steps(
     centers, rotations, focal = photos
     present, starts = segments
     ends = np.append(starts, len(photo))
-    sums = np.zeros((len(centers), len(UPPER[0]) + UNKNOWNS))
+    normal, right = np.zeros((len(centers), UNKNOWNS, UNKNOWNS)), np.zeros((len(centers), UNKNOWNS, 1))
     for low, high in runs(ends, AT_A_TIME):
-        rows = slice(ends[low], ends[high])
+        rows, some, first = slice(ends[low], ends[high]), present[low:high], starts[low:high] - ends[low]
         number = photo[rows]
         by_x, by_y, computed = partials(
             points[rows] - centers[number], rotations[number], focal[number], distance[number]
         )
         misfit_x, misfit_y = xy[rows].T - computed
-        products = [x * by_x[row:] + y * by_y[row:] for row, (x, y) in enumerate(zip(by_x, by_y, strict=True))]
-        products.append(by_x * misfit_x + by_y * misfit_y)
-        segments = starts[low:high] - ends[low]
-        sums[present[low:high]] = np.concatenate([np.add.reduceat(each, segments, axis=1) for each in products]).T
-    normal = np.zeros((len(centers), UNKNOWNS, UNKNOWNS))
-    normal[:, UPPER[0], UPPER[1]] = sums[:, : len(UPPER[0])]
-    normal[:, UPPER[1], UPPER[0]] = sums[:, : len(UPPER[0])]
+        right[some, :, 0] = np.add.reduceat(by_x * misfit_x + by_y * misfit_y, first, axis=1).T
+        for row in range(UNKNOWNS):
+            products = by_x[row] * by_x[row:]
+            products += by_y[row] * by_y[row:]
+            normal[some, row, row:] = np.add.reduceat(products, first, axis=1).T
+    for row in range(UNKNOWNS):
+        normal[:, row:, row] = normal[:, row, row:]
     diagonal = np.arange(UNKNOWNS)
     normal[:, diagonal, diagonal] += SINGULAR * np.maximum(normal[:, diagonal, diagonal], 1e-9)
-    along_axes = np.linalg.solve(normal, sums[:, len(UPPER[0]) :, None])[:, :, 0]
+    along_axes = np.linalg.solve(normal, right)[:, :, 0]
     turned = np.einsum("nij,nkj->nki", rotations, along_axes.reshape(-1, 2, 3))
     return np.asarray(turned.reshape(-1, UNKNOWNS), float)
