@@ -38,12 +38,8 @@ class Sizes:
 
 def columns(xyz: Floats, terms: Sequence[str]) -> Floats:
     """Design columns (n, k) of the terms, powers of X and Y of positions (n, 3), unscaled."""
-    result = np.ones((len(xyz), len(terms)))  # eq. 150
-    for column, term in enumerate(terms):
-        for axis, power in enumerate(POWERS[term]):
-            for _ in range(power):  # a third power of numpy takes fifty times as long
-                result[:, column] *= xyz[:, axis]
-    return result
+    x, y = xyz[:, 0], xyz[:, 1]  # eq. 150
+    return np.column_stack([x**i * y**j for i, j in (POWERS[t] for t in terms)] or [np.zeros((len(xyz), 0))])
 
 
 def count_stations(x: Floats, spacing: float) -> int:
