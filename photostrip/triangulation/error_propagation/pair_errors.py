@@ -11,10 +11,10 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import angle_rates, cross_matrix, from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.orientation import Orientation
-from photostrip.triangulation.relative_orientation.pairs import Pairs
 from photostrip.triangulation.relative_orientation.solution import normal_matrices
 
 SYSTEM = "alpha-omega-kappa"
+ROWS = 2048  # worked on together: what fits into the processor's cache
 LEFT, RIGHT = slice(0, 2), slice(2, 5)  # elements that turn the left and the right photo
 
 
@@ -48,27 +48,33 @@ def differentiate_pairs(
     left, right = _turns(orientation.elements)
     to_ground = rotations @ left.rotation.transpose(0, 2, 1) * scale[:, None, None]
     turn = np.concatenate([-left.rates, right.rates], axis=2)
-    of_row, count = _by_row(to_ground, pairs.pair), len(pairs.pair)
-    by_elements, by_image = np.empty((count, 3, 5)), np.empty((count, 3, 4))
+    held, count = to_ground @ left.rates / scale[:, None, None], len(pairs.pair)
+    point, by_elements, by_image = np.empty((count, 3)), np.empty((count, 3, 5)), np.empty((count, 3, 4))
     parallax_by_elements, parallax_by_image = np.empty((5, count)), np.empty((count, 4))
-    with np.errstate(all="ignore"):
-        levels = [_levelled(*each, pairs) for each in zip(orientation.rays, (left, right), strict=True)]
-        if across is None:
-            point, by_levels = _on_both_rays(levels[0].xy, levels[1].xy, pairs.focal)
-        else:
-            seen_along = np.einsum("pij,pj->pi", left.rotation, across)[pairs.pair]
-            point, by_levels = _on_left_rays(levels[0].xy, levels[1].xy, pairs.focal, seen_along)
-        for level, by_level, elements, image, sign in zip(
-            levels, by_levels, (LEFT, RIGHT), (slice(0, 2), slice(2, 4)), (1.0, -1.0), strict=True
-        ):
-            in_ground = _product(of_row, by_level)
-            by_elements[:, :, elements] = _product(in_ground, level.by_elements).transpose(2, 0, 1)
-            by_image[:, :, image] = _product(in_ground, level.by_image).transpose(2, 0, 1)
-            parallax_by_elements[elements] = sign * level.by_elements[1]
-            parallax_by_image[:, image] = sign * level.by_image[1].T
-        # in the frame of the left photo, which is held: (p x) turned to the ground
-        point = (of_row * point).sum(axis=1).T
-        by_elements[:, :, LEFT] += cross_matrix(point) @ (to_ground @ left.rates / scale[:, None, None])[pairs.pair]
+    for rows in (slice(start, start + ROWS) for start in range(0, count, ROWS)):
+        pair = pairs.pair[rows]
+        of_row = _by_row(to_ground, pair)
+        with np.errstate(all="ignore"):
+            levels = [
+                _levelled(ray[:, rows], photo, pair, pairs.focal)
+                for ray, photo in zip(orientation.rays, (left, right), strict=True)
+            ]
+            if across is None:
+                met, by_levels = _on_both_rays(levels[0].xy, levels[1].xy, pairs.focal)
+            else:
+                seen_along = (left.rotation @ across[:, :, None])[pair, :, 0]
+                met, by_levels = _on_left_rays(levels[0].xy, levels[1].xy, pairs.focal, seen_along)
+            for level, by_level, elements, image, sign in zip(
+                levels, by_levels, (LEFT, RIGHT), (slice(0, 2), slice(2, 4)), (1.0, -1.0), strict=True
+            ):
+                in_ground = _product(of_row, by_level)
+                by_elements[rows, :, elements] = _product(in_ground, level.by_elements).transpose(2, 0, 1)
+                by_image[rows, :, image] = _product(in_ground, level.by_image).transpose(2, 0, 1)
+                parallax_by_elements[elements, rows] = sign * level.by_elements[1]
+                parallax_by_image[rows, image] = sign * level.by_image[1].T
+            # in the frame of the left photo, which is held: (p x) turned to the ground
+            point[rows] = (of_row * met).sum(axis=1).T
+            by_elements[rows, :, LEFT] += cross_matrix(point[rows]) @ held[pair]
     base = np.zeros((pairs.size, 3, 5))
     base[:, :, LEFT] = cross_matrix(np.array([1.0, 0.0, 0.0])) @ left.rates  # the left photo is held, the base turns
     return PairErrors(
@@ -138,16 +144,15 @@ def _product(first: Floats, second: Floats) -> Floats:
     return np.asarray(np.einsum("ijm,jkm->ikm", first, second), float)
 
 
-def _levelled(ray: Floats, photo: _Turns, pairs: Pairs) -> _Level:
+def _levelled(ray: Floats, photo: _Turns, pair: Numbers, focal: float) -> _Level:
     """Bring rays (3, m) to a level photo: x = -f X/Z, y = -f Y/Z, by small turns of the photo and by its images."""
-    focal = pairs.focal
     x, y = xy = -focal * ray[:2] / ray[2]
     by_turn = np.stack([x * y, -(focal**2) - x * x, -y * focal, focal**2 + y * y, -x * y, x * focal]) / focal
     by_ray = np.zeros((2, 3, len(x)))
     by_ray[0, 0] = by_ray[1, 1] = -focal / ray[2]
     by_ray[:, 2] = -xy / ray[2]
-    by_elements = _product(by_turn.reshape(2, 3, -1), _by_row(photo.rates, pairs.pair))
-    return _Level(xy, by_elements, _product(by_ray, _by_row(photo.rotation[:, :, :2], pairs.pair)))
+    by_elements = _product(by_turn.reshape(2, 3, -1), _by_row(photo.rates, pair))
+    return _Level(xy, by_elements, _product(by_ray, _by_row(photo.rotation[:, :, :2], pair)))
 
 
 def _on_both_rays(left: Floats, right: Floats, focal: float) -> tuple[Floats, Floats]:

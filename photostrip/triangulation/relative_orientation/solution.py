@@ -52,8 +52,11 @@ def base_rays(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
     rotations = (from_alpha_omega_kappa(al1, 0.0, ka1), from_alpha_omega_kappa(al2, om2, ka2))
     turned: list[Floats] = []
     for rotation, xy in zip(rotations, (pairs.left, pairs.right), strict=True):
-        rows = rotation.transpose(1, 2, 0).take(pairs.pair, axis=2)
-        turned.append(np.stack([a * xy[:, 0] + b * xy[:, 1] - c * pairs.focal for a, b, c in rows]))  # eq. 137
+        rays = np.empty((3, len(xy)))
+        for row, (a, b, c) in enumerate(rotation.transpose(1, 2, 0)):
+            along = a.take(pairs.pair) * xy[:, 0] + b.take(pairs.pair) * xy[:, 1]
+            rays[row] = along - (c * pairs.focal).take(pairs.pair)  # eq. 137
+        turned.append(rays)
     return turned[0], turned[1]
 
 
