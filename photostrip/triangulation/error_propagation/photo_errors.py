@@ -93,14 +93,15 @@ def _some_photos(
     shift[item, place] = points.first[sightings.point] - first[item]
     along = points.by_component[point]
     slots = along.shape[2]
-    by_component = np.zeros((count, int(shift.max()) + slots, 6, COMPONENTS))
-    for ahead in range(int(shift.max()) + 1):
-        here, beyond = (
-            (by_point * chosen[:, None, :, None]).reshape(flat.shape) for chosen in (shift == ahead, shift > ahead)
-        )
+    farthest = int(shift.max())
+    by_component = np.zeros((count, farthest + slots, 6, COMPONENTS))
+    for ahead in range(farthest + 1):
+        here = (by_point * (shift == ahead)[:, None, :, None]).reshape(flat.shape)
         for slot in range(slots):
             by_component[:, ahead + slot] += here @ along[:, :, slot].reshape(count, 3 * most, COMPONENTS)
-        by_component[:, ahead] += beyond @ similar @ errors.steps[np.minimum(first + ahead, errors.models - 1)]
+        if ahead < farthest:
+            beyond = (by_point * (shift > ahead)[:, None, :, None]).reshape(flat.shape)
+            by_component[:, ahead] += beyond @ similar @ errors.steps[np.minimum(first + ahead, errors.models - 1)]
     rows = ErrorRows(
         first=first,
         by_similarity=flat @ similar,
@@ -133,4 +134,4 @@ def _resected(sightings: UsedRays, resection: Resection, item: Numbers, place: N
     turned = (unit[:, None] * solved).reshape(len(scaled), 2, 3, -1)
     turned = resection.rotations[distinct(sightings.photo), None] @ turned
     by_image = turned.reshape(len(scaled), 6, -1, 2)[item, :, place]
-    return _Resected(by_image, by_image @ design[:, :, :3] @ rotations.transpose(0, 2, 1))
+    return _Resected(by_image, by_image @ (design[:, :, :3] @ rotations.transpose(0, 2, 1)))

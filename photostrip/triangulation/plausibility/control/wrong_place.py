@@ -50,8 +50,9 @@ def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number:
         return FramePlace([], None, inside=True)
     level = np.column_stack([known[:, :2], np.zeros(len(known))])
     exchanged = level[:, [1, 0, 2]]
-    tens = _tens(frame, area, level)
-    if _inside(frame, area, level) and not tens:
+    well_inside = _inside(frame, area, level, margin=0.0)
+    tens = 0.0 if well_inside else _tens(frame, area, level)
+    if well_inside or (_inside(frame, area, level) and not tens):
         return FramePlace([], None if _inside(frame, area, exchanged) else True, inside=True)
     key = f"control[{number}]"
     where = _where(frame, level, known)
@@ -111,7 +112,7 @@ def _tens(frame: GroundFrame, area: Area, level: Floats) -> float:
 
     Near the origin of a map, where scaled numbers lie, some areas are not far.
     """
-    if frame.kind != "projected" or _inside(frame, area, level, margin=0.0):
+    if frame.kind != "projected":
         return 0.0
     return next((each for each in TENS if _inside(frame, area, each * level, margin=0.0)), 0.0)
 
