@@ -165,34 +165,37 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
 
     A ray that all its pairs have rejected stands with those.
     """
-    zone = np.zeros(len(observations), np.intp)  # in the pair with the next photo, else with the one before
+    in_pair = np.zeros(len(observations), np.intp)  # with the next photo, else with the one before
     for side in (1, 0):
-        zone[strip.of_photos.orientation.rows[:, side]] = strip.of_photos.screened.zone
+        in_pair[strip.of_photos.orientation.rows[:, side]] = strip.of_photos.screened.zone
+    zone = in_pair.tolist()
     photo_of = {photo: number for number, photo in enumerate(strip.strip.photos)}
-    rows = []
-    for each in rejected_by_strip(strip):
-        photo = observations.photo_ids[observations.photo[each.row]]
-        point = observations.point_ids[observations.point[each.row]]
-        known = bool(np.isfinite(each.worst))
-        if each.kind == "control":
-            rows.append((natural(point), photo_of[photo], _from_control(strip, each, point, photo)))
-            continue
-        entry = _entry(
-            strip=strip.strip.id,
-            photo=photo,
-            point=point,
-            stage="rays",
-            test="strip",
-            value=each.value,
-            limit=each.limit,
-            zone=int(zone[each.row]) or None,
-            size=each.worst * MICROMETRES if known else None,
-            size_unit="um" if known else "",
-            blamed=[photo] if each.cause == WRONG_RAY else [],
-            reason=REASONS[each.cause],
-        )
-        rows.append((natural(point), photo_of[photo], entry))
-    return [entry for _, _, entry in sorted(rows, key=lambda each: each[:2])]
+    every = rejected_by_strip(strip)
+    photos = [observations.photo_ids[observations.photo[each.row]] for each in every]
+    points = [observations.point_ids[observations.point[each.row]] for each in every]
+    rays = [place for place, each in enumerate(every) if each.kind != "control"]
+    size = np.array([every[place].worst for place in rays]) * MICROMETRES
+    entries = _entries(
+        strip=[strip.strip.id] * len(rays),
+        photo=[photos[place] for place in rays],
+        point=[points[place] for place in rays],
+        stage="rays",
+        test="strip",
+        value=np.array([every[place].value for place in rays]),
+        limit=np.array([every[place].limit for place in rays]),
+        unit=[""] * len(rays),
+        zone=[zone[every[place].row] or None for place in rays],
+        size=size,
+        size_unit=["um"] * len(rays),
+        blamed=[[photos[place]] if every[place].cause == WRONG_RAY else [] for place in rays],
+        reason=[REASONS[every[place].cause] for place in rays],
+    )
+    entries = [entry if entry["size"] is not None else entry | {"size_unit": ""} for entry in entries]
+    found = dict(zip(rays, entries, strict=True))
+    for place in sorted(set(range(len(every))) - found.keys()):
+        found[place] = _from_control(strip, every[place], points[place], photos[place])
+    order = sorted(range(len(every)), key=lambda place: (natural(points[place]), photo_of[photos[place]]))
+    return [found[place] for place in order]
 
 
 def rejected_by_strip(strip: StripResult) -> list[Rejection]:

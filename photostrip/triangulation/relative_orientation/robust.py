@@ -100,7 +100,9 @@ def _best_sets(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
 def _best_step(design: Floats, residual: Floats) -> Floats:
     """Change of the elements by which most residuals become small; zero when no set gives one."""
     n = len(residual)
-    draws = np.argsort(np.random.default_rng(n).random((SETS, n)), axis=1)[:, :MINIMUM_POINTS]
+    chance = np.random.default_rng(n).random((SETS, n))
+    draws = np.argpartition(chance, MINIMUM_POINTS, axis=1)[:, :MINIMUM_POINTS]
+    draws = np.take_along_axis(draws, np.take_along_axis(chance, draws, axis=1).argsort(axis=1), axis=1)
     steps = -(np.linalg.pinv(design[draws]) @ residual[draws][:, :, None])[:, :, 0]
     steps = np.where(np.abs(steps).max(axis=1, keepdims=True) < solution.LARGEST_STEP, steps, 0.0)
     left = np.log1p(np.abs(residual + steps @ design.T)).sum(axis=1)
