@@ -101,11 +101,14 @@ CASES: dict[str, tuple[Spec, Callable[[Path], None], tuple[str, ...]]] = {
     "strip with 500 control points, half 30 m off": (DENSE, control(0.5), (FOLDS,)),
     "80 % end lap, 800 points, 30 % 0.1 mm wrong": (spec(MIDDLE, 150, 5), images(0.3, 0.1), (ALL, FOLDS)),
     "80 % end lap, 800 points, 30 % 5 mm wrong": (spec(MIDDLE, 150, 5), images(0.3, 5.0), (ALL, FOLDS)),
+    "80 % end lap, 800 points, 33 % 0.1 mm wrong": (spec(MIDDLE, 150, 5), images(1 / 3, 0.1), (ALL, FOLDS)),
+    "80 % end lap, 800 points, 33 % 5 mm wrong": (spec(MIDDLE, 150, 5), images(1 / 3, 5.0), (ALL, FOLDS)),
     "94 % end lap, 813 points": (spec(LAP, 60, 3), sound, ()),
     "94 % end lap, 813 points, 30 % 5 mm wrong": (spec(LAP, 60, 3), images(0.3, 5.0), (ALL,)),
     "94 % end lap, 813 points, 30 % 0.1 mm wrong": (spec(LAP, 60, 3), images(0.3, 0.1), (FOLDS,)),
     "94 % end lap, 813 points, 0.1 mm wrong, bundle": (spec(LAP, 60, 3), images(0.3, 0.1), (*BUNDLE, FOLDS)),
     "strip of 2000 points": (spec(STRIP, 1500, 3), sound, ()),
+    "strip of 2000 points, 10 % 0.1 mm wrong": (spec(STRIP, 1500, 3), images(0.1, 0.1), ()),
     "strip of 2000 points, 30 % 0.1 mm wrong": (spec(STRIP, 1500, 3), images(0.3, 0.1), ()),
 }  # fmt: skip
 

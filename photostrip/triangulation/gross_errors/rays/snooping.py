@@ -35,6 +35,7 @@ from photostrip.triangulation.gross_errors.rays.ray_decisions import Adjusted, R
 from photostrip.triangulation.gross_errors.rays.ray_log import ROBUST, START, RayLog, WrongRays
 
 RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
+PHOTOS_ENOUGH = 3  # on which a point is among the worst, for it to go, whatever more it is on
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
@@ -272,15 +273,16 @@ class _Search:
         return np.where(self.spared | within, 0.0, worst)
 
     def _worst_nearby(self, selection: Selection, value: Floats) -> Flags:
-        """Doubtful points among the worst on each of their photos: one, and more where much went or much is left."""
+        """Doubtful points among the worst on enough of their photos: one, and more where much went or much is left."""
         photo, point = self.problem.images.photo[selection.images], self.problem.images.point[selection.images]
         out = self.problem.images.photo[self.begin & ~selection.images]
         more = np.bincount(out, minlength=self.problem.photos)
         more += np.bincount(photo, minlength=self.problem.photos) // RAYS_TO_ONE_MORE
         order = np.lexsort((-value[point], photo))
         worse = np.arange(len(order)) - np.searchsorted(photo[order], photo[order])
-        wait = point[order[worse > more[photo[order]]]]
-        return np.asarray((value > 0.0) & ~np.isin(np.arange(len(value)), wait), bool)
+        among = np.bincount(point[order[worse <= more[photo[order]]]], minlength=len(value))
+        enough = np.minimum(np.bincount(point, minlength=len(value)), PHOTOS_ENOUGH)
+        return np.asarray((value > 0.0) & (among >= enough), bool)
 
     def _wrong_rays(self, done: ScreenedBundle, points: Numbers, limit: Limit) -> WrongRays:
         """Return the rays of points that must go; all of a point where none of them alone does it."""

@@ -131,6 +131,26 @@ def test_one_point_of_a_photo_more_goes_at_a_time_for_every_fifty_rays_that_hold
     assert np.flatnonzero(found).tolist() == np.sort(held)[-3:].tolist()
 
 
+@pytest.mark.parametrize(("free", "goes"), [(3, True), (2, False)])
+def test_a_point_goes_that_is_among_the_worst_on_three_of_its_photos(free: int, *, goes: bool) -> None:
+    """On the photos after the first ones another point is worse."""
+    result = adjusted(simulate(Spec(flight=Flight(photos=9, end_lap_percent=85.0))))
+    assert result.bundle is not None
+    problem = result.bundle.block.problem
+    first, last = np.full(problem.points, problem.photos), np.zeros(problem.points, np.intp)
+    np.minimum.at(first, problem.images.point, problem.images.photo)
+    np.maximum.at(last, problem.images.point, problem.images.photo)
+    at = int(np.argmax(last - first))
+    assert last[at] - first[at] > free
+    worse = int(np.flatnonzero((first == first[at] + free) & (last >= last[at]))[0])
+    search = snooping._Search(problem, Selection.everything(problem), BundleSettings(), None, rough=False)
+    doubtful = np.zeros(problem.points)
+    doubtful[[at, worse]] = 4.0, 5.0
+    found = search._worst_nearby(Selection.everything(problem), doubtful)
+    assert found[worse]
+    assert bool(found[at]) == goes
+
+
 @pytest.mark.parametrize(("out", "more"), [(0, 0), (7, 0), (8, 1), (15, 1)])
 def test_of_given_coordinates_one_more_goes_at_a_time_for_every_eight_that_went(
     problem: BundleProblem, out: int, more: int
