@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Literal, get_args
@@ -241,16 +241,15 @@ class Result:
 
     def files(self, *, html: bool = False) -> dict[str, str]:
         """Return the files of the result, content by name: tables, the report as a page, result.json as the last."""
-        from photostrip.formats.output.result_json import to_json
+        return {name: "".join(pieces) for name, pieces in self._files(html=html).items()}
 
-        return self._beside_json(html=html) | {RESULT: to_json(self._document)}
+    def _files(self, *, html: bool) -> dict[str, Iterable[str]]:
+        from photostrip.formats.output.result_files import beside_json
+        from photostrip.formats.output.result_json import json_pieces
 
-    def _beside_json(self, *, html: bool) -> dict[str, str]:
-        from photostrip.formats.output.result_files import beside_json, refined_csv
-
-        pages = {"report.html": self.report("html")} if html else {}
-        refined = refined_csv(self.computed) if self.computed is not None else ""
-        return pages | beside_json(self._document, self._resolved, refined)
+        pages = {"report.html": [self.report("html")]} if html else {}
+        tables = beside_json(self._document, self._resolved, self.computed)
+        return pages | tables | {RESULT: json_pieces(self._document)}
 
     def pictures(self) -> dict[str, str]:
         """Return the pictures of the report as SVG, content by file name."""
@@ -266,10 +265,9 @@ class Result:
         """
         from pathlib import Path
 
-        from photostrip.formats.output.result_json import json_pieces
         from photostrip.formats.text.writing import write_files
 
-        files = self._beside_json(html=html) | {RESULT: json_pieces(self._document)}
+        files = self._files(html=html)
         write_files(Path(folder), files)
         return tuple(files)
 

@@ -51,7 +51,7 @@ def flown() -> Simulation:
 
 def rejected(inputs: Inputs) -> str:
     """Give rejected.csv."""
-    return rejected_csv(document_of(triangulate(inputs, settings_of(flown()))))
+    return "".join(rejected_csv(document_of(triangulate(inputs, settings_of(flown())))))
 
 
 def rows(text: str) -> list[dict[str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain, compress
 from typing import Any
 
@@ -23,18 +23,18 @@ from photostrip.result.records import Grouped, Records
 ODD = re.compile(r'[",\s]')  # without these no id needs quotes
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
 BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column
+LINES = 2000  # that are written at a time
 
 
-def beside_json(document: Document, resolved: str, refined: str) -> dict[str, str]:
-    """Return the files beside result.json: content by file name.
+def beside_json(document: Document, resolved: str, result: Result | None) -> dict[str, Iterable[str]]:
+    """Return the files beside result.json: by file name the content in pieces, made when they are written.
 
-    `resolved` is the text of project.resolved.yaml, `refined` that of refined.csv, which is not rendered from the
-    document; they are not written when they are empty.
+    `resolved` is the text of project.resolved.yaml, not written when it is empty; refined.csv is that of the `result`.
     """
     frame, photos = document["frame"], document["photos"]
     angles = photos[0]["angles"] if photos else {"system": "alpha-omega-kappa", "unit": "deg"}
     unit = angles["unit"]
-    files = {
+    files: dict[str, Iterable[str]] = {
         "points.csv": _table(tables.in_frame(tables.points_csv(unit), frame), _flat_points(document["points"], unit)),
         "photos.csv": _table(tables.in_frame(tables.photos_csv(angles), frame), map(tables.flat_photo, photos)),
         "residuals.csv": _grouped(tables.residuals_csv(), document["residuals"]),
@@ -45,25 +45,28 @@ def beside_json(document: Document, resolved: str, refined: str) -> dict[str, st
         files["reliability.csv"] = _table(tables.reliability_csv(), _checked_rays(document["residuals"]))
     if "link_residuals" in document:
         files["links.csv"] = _grouped(tables.links_csv(), document["link_residuals"])
-    if refined:
-        files["refined.csv"] = refined
+    if result is not None and len(result.refined.observations):  # of independent models there are none
+        files["refined.csv"] = refined_csv(result)
     if resolved:
-        files["project.resolved.yaml"] = resolved
+        files["project.resolved.yaml"] = [resolved]
     return files
 
 
-def refined_csv(result: Result) -> str:
-    """Return refined.csv: the ideal image coordinates of all points; empty for independent models."""
+def refined_csv(result: Result) -> Iterator[str]:
+    """Give refined.csv: the ideal image coordinates of all points."""
     found = refined_rows(result)
-    if not len(found["x_mm"]):
-        return ""
     listed = tables.refined_csv()
-    ids = [_cells(column.quantity, names)[:, number] for column in listed[:2] for names, number in [found[column.key]]]
-    return _written(listed, ids + [_cells(column.quantity, found[column.key]) for column in listed[2:]])
+    ids = [(_cells(column.quantity, names), numbers) for column in listed[:2] for names, numbers in [found[column.key]]]
+
+    def cells(part: slice) -> list[Cells]:
+        coordinates = [_cells(column.quantity, found[column.key][part]) for column in listed[2:]]
+        return [*(names[:, numbers[part]] for names, numbers in ids), *coordinates]
+
+    yield from _pieces(listed, len(found["x_mm"]), LINES, cells)
 
 
-def rejected_csv(document: Document) -> str:
-    """Return rejected.csv: measurements that were taken out, and why."""
+def rejected_csv(document: Document) -> Iterator[str]:
+    """Give rejected.csv: measurements that were taken out, and why."""
     return _table(tables.rejected_csv(), document["rejected"])
 
 
@@ -85,20 +88,26 @@ def _checked_rays(residuals: Sequence[Document]) -> Records:
     return Records({name: list(compress(column, tested)) for name, column in columns.items()})
 
 
-def _table(columns: Sequence[Column], rows: Iterable[Document]) -> str:
+def _table(columns: Sequence[Column], rows: Iterable[Document]) -> Iterator[str]:
     """Write a table; an empty cell is a number that does not exist."""
     if not isinstance(rows, Records):
         listed = list(rows)
         rows = Records({column.key: [row.get(column.key) for row in listed] for column in columns})
     nothing = [None] * len(rows)
-    return _written(columns, [_cells(column.quantity, rows.columns.get(column.key, nothing)) for column in columns])
+    found = [(column.quantity, rows.columns.get(column.key, nothing)) for column in columns]
+    return _pieces(columns, len(rows), LINES, lambda part: [_cells(quantity, cells[part]) for quantity, cells in found])
 
 
-def _written(columns: Iterable[Column], cells: Sequence[Cells]) -> str:
-    """Write the cells of columns below their names."""
-    count = cells[0].shape[1]
-    parts = [part for each in cells for part in (each, number_columns.repeated(",", count))]
-    return f"{_header(columns)}\n" + number_columns.joined([*parts[:-1], number_columns.repeated("\n", count)])
+def _pieces(
+    columns: Iterable[Column], count: int, at_once: int, cells: Callable[[slice], Sequence[Cells]]
+) -> Iterator[str]:
+    """Write cells of columns below their names, some rows at a time: all together take more memory than the result."""
+    yield f"{_header(columns)}\n"
+    for start in range(0, count, at_once):
+        found = cells(slice(start, start + at_once))
+        lines = found[0].shape[1]
+        parts = [part for each in found for part in (each, number_columns.repeated(",", lines))]
+        yield number_columns.joined([*parts[:-1], number_columns.repeated("\n", lines)])
 
 
 def _header(columns: Iterable[Column]) -> str:
@@ -133,14 +142,21 @@ def _cell(text: str | Sequence[str] | None) -> str:
     return '"' + text.replace('"', '""') + '"' if NEEDS_QUOTES.search(text) or not text else text
 
 
-def _grouped(columns: Sequence[Column], groups: Records | list[Document]) -> str:
+def _grouped(columns: Sequence[Column], groups: Records | list[Document]) -> Iterator[str]:
     """Write points that stand together under a photo or a pair: its ids, then a line for each point."""
     first = [column.key for column in columns].index("points")
-    found = {column.key: _column(groups, column.key) for column in columns}
-    counts = list(map(len, found["points"]))
-    heads = [_cells(column.quantity, found[column.key]) for column in columns[:first]]
-    of_points = [_cells(column.quantity, _flat(found[column.key])) for column in columns[first:]]
-    return _written(columns, [*(np.repeat(head, counts, axis=1) for head in heads), *of_points])
+    found = [_column(groups, column.key) for column in columns]
+    points = found[first]
+    counts = np.diff(points.ends).tolist() if isinstance(points, Grouped) else list(map(len, points))
+
+    def cells(part: slice) -> list[Cells]:
+        each = [column[part] for column in found]
+        heads = [_cells(column.quantity, ids) for column, ids in zip(columns[:first], each[:first], strict=True)]
+        lists = zip(columns[first:], each[first:], strict=True)
+        of_points = [_cells(column.quantity, _flat(values)) for column, values in lists]
+        return [*(np.repeat(head, counts[part], axis=1) for head in heads), *of_points]
+
+    return _pieces(columns, len(counts), max(LINES * len(counts) // max(sum(counts), 1), 1), cells)
 
 
 def _column(rows: Records | list[Document], key: str) -> Sequence[Any]:
