@@ -84,7 +84,12 @@ def plain(values: Floats) -> Plain:
 
 
 def significant(values: ArrayLike, digits: int = SIGNIFICANT) -> Plain:
-    """Round to significant digits; otherwise as ``rounded``. All together, but what lies in the middle between two."""
+    """Round to significant digits; otherwise as ``rounded``."""
+    return plain(to_digits(values, digits))
+
+
+def to_digits(values: ArrayLike, digits: int) -> Floats:
+    """Round numbers to significant digits: all together, but what lies in the middle between two."""
     array = np.asarray(values, float)
     flat, large = array.ravel(), np.abs(array.ravel())
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -97,7 +102,7 @@ def significant(values: ArrayLike, digits: int = SIGNIFICANT) -> Plain:
         found = np.copysign(np.where(shift < 0, whole * ten, whole / ten), flat)
     for place in np.flatnonzero(~known).tolist():
         found[place] = float(f"{flat[place]:.{digits}g}") + 0.0
-    return plain(found.reshape(array.shape))
+    return np.asarray(found.reshape(array.shape))
 
 
 def micrometres(millimetres: ArrayLike) -> Plain:
@@ -128,10 +133,11 @@ def _padded(names: Sequence[str]) -> list[Any]:
     if text.count("\n") != len(names) - 1 or "\0" in text:
         return []
     parts = WHOLE_NUMBERS.split(text)
-    numbers = [part.lstrip("0") for part in parts[1::2]]
-    width = max(map(len, numbers), default=0)
-    parts[1::2] = ["\0" + digits.rjust(width, "0") for digits in numbers]  # a number comes before any other sign
-    return list(zip("".join(parts).split("\n"), names, strict=True))
+    width = max((len(part.lstrip("0")) for part in parts[1::2]), default=0)
+    parts[1::2] = ["\0" + part.lstrip("0").rjust(width, "0") for part in parts[1::2]]  # a number before any other sign
+    text = "".join(parts)
+    del parts  # with tens of thousands of points its texts take as much memory as the keys
+    return list(zip(text.split("\n"), names, strict=True))
 
 
 def rms(values: Floats) -> float:

@@ -22,6 +22,7 @@ from photostrip.result.numbers import (
     rounded,
     significant,
     to_decimals,
+    to_digits,
 )
 from photostrip.result.records import Grouped, Records
 
@@ -92,12 +93,14 @@ def _cells(
     if isinstance(column, Mapping) and isinstance(entry, dict):
         return Records({key: _cells(entry[key], part, size) for key, part in column.items()})
     if not isinstance(column, list | tuple | np.ndarray):
-        return [column] * size
+        return column if isinstance(column, RoundedColumn | Grouped) else [column] * size
     if isinstance(entry, Quantity):
         unit = next(iter(beside.get(entry.unit_key, ())), "")
         decimals = _decimals(entry, unit)
         if decimals is not None and isinstance(column, np.ndarray):
             return RoundedColumn(to_decimals(column, decimals))
+        if entry.digits is not None and isinstance(column, np.ndarray):
+            return RoundedColumn(to_digits(column, entry.digits))
         cells: Sequence[Plain] = rounded_as(entry, column, unit)
         return cells
     return [None if each is None else _record(entry, each) for each in column]

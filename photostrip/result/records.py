@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, cast, overload
@@ -45,14 +46,29 @@ class Grouped(Sequence[list[Any]]):
     @overload
     def __getitem__(self, place: slice) -> Grouped: ...
     def __getitem__(self, place: int | slice) -> list[Plain] | Grouped:
-        start, stop, _ = (place if isinstance(place, slice) else slice(place, place + 1 or None)).indices(len(self))
-        ends = self.ends[start : stop + 1]
-        values = self.values[ends[0] : ends[-1]]
-        return Grouped(values, [end - ends[0] for end in ends]) if isinstance(place, slice) else list(values)
+        if isinstance(place, slice):
+            start, stop, _ = place.indices(len(self))
+            ends = self.ends[start : stop + 1]
+            return Grouped(self.values[ends[0] : ends[-1]], [end - ends[0] for end in ends])
+        first = place if place >= 0 else place + len(self)
+        return list(self.values[self.ends[first] : self.ends[first + 1]])
 
     def __iter__(self) -> Iterator[list[Plain]]:
         values = list(self.values)
         return (values[start:stop] for start, stop in pairwise(self.ends))
+
+    @classmethod
+    def of(cls, lists: Iterable[Iterable[Plain]]) -> Grouped:
+        values: list[Plain] = []
+        ends = array("q", [0])
+        for each in lists:
+            values.extend(each)
+            ends.append(len(values))
+        return cls(values, ends)
+
+    def taken(self, order: Numbers) -> Grouped:
+        values, ends = list(self.values), self.ends
+        return Grouped.of(values[ends[place] : ends[place + 1]] for place in order.tolist())
 
 
 class Records(Sequence[dict[str, Any]]):

@@ -11,7 +11,7 @@ from photostrip.formats.output import json_encoder
 from photostrip.formats.output.json_encoder import Encoder
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
 from photostrip.notes import Document
-from photostrip.result.records import Records
+from photostrip.result.records import Grouped, Records
 from photostrip.visible import visible_json
 
 if TYPE_CHECKING:
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 LARGEST_RESULT = 1000 * MEGABYTE
 SCHEMA = 1
 LINES = 2000  # that are written at a time
-FEW_LINES = 300  # lines below which their columns are not worth the trouble
+LISTED = 20_000  # values of a column of lists that are written at a time
+FEW_LINES = 300  # lines of a block below which their columns are not worth the trouble
 LONGEST_LINE = 160  # characters up to which a dictionary stands on one line
 
 
@@ -48,9 +49,12 @@ def _pieces(document: Document, encode: Encoder) -> Iterator[str]:
 
 def _block(value: Plain, encode: Encoder) -> Iterator[str]:
     if value and (isinstance(value, Records) or (isinstance(value, list) and isinstance(value[0], dict))):
-        for start in range(0, len(value), LINES):
+        columns = value.columns.values() if isinstance(value, Records) else ()
+        listed = max((len(column.values) for column in columns if isinstance(column, Grouped)), default=0)
+        at_once = max(min(LINES, LISTED * len(value) // max(listed, 1)), 1)
+        for start in range(0, len(value), at_once):
             yield ",\n" if start else "[\n"
-            yield _lines(value[start : start + LINES], encode)
+            yield _lines(value[start : start + at_once], encode, by_columns=len(value) >= FEW_LINES)
         yield "\n]"
         return
     if isinstance(value, dict):
@@ -61,9 +65,9 @@ def _block(value: Plain, encode: Encoder) -> Iterator[str]:
     yield _text(value, encode)
 
 
-def _lines(records: Records | list[Document], encode: Encoder) -> str:
+def _lines(records: Records | list[Document], encode: Encoder, *, by_columns: bool) -> str:
     """Write each record on a line of its own."""
-    if len(records) >= FEW_LINES:
+    if by_columns:
         from photostrip.formats.output import json_lines  # with numpy, which nobody needs who reads a result
 
         columns = records.columns if isinstance(records, Records) else json_lines.columns_of(records)

@@ -203,7 +203,8 @@ def rejected_by_strip(strip: StripResult) -> list[Rejection]:
     oriented = strip.of_photos.orientation
     logged = np.zeros(len(oriented.point), bool)
     logged[[each.row for each in strip.of_photos.rejections if not each.readmitted]] = True
-    left = set(oriented.rows[~logged].ravel().tolist())
+    wanted = {each.row for each in strip.of_photos.wrong_rays}
+    left = wanted and wanted.intersection(oriented.rows[~logged].ravel().tolist())
     return [each for each in strip.of_photos.wrong_rays if each.row in left]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import compress
 from math import erfc, sqrt
 
 import numpy as np
@@ -19,7 +20,7 @@ from photostrip.result.numbers import natural_rank
 from photostrip.result.points.own_precision import chances, normalised
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.quantities import records
-from photostrip.result.records import Records
+from photostrip.result.records import Grouped, Records
 
 PARTS = "plan", "height"
 CONTROL = "control"  # kind of observations of a bundle adjustment
@@ -201,9 +202,9 @@ def control_of(result: Result, found: Differences) -> Records:
         "sigma": _in_list_order(result, control.sigma),
         "sigma_fit": _in_list_order(result, found.sigma),
         "normalised": found.normalised,
-        "stands_out": [[part for part, yes in zip(PARTS, row, strict=True) if yes] for row in found.stands_out],
+        "stands_out": Grouped.of(compress(PARTS, row) for row in found.stands_out.tolist()),
         "list": control.frame + 1,
-        "strips": [list(strips) for strips in found.strips],
+        "strips": Grouped.of(found.strips),
     }
     return records("control", columns).taken(np.argsort(natural_rank(control.ids)))
 

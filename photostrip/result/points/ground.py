@@ -10,7 +10,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result
-from photostrip.result.numbers import natural_rank, rounded
+from photostrip.result.numbers import RoundedColumn, natural_rank, to_decimals
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns
 from photostrip.result.quantities import coordinate_decimals, records
@@ -20,7 +20,8 @@ from photostrip.result.records import Records
 def coordinates(frame: GroundFrame, enu: Floats) -> Document:
     """Return the columns x, y, z of coordinates in the internal order, with the decimals of their frame."""
     decimals = coordinate_decimals(frame.kind, frame.axes)
-    return {axis: rounded(enu[:, k], count) for axis, k, count in zip("xyz", frame.order, decimals, strict=True)}
+    columns = zip("xyz", frame.order, decimals, strict=True)
+    return {axis: RoundedColumn(to_decimals(enu[:, k], count)) for axis, k, count in columns}
 
 
 def frame_of(result: Result) -> Document:
