@@ -62,11 +62,11 @@ class StripAtControl:
         total = len(self.coordinates.point)
         part = before * -(-total // LARGEST_SECTION) // max(total, 1)
         parts = [np.sort(order[part == number]) for number in distinct(part)]
-        return [(rows, self._section(rows)) for rows in parts] if len(parts) > 1 else [(np.sort(order), self)]
+        return [(rows, self._section(rows)) for rows in parts]  # none of them holds the whole, which holds them
 
     def _section(self, rows: Numbers) -> StripAtControl:
         """Return the strip at some of its control points, numbered anew; covariances stay those of the whole strip."""
-        place, targets = np.full(len(self.control), -1), self.targets
+        place, targets, covariance = np.full(len(self.control), -1), self.targets, self.covariance
         place[rows] = np.arange(len(rows))
         inside = np.flatnonzero(place[self.coordinates.point] >= 0)
         return replace(
@@ -77,7 +77,7 @@ class StripAtControl:
             rays=[ray._replace(point=int(place[ray.point])) for ray in self.rays if place[ray.point] >= 0],
             coordinates=replace(self.coordinates.take(inside), point=place[self.coordinates.point[inside]]),
             design=self.design[inside],
-            covariance=lambda some: self.covariance(inside[some]),
+            covariance=lambda some: covariance(inside[some]),
             share=len(inside) / len(self.design),
         )
 

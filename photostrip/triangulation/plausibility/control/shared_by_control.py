@@ -49,8 +49,8 @@ class ShiftedList(NamedTuple):
 
 def find_shared(strip: StripAtControl) -> StretchedHeights | ShiftedList | None:
     """Find what all control of a strip, or of a list, shares; None where nothing says so, or single points say more."""
-    if len(strip.sections) > 1:  # the one with most relief says most
-        _, strip = max(strip.sections, key=lambda each: float(np.std(each[1].placed[:, HEIGHT])))
+    # the section with most relief says most
+    _, strip = max(strip.sections, key=lambda each: float(np.std(each[1].placed[:, HEIGHT])))
     count = len(strip.coordinates.point)
     if count <= strip.design.shape[1] + 1:
         return None
