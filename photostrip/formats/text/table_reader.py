@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import count, islice
 
 import numpy as np
 
@@ -17,13 +17,12 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import BYTE_ORDER_MARK
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber, number, shown
+from photostrip.formats.text.numbers import SMALLEST_LENGTH, NotANumber, number, shown
+from photostrip.formats.text.rows import Cells, PlainRows, SplitRows
 from photostrip.formats.text.table_text import TableText, content
 from photostrip.formats.text.tables import CONTROL_CHARACTER, Column, Table
 from photostrip.frozen import replace
 from photostrip.notes import Note, counted, listed
-
-Cells = tuple[str, ...]
 
 CHUNK = 16_384  # rows turned into columns at a time, so that a big table never stands in memory cell by cell
 STANDARD_DEVIATIONS = {"s", "sd", "std", "sigma", "stdev", "accuracy", "precision"}  # one column for all coordinates
@@ -69,12 +68,10 @@ def _renamed(layout: Sequence[Column], columns: Mapping[str, str]) -> tuple[Colu
     )
 
 
-class _Codes(dict[str, int]):
-    """Numbers for ids, given out in order of first appearance."""
-
-    def __missing__(self, key: str) -> int:
-        self[key] = code = len(self)
-        return code
+def _add_new(names: Iterable[str], index: dict[str, int]) -> None:
+    """Give numbers to the names that have none yet, in order of first appearance."""
+    new = [name for name in dict.fromkeys(names) if name not in index]
+    index.update(zip(new, count(len(index)), strict=False))
 
 
 class _Reader:
@@ -89,13 +86,13 @@ class _Reader:
         self.lines: list[Numbers] = []
         self.numbers: dict[str, list[Floats]] = {}
         self.codes: dict[str, list[Numbers]] = {}
-        self.index: dict[str, _Codes] = {}
+        self.index: dict[str, dict[str, int]] = {}
 
     def read(self) -> Table | None:
         if not self._header():
             return None
-        for rows, lines in self._chunks():
-            self._take(rows, lines)
+        for columns, lines in self._chunks():
+            self._take(columns, lines)
         places = np.concatenate([np.zeros(0, np.intp), *self.lines])
         if not len(places) and not self.findings.number(self.source.file):
             self.findings.add(Fault("has a header but no rows", code="no-rows", file=self.source.file, line=1))
@@ -181,7 +178,7 @@ class _Reader:
             if column.number:
                 self.numbers[column.name] = []
             else:
-                self.codes[column.name], self.index[column.name] = [], _Codes()
+                self.codes[column.name], self.index[column.name] = [], {}
 
     def _missing(self, unused: dict[int, str], line: int) -> None:
         for column in self.layout:
@@ -215,16 +212,30 @@ class _Reader:
             message = f"{counted(len(others), 'column')} not used: {listed(others)}; used: {used}"
             self.findings.notes.append(Note("unused-column", message, "note", file=self.source.file, line=line))
 
-    def _chunks(self) -> Iterator[tuple[list[list[str]], list[int]]]:
-        """Give rows with their line numbers, some thousands at a time."""
-        last = self.rows.line_num
+    def _chunks(self) -> Iterator[tuple[PlainRows | SplitRows, Numbers]]:
+        """Give rows with the numbers of their lines, some thousands at a time."""
+        line = self.rows.line_num
+        start = self.source.start_of(line + 1)
+        while plain := self.source.plain(start, self.width):
+            rows, start = plain
+            yield rows, np.arange(line + 1, line + 1 + len(rows))
+            line += len(rows)
+        for read, numbers in self._rows(start, line):
+            even, lines = self._even(read, numbers) if set(map(len, read)) - {self.width} else (read, numbers)
+            if even:
+                yield SplitRows(list(zip(*even, strict=True))), np.array(lines, np.intp)
+
+    def _rows(self, start: int, before: int) -> Iterator[tuple[list[list[str]], list[int]]]:
+        """Give rows from a byte of the text on with their line numbers; `before` is that of the line before them."""
+        reader = csv.reader(self.source.stream(start), strict=True, skipinitialspace=True)
+        last = before
         while True:
             rows, lines = [], []
             try:
-                for row in islice(self.rows, CHUNK):
+                for row in islice(reader, CHUNK):
                     rows.append(row)
                     lines.append(last + 1)
-                    last = self.rows.line_num
+                    last = before + reader.line_num
             except csv.Error as error:
                 yield rows, lines
                 self._unreadable(error, last + 1)
@@ -243,32 +254,28 @@ class _Reader:
             message = f"cannot be read as CSV ({error})"
         self._add(line, "", message, "csv", fix=fix)
 
-    def _take(self, rows: list[list[str]], lines: list[int]) -> None:
+    def _take(self, rows: PlainRows | SplitRows, lines: Numbers) -> None:
         """Turn a chunk of rows into columns."""
-        if set(map(len, rows)) - {self.width}:
-            rows, lines = self._even(rows, lines)
-        if not rows:
-            return
-        numbered = [column for column in self.columns if column.number]
-        of_all = list(zip(*rows, strict=True))
-        fields = {column: of_all[self.source.where[column.name]] for column in self.columns}
-        values = {column: _fast_floats(fields[column]) for column in numbered}
+        values = {each: rows.numbers(self.source.where[each.name]) for each in self.columns if each.number}
         if any(each is None for each in values.values()):
-            kept = [row for row, cells in enumerate(rows) if any(map(str.strip, cells))]
-            if len(kept) < len(rows):  # rows of empty cells, as spreadsheets leave them behind
-                self._take([rows[row] for row in kept], [lines[row] for row in kept])
+            fields = [rows.texts(place) for place in range(self.width)]
+            kept = [row for row, cells in enumerate(zip(*fields, strict=True)) if any(map(str.strip, cells))]
+            if len(kept) < len(lines):  # rows of empty cells, as spreadsheets leave them behind
+                if kept:
+                    self._take(SplitRows([[cells[row] for row in kept] for cells in fields]), lines[kept])
                 return
         for column in self.columns:
-            name, cells = column.name, fields[column]
+            name, place = column.name, self.source.where[column.name]
             if column.number:
                 fast = values[column]
-                self.numbers[name].append(self._floats(column, cells, lines) if fast is None else fast)
+                self.numbers[name].append(self._floats(column, rows.texts(place), lines) if fast is None else fast)
                 if column.positive:
                     self._positive(column, lines)
             else:
-                codes = map(self.index[name].__getitem__, cells)
-                self.codes[name].append(np.fromiter(codes, np.intp, len(cells)))
-        self.lines.append(np.array(lines, np.intp))
+                cells, index = rows.texts(place), self.index[name]
+                _add_new(cells, index)
+                self.codes[name].append(np.fromiter(map(index.__getitem__, cells), np.intp, len(cells)))
+        self.lines.append(lines)
 
     def _even(self, rows: list[list[str]], lines: list[int]) -> tuple[list[list[str]], list[int]]:
         """Drop blank rows and refuse rows with too few or too many fields."""
@@ -293,7 +300,7 @@ class _Reader:
             fix = "write decimal points, not commas; put an id that has a comma between quotation marks"
         self._add(line, "", message, "row-length", fix=fix)
 
-    def _floats(self, column: Column, cells: Cells, lines: list[int]) -> Floats:
+    def _floats(self, column: Column, cells: Cells, lines: Numbers) -> Floats:
         """Convert cell by cell and refuse those that are no numbers."""
         values = np.full(len(cells), np.nan)
         for row, cell in enumerate(cells):
@@ -302,14 +309,14 @@ class _Reader:
             try:
                 values[row] = number(cell)
             except NotANumber as why:
-                self._add(lines[row], column.name, why.message, "number", expected="a number", fix=why.fix)
+                self._add(int(lines[row]), column.name, why.message, "number", expected="a number", fix=why.fix)
         return values
 
-    def _positive(self, column: Column, lines: list[int]) -> None:
+    def _positive(self, column: Column, lines: Numbers) -> None:
         values = self.numbers[column.name][-1]
         for row in np.flatnonzero(values < SMALLEST_LENGTH):
             message = f"{values[row]:g} cannot be a standard deviation"
-            self._add(lines[row], column.name, message, "range", expected="a number larger than 0")
+            self._add(int(lines[row]), column.name, message, "range", expected="a number larger than 0")
 
     def _clean(self, column: Column, codes: Numbers, lines: Numbers) -> tuple[Numbers, tuple[str, ...]]:
         """Take blanks off ids and refuse ids that cannot be."""
@@ -319,9 +326,12 @@ class _Reader:
             stripped = self._words(column, stripped, codes, lines)
         elif stripped != written:
             self._note_blanks(column, written, codes, lines)
-        index = _Codes()
-        renumbered = np.fromiter(map(index.__getitem__, stripped), np.intp, len(stripped))
-        names, codes = tuple(index), renumbered[codes]
+        if stripped != written:
+            index: dict[str, int] = {}
+            _add_new(stripped, index)
+            codes = np.fromiter(map(index.__getitem__, stripped), np.intp, len(stripped))[codes]
+            stripped = list(index)
+        names = tuple(stripped)
         if not column.words and ("" in names or CONTROL_CHARACTER.search("".join(names))):  # first all of them together
             wrong = np.array([not name or bool(CONTROL_CHARACTER.search(name)) for name in names], bool)
             for row in np.flatnonzero(wrong[codes]):
@@ -351,15 +361,3 @@ class _Reader:
         name = self.source.header.get(column.name, column.name)
         note = Note("stray-blanks", message, "note", file=self.source.file, line=int(lines[rows[0]]), key=name)
         self.findings.notes.append(note)
-
-
-def _fast_floats(cells: Cells) -> Floats | None:
-    """Convert a clean column at once; None when a cell needs a closer look."""
-    joined = "".join(cells)
-    if not joined.isascii() or "_" in joined:  # float() takes digits of every script, and 1_000
-        return None
-    try:
-        values = np.fromiter(map(float, cells), float, len(cells))
-    except ValueError:
-        return None
-    return values if (np.abs(values) <= LARGEST_NUMBER).all() else None

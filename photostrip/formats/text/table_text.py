@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import gzip
+import re
 import zlib
 from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO, TextIOWrapper
+from itertools import islice
 
 from photostrip.errors import Fault
 from photostrip.formats.text.files import BOM, GZIP, MEGABYTE, decode, read_bytes, refuse
+from photostrip.formats.text.rows import PlainRows, plain_rows
 
 LARGEST_TABLE = 200 * MEGABYTE  # unpacked; a million points are 50 MB
 BLOCK_BYTES = 4 * MEGABYTE
+BLOCK = MEGABYTE // 2  # bytes of rows that are taken at a time
+LINE_END = re.compile(rb"\r\n|\r|\n")
 
 
 @dataclass(eq=False)
@@ -24,9 +29,20 @@ class TableText:
     where: dict[str, int] = field(default_factory=dict)  # number of the field in a row, by column
     header: dict[str, str] = field(default_factory=dict)
 
-    def stream(self) -> TextIOWrapper:
-        """Return the lines of the table; ends of lines of all systems count."""
-        return TextIOWrapper(BytesIO(self.data), encoding="utf-8", newline="")
+    def stream(self, start: int = 0) -> TextIOWrapper:
+        """Return the lines of the table from a byte on; ends of lines of all systems count."""
+        return TextIOWrapper(BytesIO(self.data[start:] if start else self.data), encoding="utf-8", newline="")
+
+    def start_of(self, line: int) -> int:
+        """Return the byte at which a line begins, counted from 1."""
+        before = [end.end() for end in islice(LINE_END.finditer(self.data), line - 1)]
+        return 0 if line == 1 else before[-1] if len(before) == line - 1 else len(self.data)
+
+    def plain(self, start: int, width: int) -> tuple[PlainRows, int] | None:
+        """Find rows from a byte on, and where the next one begins; None where ``csv`` has to split them."""
+        stop = self.data.find(b"\n", start + BLOCK) + 1 or len(self.data)
+        rows = plain_rows(self.data[start:stop], width)
+        return None if rows is None else (rows, stop)
 
     @cached_property
     def _lines(self) -> list[str]:

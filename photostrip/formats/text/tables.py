@@ -64,7 +64,7 @@ class Table:
     def cells(self, name: str) -> list[str]:
         """Return a column of ids, or of words, row by row."""
         ids = self.ids[name]
-        return [ids[code] for code in self.codes[name]]
+        return [ids[code] for code in self.codes[name].tolist()]
 
     def without_numbers(self) -> Table:
         """Return the table without its numbers, where they are kept elsewhere."""

@@ -43,6 +43,7 @@ def write(path: Path, text: str | bytes) -> Path:
 @pytest.mark.parametrize("chunk", [1, 2, 3, 1000])
 def test_chunks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
     monkeypatch.setattr(table_reader, "CHUNK", chunk)
+    monkeypatch.setattr(table_text, "BLOCK", 10 * chunk)
     rows = [(f"p{i % 3}", f"Q{i}", i / 7, -i / 3) for i in range(10)]
     text = HEADER + "\n".join(",".join(map(str, row)) + "\n" * (i % 2) for i, row in enumerate(rows))
     findings = Findings()
