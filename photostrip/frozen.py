@@ -13,7 +13,7 @@ from functools import cache
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Never, Self, TypeVar
 
-__all__ = ["NamedTuple", "dataclass", "replace"]
+__all__ = ["NamedTuple", "as_dict", "dataclass", "names_of", "replace"]
 
 T = TypeVar("T")
 FIELDS = "__dataclass_fields__"  # where the standard library keeps them
@@ -74,6 +74,18 @@ def _values_left_out(cls: type) -> tuple[dict[str, None], dict[str, Any], dict[s
         elif callable(factory := getattr(declared, "default_factory", None)):
             factories[name] = factory
     return names, defaults, factories
+
+
+def names_of(kind: type) -> tuple[str, ...]:
+    """Return the names of the fields of a dataclass; none of another class."""
+    known = any(FIELDS in vars(each) for each in kind.__mro__)
+    return tuple(_values_left_out(kind)[0]) if known else ()
+
+
+def as_dict(value: object) -> dict[str, Any]:
+    """Return the fields of a dataclass by name, and those of dataclasses in it."""
+    found = {name: getattr(value, name) for name in names_of(type(value))}
+    return {name: as_dict(each) if names_of(type(each)) else each for name, each in found.items()}
 
 
 def _builder(cls: type) -> Callable[..., None]:

@@ -95,3 +95,18 @@ def test_values_travel_between_processes() -> None:
 def test_what_may_change_is_not_made_here() -> None:
     with pytest.raises(TypeError, match="standard library"):
         frozen.dataclass(frozen=False)
+
+
+def test_fields_are_named_and_given_without_the_standard_library() -> None:
+    @frozen.dataclass(frozen=True)
+    class Outer:
+        inner: Plain
+        others: list[str] = dataclasses.field(default_factory=list)
+
+    value = Outer(Plain("a"))
+    assert frozen.names_of(Outer) == ("inner", "others")
+    assert frozen.names_of(str) == frozen.names_of(dict) == ()
+    assert frozen.as_dict(value) == {"inner": {"name": "a", "size": 1.0}, "others": []} == dataclasses.asdict(value)
+    for each in DECORATORS:
+        _, derived, _ = classes(each)
+        assert frozen.names_of(derived) == ("name", "many", "hidden", "last")

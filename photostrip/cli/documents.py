@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import typer
-
+from photostrip.cli.declared import typer
 from photostrip.cli.stdout import Document, print_json, print_sections
 from photostrip.frozen import dataclass
 from photostrip.visible import visible

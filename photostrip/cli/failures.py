@@ -11,8 +11,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import typer
-
+from photostrip.cli.declared import typer
 from photostrip.cli.stdout import Format, ascii_only
 from photostrip.errors import EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
 from photostrip.visible import visible, visible_json

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib import import_module
+from types import FunctionType
 from typing import TYPE_CHECKING, TextIO, cast
 
 from photostrip import __version__
@@ -104,27 +105,43 @@ def _refuse(first: str) -> int:
 
 
 def _call(name: str, arguments: list[str]) -> int:
-    """Import one command, let typer read its arguments, and run it.
+    """Import one command, read its arguments, and run it.
 
     The function returns its exit code, or None for 0.
     """
+    from photostrip.cli.plain_line import plain_arguments
+
+    target = getattr(import_module(COMMANDS[name].module), name)
+    given = plain_arguments(target, arguments) if isinstance(target, FunctionType) else None
+    try:
+        code = _by_typer(name, target, arguments) if given is None else target(**given)
+    except Exception as error:
+        if "typer" not in sys.modules:
+            raise
+        return _told_by_typer(error, name)
+    return code if isinstance(code, int) else 0
+
+
+def _by_typer(name: str, target: Callable[..., object], arguments: list[str]) -> object:
+    # not command.main(), which has exit codes of its own for interrupts and closed pipes
+    command = _parser(name, target)
+    with command.make_context(f"photostrip {name}", arguments) as context:
+        return command.invoke(context)
+
+
+def _told_by_typer(error: Exception, name: str) -> int:
+    """Return the exit code of what typer raises, or is raised for it; say what is wrong with the usage."""
     import typer
 
-    command = _parser(name, getattr(import_module(COMMANDS[name].module), name))
+    if isinstance(error, typer.Exit):
+        return error.exit_code
     # the class of every usage error; typer does not export it, but derives BadParameter from it
-    usage_error = cast("type[Exception]", typer.BadParameter.__base__)
-    try:
-        # not command.main(), which has exit codes of its own for interrupts and closed pipes
-        with command.make_context(f"photostrip {name}", arguments) as context:
-            code = command.invoke(context)
-    except typer.Exit as stop:
-        return stop.exit_code
-    except usage_error as error:
-        text: str = getattr(error, "format_message", error.__str__)().replace(": Value error, ", ": ")
-        end = "" if text.endswith((".", "?", "!")) else "."
-        _complain(f"{text}{end} 'photostrip {name} --help' shows how it is called.")
-        return EXIT_USAGE
-    return code if isinstance(code, int) else 0
+    if not isinstance(error, cast("type[Exception]", typer.BadParameter.__base__)):
+        raise error
+    text: str = getattr(error, "format_message", error.__str__)().replace(": Value error, ", ": ")
+    end = "" if text.endswith((".", "?", "!")) else "."
+    _complain(f"{text}{end} 'photostrip {name} --help' shows how it is called.")
+    return EXIT_USAGE
 
 
 @cache  # for a program that calls many commands: typer takes 7 ms for one
@@ -132,12 +149,13 @@ def _parser(name: str, target: Callable[..., object]) -> Command:
     """Let typer make what reads the arguments of a command."""
     import typer
 
+    from photostrip.cli.declared import for_typer
     from photostrip.cli.typed_values import read_plainly
 
     app = target
     if not isinstance(app, typer.Typer):
         app = typer.Typer(add_completion=False, rich_markup_mode=None)
-        app.command(name, context_settings=HELP_NAMES)(target)
+        app.command(name, context_settings=HELP_NAMES)(for_typer(target))
     command = typer.main.get_command(app)
     read_plainly(command)
     command.epilog = f"\b\nExample:\n  {COMMANDS[name].example}"  # \b: typer keeps the line breaks

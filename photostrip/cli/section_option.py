@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-import typer
-
+from photostrip.cli.declared import typer
 from photostrip.cli.stdout import Format
 from photostrip.report.sections.accuracy_report import SectionName
 

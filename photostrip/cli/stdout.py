@@ -8,8 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
+from photostrip.cli.declared import typer
 from photostrip.frozen import NamedTuple
 
 if TYPE_CHECKING:

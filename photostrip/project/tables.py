@@ -18,7 +18,6 @@ from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.frozen import dataclass, replace
-from photostrip.geodesy.zones import FEWEST_COMMON, join_zones
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, counted, listed
 from photostrip.project.conversion import ground_columns
@@ -230,6 +229,8 @@ def in_one_zone(
     for number, (read, given) in enumerate(zip(tables, lists, strict=True)):
         if not given.other_zone:
             continue
+        from photostrip.geodesy.zones import FEWEST_COMMON, join_zones  # few projects have two zones
+
         place = ("control", number, "other_zone")
         if number == 0:
             message = "the other lists are brought into the zone of the first one"

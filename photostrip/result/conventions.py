@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields, is_dataclass
-
 import numpy as np
 
+from photostrip.frozen import as_dict, names_of
 from photostrip.geodesy.ground_frame import plural
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result
@@ -59,14 +58,14 @@ def settings_of(result: Result) -> Document:
     """Return the block ``settings``: what was asked for, with the keys and units of the project file."""
     settings = result.settings
     found: Document = {"adjustment": settings.adjustment}
-    for field in fields(settings):
-        value = getattr(settings, field.name)
-        if field.name in {"bundle", "covariance"} and settings.adjustment not in ASKED_BY[field.name]:
+    for name in names_of(type(settings)):
+        value = getattr(settings, name)
+        if name in {"bundle", "covariance"} and settings.adjustment not in ASKED_BY[name]:
             continue
-        if field.name in (OF_PHOTOS if result.model_strips else OF_MODELS):
+        if name in (OF_PHOTOS if result.model_strips else OF_MODELS):
             continue
-        if is_dataclass(value) and not isinstance(value, type):
-            found[field.name] = asdict(value)
+        if names_of(type(value)):
+            found[name] = as_dict(value)
     return found
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from photostrip.cli.declared import typer
 from photostrip.cli.options import Assignments, Quiet, Rule, Strict, Verbose, Width, require_target
 from photostrip.cli.stdout import BatchFormat
 

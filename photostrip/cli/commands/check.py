@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from photostrip.cli.declared import typer
 from photostrip.cli.options import Assignments, Quiet, Shape, Verbose, Width
 from photostrip.cli.stdout import Format
 

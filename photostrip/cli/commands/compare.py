@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
+from photostrip.cli.declared import typer
 from photostrip.cli.options import Quiet, Verbose, Width
 from photostrip.cli.stdout import CompareFormat, Format, print_json, print_sections
 

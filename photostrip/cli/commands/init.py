@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from photostrip.cli.declared import typer
 from photostrip.cli.options import Silent
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Note
@@ -70,6 +69,8 @@ class Findings:
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Ask whether a similar known name was meant, ``did you mean `...`?``; empty when nothing is similar."""
+    from difflib import get_close_matches  # takes a millisecond to load, and is needed where a name is not known
+
     names = list(known)
     folded = {each.casefold(): each for each in reversed(names)}
     close = get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.65)

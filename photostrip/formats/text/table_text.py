@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
 import re
-import zlib
 from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO, TextIOWrapper
@@ -16,7 +14,7 @@ from photostrip.formats.text.rows import PlainRows, plain_rows
 
 LARGEST_TABLE = 200 * MEGABYTE  # unpacked; a million points are 50 MB
 BLOCK_BYTES = 4 * MEGABYTE
-BLOCK = MEGABYTE // 2  # bytes of rows that are taken at a time
+BLOCK = MEGABYTE // 5  # bytes of rows that are taken at a time; what comes of them stays in the cache
 LINE_END = re.compile(rb"\r\n|\r|\n")
 
 
@@ -93,6 +91,9 @@ def content(file: str) -> tuple[bytes, bool]:
 
 
 def _unpack(file: str, data: bytes) -> bytes:
+    import gzip  # few tables are packed
+    import zlib
+
     try:
         with gzip.GzipFile(fileobj=BytesIO(data)) as stream:
             unpacked = b""

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
+from photostrip.cli.declared import typer
 from photostrip.cli.options import Quiet, Saved, Target, Width
 from photostrip.cli.stdout import Document, Format, StatementFormat, form_of, print_json, print_sections
 
