@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from photostrip.arrays import distinct
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result, StripResult
@@ -81,9 +80,8 @@ def _entries(**columns: object) -> list[Document]:
 def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]:
     ids, photos, oriented = observations.point_ids, strip.strip.photos, strip.of_photos.orientation
     wrong_rays = {each.row for each in strip.of_photos.wrong_rays if each.cause == WRONG_RAY}
-    names = {point: natural(ids[point]) for point in distinct(oriented.point).tolist()}
     pair, point, rays = oriented.pairs.pair.tolist(), oriented.point.tolist(), oriented.rows.tolist()
-    every = sorted(strip.of_photos.rejections, key=lambda each: (pair[each.row], names[point[each.row]]))
+    every = sorted(strip.of_photos.rejections, key=lambda each: (pair[each.row], natural(ids[point[each.row]])))
     found: list[Document] = [{}] * len(every)
     for unit, factor in (("um", MICROMETRES), ("", 1.0)):
         places = [n for n, each in enumerate(every) if (each.test == "parallax") == (unit == "um")]
