@@ -162,10 +162,27 @@ class _Deleted(NamedTuple):
 
 
 def _without(total: Floats, pulled: Floats, normal: Floats, sets: Numbers) -> _Deleted:
-    """Take sets (s, k) of as many rays each out."""
-    rows = (2 * sets[:, :, None] + np.arange(2)).reshape(len(sets), -1)
-    pull, part = pulled[..., rows], normal[..., rows[:, :, None], rows[:, None, :]]
-    solved = np.linalg.solve(part + REGULARISATION * np.eye(rows.shape[1]), pull[..., None])
-    error = np.asarray(solved[..., 0], float)
-    left = total[..., None] - np.einsum("...i,...i->...", pull, error)
-    return _Deleted(left, error.reshape(*error.shape[:-1], -1, 2))
+    """Take sets (s, k) of as many rays each out.
+
+    Their normal equations, of up to 6 errors, are eliminated element by element, together for all points and sets: 64
+    points of 17 rays have 43 520 of them.
+    """
+    (m, n), rows = pulled.shape, (2 * sets[:, :, None] + np.arange(2)).reshape(len(sets), -1).T
+    of_rows, of_pairs = np.ascontiguousarray(pulled.T), np.ascontiguousarray(normal.reshape(m, -1).T)
+    pull, size = of_rows[rows], len(rows)
+    left = [[of_pairs[rows[i] * n + rows[j]] for j in range(i + 1)] for i in range(size)]
+    reduced, factor = list(pull), [[np.zeros(0)] * i for i in range(size)]
+    for j in range(size):
+        left[j][j] += REGULARISATION
+        for i in range(j + 1, size):
+            factor[i][j] = left[i][j] / left[j][j]
+            for k in range(j + 1, i + 1):
+                left[i][k] = left[i][k] - factor[i][j] * left[k][j]
+            reduced[i] = reduced[i] - factor[i][j] * reduced[j]
+    error = np.empty_like(pull)
+    for j in reversed(range(size)):
+        error[j] = reduced[j] / left[j][j]
+        for i in range(j + 1, size):
+            error[j] -= factor[i][j] * error[i]
+    sums = total[:, None] - np.einsum("ism,ism->ms", pull, error)
+    return _Deleted(sums, np.ascontiguousarray(error.transpose(2, 1, 0)).reshape(m, len(sets), -1, 2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -28,7 +29,7 @@ from photostrip.triangulation.resection.collinearity import KnownPhotos, derivat
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats
+    from photostrip.arrays import Flags, Floats, Numbers
 
 SIGMA = 0.005  # mm
 ALPHA = 0.01
@@ -86,6 +87,26 @@ def together(*points: PointRays) -> PointRays:
     )
 
 
+def without(gap: Floats, weight: Floats, basis: Floats, sets: Numbers) -> tuple[Floats, Floats]:
+    """Take sets of rays of one point out: sums of squares (s,) and errors (s, k, 2)."""
+    normal = basis @ weight @ basis.T
+    found = point_decisions._without(np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets)
+    return found.left[0], found.errors[0]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_sets_of_many_points_are_taken_out_as_one_by_one(count: int) -> None:
+    random = np.random.default_rng(count)
+    root, pulled, total = random.normal(size=(5, 12, 15)), random.normal(size=(5, 12)), random.normal(size=5)
+    normal, sets = root @ root.swapaxes(1, 2), point_decisions.ray_sets(6, count).rays
+    left, errors = point_decisions._without(total, pulled, normal, sets)
+    for point, (row, rays) in nonempty(itertools.product(range(5), enumerate(sets))):
+        at = (2 * rays[:, None] + np.arange(2)).ravel()
+        error = np.linalg.solve(normal[point][np.ix_(at, at)], pulled[point, at])
+        assert errors[point, row].ravel() == pytest.approx(error, rel=1e-6)
+        assert left[point, row] == pytest.approx(total[point] - pulled[point, at] @ error, rel=1e-6)
+
+
 def spoiled(point: PointRays, errors: dict[tuple[int, int], float], noise: float = 0.2) -> PointRays:
     """Add errors by ray and axis, in standard deviations, to quiet measurements."""
     misfit = noise * point.misfit
@@ -127,9 +148,7 @@ def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() ->
     point = a_point(3, 5)
     gap, weight, basis = point_decisions._misclosures(point)
     sets = [(0,), (3,), (4,)]
-    left, errors = point_decisions._without(
-        np.array(gap @ weight @ gap), basis @ weight @ gap, basis @ weight @ basis.T, np.array(sets)
-    )
+    left, errors = without(gap, weight, basis, np.array(sets))
     for value, (ray,), ((error,),) in nonempty(zip(left, sets, [each[None] for each in errors], strict=True)):
         rows = np.arange(10) // 2 != ray
         design, misfit = point.by_point[rows], point.misfit[rows]
@@ -224,8 +243,7 @@ def test_a_ray_is_blamed_when_it_is_so_much_likelier_than_any_other(times: float
 
     def next_best(size: float) -> float:
         gap, weight, basis = point_decisions._misclosures(spoiled(point, {(0, 1): size}, 0.0))
-        total, normal = np.array(gap @ weight @ gap), basis @ weight @ basis.T
-        left = point_decisions._without(total, basis @ weight @ gap, normal, np.arange(3)[:, None]).left
+        left, _ = without(gap, weight, basis, np.arange(3)[:, None])
         return float(np.partition(left, 1)[1] - left.min())
 
     size = np.sqrt(times * LIKELIER / next_best(1.0))
@@ -290,9 +308,7 @@ def test_the_likeliest_set_with_a_ray_says_its_error() -> None:
     point = spoiled(a_point(11, 9), {(ray, 1): 200.0 * (1 + ray) * (-1) ** ray for ray in range(4)})
     found, (gap, weight, basis) = decide(point, limit()), point_decisions._misclosures(point)
     sets = point_decisions.ray_sets(9, 3).rays
-    left, errors = point_decisions._without(
-        np.array(gap @ weight @ gap), basis @ weight @ gap, basis @ weight @ basis.T, sets
-    )
+    left, errors = without(gap, weight, basis, sets)
     for ray, size in nonempty(enumerate(found.size)):
         best = min((value, row) for row, value in enumerate(left) if ray in sets[row])[1]
         assert size == pytest.approx(errors[best, sets[best].tolist().index(ray)], rel=1e-9)
