@@ -1,6 +1,6 @@
 """Decisions on many rays at once, in columns: points with as many rays and given coordinates are linearised together.
 
-Source: none; ``point_decisions`` decides.
+Source: derived; ``point_decisions`` decides.
 """
 
 from __future__ import annotations

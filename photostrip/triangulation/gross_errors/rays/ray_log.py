@@ -1,6 +1,6 @@
 """What a search said of rays, in columns: thousands of them are decided on, some several times; records are made once.
 
-Source: none; bookkeeping.
+Source: derived; bookkeeping.
 """
 
 from __future__ import annotations
