@@ -127,7 +127,7 @@ def test_a_principal_distance_off_by_a_percent_is_named() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "rejected"), [(8810027, 15), (8930004, 20)])
+@pytest.mark.parametrize(("seed", "rejected"), [(8810027, 15), (8930004, 30)])
 def test_a_camera_of_one_strip_off_by_ten_percent_is_named(seed: int, rejected: int) -> None:
     """Its unknown did not converge, and up to 173 image points were rejected in its place."""
     case = plausibility.block(seed)
@@ -137,7 +137,9 @@ def test_a_camera_of_one_strip_off_by_ten_percent_is_named(seed: int, rejected: 
     (finding,) = result.findings
     assert (finding.code, set(finding.strips)) == ("P105", set(planted[1]))
     assert result.bundle is not None
-    assert len(result.bundle.screened.rejections) <= rejected
+    rejections = result.bundle.screened.rejections
+    assert len(rejections) <= rejected
+    assert all(each.readmitted for each in rejections)
     given = case.inputs.strips[0].camera.principal_distance
     assert float(finding.evidence["would_fit_mm"]) == pytest.approx(given, rel=0.02)
 
