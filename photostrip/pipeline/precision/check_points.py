@@ -42,9 +42,8 @@ class Propagation:
 
     def photos(self) -> Iterator[PhotoErrors]:
         """Rows of the photos that could be oriented, some at a time."""
-        return differentiate_photos(
-            self.errors, self.sightings, self.resection, lambda rows: self.fit.influence(self.xyz[rows])
-        )
+        terms = self.fit.polynomial_columns(self.xyz)
+        return differentiate_photos(self.errors, self.sightings, self.resection, terms)
 
 
 class CheckPoints(NamedTuple):

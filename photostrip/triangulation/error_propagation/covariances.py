@@ -20,7 +20,14 @@ from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows, add_rows
+from photostrip.triangulation.error_propagation.derivatives import (
+    COMPONENTS,
+    SHARING,
+    SPAN,
+    ErrorRows,
+    add_products,
+    add_rows,
+)
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
@@ -150,12 +157,12 @@ def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Sums:
     image, entry = np.unique(rows.image, return_inverse=True)
     by_image = np.zeros((len(image), 2, len(operator)))
     add_rows(by_image, entry, rows.by_image[:, 0, :, None] * operator.T[rows.item][:, None, :])
+    of_photos = np.zeros((errors.models + 1, SPAN * COMPONENTS, len(operator)))
+    add_products(of_photos, images.photo[image], images.components[image].reshape(len(image), 2, -1), by_image)
     of_images = np.zeros_like(by_component)
-    for slot in range(SPAN):
-        model = images.photo[image] - SHARING + slot
-        inside = np.flatnonzero((model >= 0) & (model < errors.models))
-        values = images.components[image[inside], :, slot].transpose(0, 2, 1) @ by_image[inside]
-        add_rows(of_images, model[inside], values)
+    for slot, part in enumerate(np.split(of_photos, SPAN, axis=1)):  # of the models photo - 2 + slot
+        of_slot = part[SHARING - slot :][: errors.models]
+        of_images[: len(of_slot)] += of_slot
     return Sums(
         by_component=by_component,
         image=image,
@@ -168,14 +175,15 @@ def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Sums:
 def _summed_components(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
     """Coefficients of the components in weighted sums of rows with d = 1, shape (p, 6, t)."""
     models, count = errors.models, weights.shape[1]
-    by_first = np.zeros((models + 1, SIMILARITY_PARAMETERS, count))
-    add_rows(by_first, rows.first, rows.by_similarity[:, 0, :, None] * weights[:, None, :])
-    after = np.cumsum(by_first[::-1], axis=0)[::-1][1:]  # rows whose first model comes after each model
+    by_first = np.zeros((models + 1, SIMILARITY_PARAMETERS + rows.by_component.shape[1] * COMPONENTS, count))
+    add_products(by_first, rows.first, by_model(rows), weights[:, None])
+    by_similarity, *by_component = np.split(
+        by_first, range(SIMILARITY_PARAMETERS, by_first.shape[1], COMPONENTS), axis=1
+    )
+    after = np.cumsum(by_similarity[::-1], axis=0)[::-1][1:]  # rows whose first model comes after each model
     result: Floats = errors.steps.transpose(0, 2, 1) @ after
-    for slot in range(rows.by_component.shape[1]):
-        model = rows.first + slot
-        inside = np.flatnonzero(model < models)
-        add_rows(result, model[inside], rows.by_component[inside, slot, 0, :, None] * weights[inside, None, :])
+    for slot, part in enumerate(by_component):
+        result[slot:] += part[: max(models - slot, 0)]
     return result
 
 
@@ -204,8 +212,10 @@ def covariances(
         part, phi = rows.take(order[some]), influence(order[some])
         near, models = NearImages.of(errors, part), distinct(part.first)
         by = _coefficients(part, near)
-        matrices = [_halves(errors, fit.along, models, slots), _with_parameters(fit, models, slots)]
-        found = _by_model(by, part.first, np.concatenate(matrices, axis=2))
+        matrices = np.zeros((len(models), by.shape[2], own + len(fit.parameters)))
+        _put_halves(matrices[:, :, :own], errors, fit.along, models, slots)
+        _put_with_parameters(matrices[:, :, own:], fit, models, slots)
+        found = _by_model(by, part.first, matrices)
         _add_same_images(found[:, :, own:], part, fit.sums)
         found[:, :, own:] -= (phi.reshape(-1, len(fit.parameters)) @ (fit.parameters / 2)).reshape(phi.shape)
         found = found @ np.concatenate([by[:, :, :own], -phi], axis=2).transpose(0, 2, 1)
@@ -245,7 +255,8 @@ class NearImages(NamedTuple):
         by_image[rows.item, photo, place] = rows.by_image.transpose(0, 2, 1)
         with_components = np.zeros((n, size, (photos + SHARING + 1) * COMPONENTS))
         for slot in range(photos):
-            components = errors.images.components[image[:, slot]].reshape(n, 2 * most, SPAN * COMPONENTS)
+            components = errors.images.components.take(image[:, slot], axis=0)
+            components = components.reshape(n, 2 * most, SPAN * COMPONENTS)
             products = by_image[:, slot].reshape(n, 2 * most, size).transpose(0, 2, 1) @ components
             with_components[:, :, slot * COMPONENTS : (slot + SPAN) * COMPONENTS] += products
         return cls(
@@ -261,25 +272,28 @@ def local_covariances(errors: StripErrors, rows: ErrorRows, near: NearImages) ->
     for some in _slices(rows):
         part, images = rows.part(some.start, some.stop), near.by_image[some]
         by = _coefficients(part.without_similarity(), NearImages(images, near.with_components[some]))
-        half = _by_model(by, part.first, _halves(errors, along, distinct(part.first), slots))
+        models = distinct(part.first)
+        matrices = np.zeros((len(models), by.shape[2], SIMILARITY_PARAMETERS + slots * COMPONENTS))
+        _put_halves(matrices, errors, along, models, slots)
+        half = _by_model(by, part.first, matrices)
         found = half @ by[:, :, : half.shape[2]].transpose(0, 2, 1) + images @ images.transpose(0, 2, 1) / 2
         result[some] = found + found.transpose(0, 2, 1)
     return result
 
 
-def _halves(errors: StripErrors, along: SimilarityCovariances, models: Numbers, slots: int) -> Floats:
-    """Matrices (m, k, 7 + 6 s) that write S of rows as G H^T + H G^T, products of image points left out.
+def _put_halves(
+    matrices: Floats, errors: StripErrors, along: SimilarityCovariances, models: Numbers, slots: int
+) -> None:
+    """Fill zeros (m, k, 7 + 6 s) with what writes S of rows as G H^T + H G^T, products of image points left out.
 
     G (n, d, 7 + 6 s) are the coefficients of y(first) and of the components from there on, H = G K / 2 + X with K the
     covariances of these, and X those of the image points with them: what ``_coefficients`` gives, times the matrices.
     """
     own = SIMILARITY_PARAMETERS + slots * COMPONENTS
     before = own + SHARING * COMPONENTS
-    result = np.zeros((len(models), before + (slots + SHARING) * COMPONENTS, own))
-    result[:, :own] = covariances_of_models(errors, along, models, slots) / 2
-    result[:, own:before, :SIMILARITY_PARAMETERS] = _stacked(steps_before(errors, models))
-    result[:, before : before + slots * COMPONENTS, SIMILARITY_PARAMETERS:] = np.eye(slots * COMPONENTS)
-    return result
+    np.divide(covariances_of_models(errors, along, models, slots), 2, out=matrices[:, :own])
+    matrices[:, own:before, :SIMILARITY_PARAMETERS] = _stacked(steps_before(errors, models))
+    matrices[:, before : before + slots * COMPONENTS, SIMILARITY_PARAMETERS:] = np.eye(slots * COMPONENTS)
 
 
 def by_model(rows: ErrorRows) -> Floats:
@@ -324,31 +338,34 @@ def steps_before(errors: StripErrors, models: Numbers) -> Floats:
 def around_models(of_models: Floats, models: Numbers, before: int, after: int) -> Floats:
     """Give what belongs to the models around each, (m, before + after, ...), 0 beyond the ends."""
     number = models[:, None] + np.arange(-before, after)
-    found = of_models[np.clip(number, 0, len(of_models) - 1)]
+    found = of_models.take(number, axis=0, mode="clip")
     found[(number < 0) | (number >= len(of_models))] = 0.0
     return np.asarray(found, float)
 
 
 def with_parameters(rows: ErrorRows, near: NearImages, fit: ParameterCovariances) -> Floats:
     """C: covariances (n, d, t) of rows that are ordered by their first models with the fitted parameters."""
-    matrices = _with_parameters(fit, distinct(rows.first), rows.by_component.shape[1])
-    result = _by_model(_coefficients(rows, near), rows.first, matrices)
+    models, by = distinct(rows.first), _coefficients(rows, near)
+    matrices = np.empty((len(models), by.shape[2], len(fit.parameters)))
+    _put_with_parameters(matrices, fit, models, rows.by_component.shape[1])
+    result = _by_model(by, rows.first, matrices)
     _add_same_images(result, rows, fit.sums)
     return result
 
 
-def _with_parameters(fit: ParameterCovariances, models: Numbers, slots: int) -> Floats:
-    """Matrices (m, k, t) that give C of rows but for the image points that the fit has directly, too."""
-    with_components = _stacked(around_models(fit.sums.with_components, models, 0, slots))
-    by_component = _stacked(around_models(fit.sums.by_component, models, SHARING, slots + SHARING))
-    return np.concatenate([fit.similarities[models], with_components, by_component], axis=1)
+def _put_with_parameters(matrices: Floats, fit: ParameterCovariances, models: Numbers, slots: int) -> None:
+    """Fill (m, k, t) with what gives C of rows but for the image points that the fit has directly, too."""
+    own = SIMILARITY_PARAMETERS + slots * COMPONENTS
+    matrices[:, :SIMILARITY_PARAMETERS] = fit.similarities[models]
+    matrices[:, SIMILARITY_PARAMETERS:own] = _stacked(around_models(fit.sums.with_components, models, 0, slots))
+    matrices[:, own:] = _stacked(around_models(fit.sums.by_component, models, SHARING, slots + SHARING))
 
 
 def _add_same_images(result: Floats, rows: ErrorRows, sums: Sums) -> None:
     """Add to C the products of the image points that enter rows and the fit directly."""
     of_fit = np.searchsorted(sums.image, rows.image)
     entry = np.flatnonzero(sums.image[np.minimum(of_fit, len(sums.image) - 1)] == rows.image)
-    add_rows(result, rows.item[entry], rows.by_image[entry] @ sums.by_image[of_fit[entry]])
+    add_products(result, rows.item[entry], rows.by_image[entry].transpose(0, 2, 1), sums.by_image[of_fit[entry]])
 
 
 def _stacked(around: Floats) -> Floats:

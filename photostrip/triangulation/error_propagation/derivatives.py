@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -159,3 +160,15 @@ def add_rows(result: Floats, place: Numbers, values: Floats) -> None:
     starts = np.flatnonzero(np.diff(place, prepend=-1))
     if len(starts):
         result[place[starts]] += np.add.reduceat(values, starts, axis=0)
+
+
+def add_products(result: Floats, place: Numbers, first: Floats, second: Floats) -> None:
+    """Add first^T second of rows (n, k, a) and (n, k, b) to matrices (a, b) of the result, several to one perhaps."""
+    if (place[1:] < place[:-1]).any():
+        order = np.argsort(place, kind="stable")
+        place, first, second = place[order], first[order], second[order]
+    starts = np.flatnonzero(np.diff(place, prepend=-1))
+    ends = [*(starts * first.shape[1]).tolist(), first.shape[0] * first.shape[1]]
+    first, second = first.reshape(-1, first.shape[2]), second.reshape(-1, second.shape[2])
+    for at, (start, stop) in zip(place[starts].tolist(), pairwise(ends), strict=True):
+        result[at] += first[start:stop].T @ second[start:stop]

@@ -5,7 +5,7 @@ Source: derived; see docs/precision.md, eq. 3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -44,11 +44,11 @@ class PhotoErrors:
 
 
 def differentiate_photos(
-    errors: StripErrors, sightings: UsedRays, resection: Resection, influence: Callable[[Numbers], Floats]
+    errors: StripErrors, sightings: UsedRays, resection: Resection, terms: Sequence[Floats]
 ) -> Iterator[PhotoErrors]:
     """Differentiate the resections, some photos at a time: all their rows together are the largest table of a run.
 
-    influence: (n, 3, t), what the fit takes away from n of the points.
+    terms: (q, t) for X, Y and Z: terms of the polynomials at all points.
 
     The points carry the photo with them, and its measurements move it once more: do = sum by_point dX + by_image dl.
     """
@@ -57,67 +57,69 @@ def differentiate_photos(
     ends = np.searchsorted(sightings.photo, np.arange(len(resection.centers) + 1))
     for low, high in runs(ends, SIGHTINGS):
         some = sightings.take(np.arange(ends[low], ends[high]))
-        yield _some_photos(errors, some, resection, influence, distance)
+        yield _some_photos(errors, some, resection, terms, distance)
 
 
 def _some_photos(
     errors: StripErrors,
     sightings: UsedRays,
     resection: Resection,
-    influence: Callable[[Numbers], Floats],
+    terms: Sequence[Floats],
     distance: float,
 ) -> PhotoErrors:
     """Differentiate the resections of photos that have sightings: o = sum over their points of by.point times its row.
 
-    The points of a photo lie side by side, (k, 6, 3 most), so that their rows are summed by products of matrices:
-    similarities at once, components model by model. Beyond the first model of the photo a point's similarity is that of
-    the first, and a step for each model between.
+    The points of a photo lie side by side, (k, most), so that their rows are summed by products of matrices. Beyond the
+    first model of the photo a point's similarity is that of the first, and a step for each model between.
     """
     photos, starts, item = np.unique(sightings.photo, return_index=True, return_inverse=True)
     place = np.arange(len(item)) - starts[item]  # among the sightings of the photo
+    count, most = len(photos), int(place.max()) + 1
     by = _resected(sightings, resection, item, place, distance)
     points, images = errors.points, errors.images
-    first = np.minimum.reduceat(points.first[sightings.point], starts)
     sighting, entry = ranges(*points.entries(sightings.point))
-    image, by_image = points.image[entry], by.point[sighting] @ points.by_image[entry]
+    beside = item * most + place
+    by_image = points.by_image[entry].transpose(0, 2, 1) @ by.point.reshape(-1, 3, 6)[beside[sighting]]
+    image = points.image[entry]
     once_more = np.flatnonzero(image == images.rows_of(sightings.image)[sighting])
-    by_image[once_more] += by.image[sighting[once_more]] * images.sigma[image[once_more]][:, None, :]
+    directly = by.image.reshape(-1, 2, 6)[beside[sighting[once_more]]]
+    by_image[once_more] += directly * images.sigma[image[once_more]][:, :, None]
 
-    count, most = len(photos), int(place.max()) + 1  # points of a photo side by side, those that are none with zeros
-    by_point = np.zeros((count, 6, most, 3))
-    by_point[item, :, place] = by.point
-    point = sightings.point[np.minimum(starts[:, None] + np.arange(most), len(item) - 1)]
-    flat = by_point.reshape(count, 6, 3 * most)
-    similar = points.by_similarity[point].reshape(count, 3 * most, -1)
-    shift = np.zeros((count, most), np.intp)
-    shift[item, place] = points.first[sightings.point] - first[item]
-    along = points.by_component[point]
-    slots = along.shape[2]
-    farthest = int(shift.max())
-    by_component = np.zeros((count, farthest + slots, 6, COMPONENTS))
-    for ahead in range(farthest + 1):
-        here = (by_point * (shift == ahead)[:, None, :, None]).reshape(flat.shape)
-        for slot in range(slots):
-            by_component[:, ahead + slot] += here @ along[:, :, slot].reshape(count, 3 * most, COMPONENTS)
-        if ahead < farthest:
-            beyond = (by_point * (shift > ahead)[:, None, :, None]).reshape(flat.shape)
-            by_component[:, ahead] += beyond @ similar @ errors.steps[np.minimum(first + ahead, errors.models - 1)]
+    first = np.minimum.reduceat(points.first[sightings.point], starts)
+    # where a photo has fewer points, the last again, with derivatives of zero
+    point = sightings.point[
+        np.minimum(starts[:, None] + np.arange(most), np.append(starts[1:], len(item))[:, None] - 1)
+    ]
+    similar, along = points.by_similarity[point], points.by_component[point]
+    shift, slots = points.first[point] - first[:, None], along.shape[2]
+    farthest, all_similar = int(shift.max()), similar.reshape(count, 3 * most, -1)
+    carried = np.zeros((count, farthest + slots, most, 3, COMPONENTS))
+    for slot in range(slots):
+        carried[np.arange(count)[:, None], shift + slot, np.arange(most)] = along[:, :, slot]
+    for ahead in range(farthest):
+        moved = all_similar @ errors.steps[np.minimum(first + ahead, errors.models - 1)]
+        beyond = shift > ahead
+        carried[:, ahead][beyond] = moved.reshape(count, most, 3, -1)[beyond]
+    flat = by.point.reshape(count, 3 * most, 6).transpose(0, 2, 1)
+    by_similarity = flat @ all_similar
     rows = ErrorRows(
         first=first,
-        by_similarity=flat @ similar,
-        by_component=by_component,
+        by_similarity=by_similarity,
+        by_component=flat[:, None] @ carried.reshape(count, -1, 3 * most, COMPONENTS),
         item=item[sighting],
         image=image,
-        by_image=by_image,
+        by_image=by_image.transpose(0, 2, 1),
     )
-    return PhotoErrors(rows, flat @ influence(point.ravel()).reshape(count, 3 * most, -1), photos)
+    # a similarity of the whole strip moves a photo as that of its first model does
+    by_terms = [by.point[:, :, axis].transpose(0, 2, 1) @ of_axis[point] for axis, of_axis in enumerate(terms)]
+    return PhotoErrors(rows, np.concatenate([by_similarity, *by_terms], axis=2), photos)
 
 
 class _Resected(NamedTuple):
-    """Derivatives of a photo's orientation by what it was oriented on."""
+    """Derivatives of the orientations of k photos by what they were oriented on, the points of a photo side by side."""
 
-    image: Floats  # (e, 6, 2)
-    point: Floats  # (e, 6, 3)
+    image: Floats  # (k, most, 2, 6)
+    point: Floats  # (k, most, 3, 6)
 
 
 def _resected(sightings: UsedRays, resection: Resection, item: Numbers, place: Numbers, distance: float) -> _Resected:
@@ -125,13 +127,14 @@ def _resected(sightings: UsedRays, resection: Resection, item: Numbers, place: N
     rotations = resection.rotations[sightings.photo]
     arm = sightings.xyz - resection.centers[sightings.photo]
     by_x, by_y, _ = partials(arm, rotations, np.full(len(item), sightings.focal), np.ones(len(item)))
-    design = np.stack([by_x.T, by_y.T], axis=1)
     unit = np.array([distance] * 3 + [1.0] * 3)  # so that shifts and rotations are of one size
-    scaled = np.zeros((int(item[-1]) + 1, int(place.max()) + 1, 2, 6))
-    scaled[item, place] = design * unit
-    flat = scaled.reshape(len(scaled), -1, 6)
-    solved = np.linalg.inv(flat.transpose(0, 2, 1) @ flat) @ flat.transpose(0, 2, 1)
-    turned = (unit[:, None] * solved).reshape(len(scaled), 2, 3, -1)
-    turned = resection.rotations[distinct(sightings.photo), None] @ turned
-    by_image = turned.reshape(len(scaled), 6, -1, 2)[item, :, place]
-    return _Resected(by_image, by_image @ (design[:, :, :3] @ rotations.transpose(0, 2, 1)))
+    count, most = int(item[-1]) + 1, int(place.max()) + 1
+    scaled = np.zeros((count, most, 2, 6))
+    scaled[item, place, 0], scaled[item, place, 1] = by_x.T * unit, by_y.T * unit
+    flat = scaled.reshape(count, -1, 6)
+    cofactors = unit[:, None] * np.linalg.inv(flat.transpose(0, 2, 1) @ flat)
+    turn = resection.rotations[distinct(sightings.photo)]
+    turned = (turn[:, None] @ cofactors.reshape(count, 2, 3, 6)).reshape(count, 6, 6)
+    by_image = (flat @ turned.transpose(0, 2, 1)).reshape(scaled.shape)
+    by_shift = (flat[:, :, :3] / distance) @ turn.transpose(0, 2, 1)
+    return _Resected(by_image, by_shift.reshape(count, most, 2, 3).transpose(0, 1, 3, 2) @ by_image)
