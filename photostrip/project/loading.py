@@ -26,7 +26,7 @@ from photostrip.project import conversion
 from photostrip.project.hints import hints
 from photostrip.project.models import check_models, measured_models
 from photostrip.project.pixel_size import with_pixel_sizes
-from photostrip.project.places import of_points, places_of
+from photostrip.project.places import ListedPoints, listed_points, of_points, places_of
 from photostrip.project.resolved import completed, text_of
 from photostrip.project.schema.cameras import Camera as CameraBlock
 from photostrip.project.schema.ground import CameraPositions as CameraPositionsBlock
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.strips.stages import Stages
 
 OF_IMAGES = ("photostrip", "cameras", "strips", "observations", "fiducial_measurements", "accept")
-__all__ = ["Project", "adjust_project", "load_project"]
+__all__ = ["Project", "adjust_project", "load_project", "read_project"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class Project:
     completed: ProjectFile  # the project with all defaults filled in, without absolute paths
     hints: tuple[Note, ...]  # what was passed over or not used, and why
     tree: Node  # the project file with everything merged into it: it knows where each value stands
-    tables: Tables
+    control: tuple[ListedPoints, ...]
     # names of the grid files that the ground frames ask for. Those that stand beside the project file are used; for the
     # others PROJ looks elsewhere
     grids: tuple[str, ...]
@@ -82,7 +82,7 @@ class Project:
 
     def placed(self, findings: Iterable[Finding]) -> tuple[Finding, ...]:
         """Give findings the place in the files where they would be put right."""
-        return tuple(places_of(findings, self.tree, self.tables, self.inputs.flights))
+        return tuple(places_of(findings, self.tree, self.control, self.inputs.flights))
 
     def seen(self, file: str) -> str:
         """Return a file that was read as seen from the project's folder."""
@@ -106,7 +106,7 @@ class Project:
         try:
             yield
         except InputError as error:
-            faults = [fault if fault.file or fault.key else of_points(fault, self.tables) for fault in error.faults]
+            faults = [fault if fault.file or fault.key else of_points(fault, self.control) for fault in error.faults]
             placed = InputError(fault if fault.file else at_own_key(fault, self.tree) for fault in faults)
             placed.findings = self.placed(error.findings)
             raise placed from None
@@ -129,7 +129,15 @@ def adjust_project(project: Project, stages: Stages | None = None) -> Result:
 
 
 def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
-    """Read a project and all its tables, or raise every fault of every file."""
+    """Read a project and all its tables, or raise every fault of every file.
+
+    The tables are let go: with their text they take a fifth of what a run of many points holds.
+    """
+    return read_project(path, overrides)[0]
+
+
+def read_project(path: Path, overrides: Sequence[str] = ()) -> tuple[Project, Tables]:
+    """Read a project as ``load_project`` does, and give its tables, too."""
     reading = Reading.of(str(path), overrides)
     root, findings = reading.root, reading.findings
     checked = reading.checked(ProjectFile)
@@ -149,7 +157,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
         raise
     specs = (*inputs.frames, *(() if inputs.output is None else (inputs.output,)))
     grids = tuple(dict.fromkeys(grid for spec in specs for grid in grid_names(spec.crs)))
-    return Project(
+    read = Project(
         inputs=inputs,
         settings=conversion.settings(project),
         path=path,
@@ -157,11 +165,12 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
         completed=project,
         hints=(*findings.notes, *hints(project, tables, root), *notes),
         tree=root,
-        tables=tables,
+        control=listed_points(tables),
         grids=grids,
         grid_folder=grid_folder,
         tied=tied,
     )
+    return read, tables
 
 
 def _seen_from(file: str, folder: Path) -> str:
@@ -238,7 +247,7 @@ def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
         findings = image_evidence.of_units(inputs, conversion.settings(given))
     except (GeometryError, InputError):
         return ()
-    return tuple(places_of(findings, root, tables, inputs.flights))
+    return tuple(places_of(findings, root, listed_points(tables), inputs.flights))
 
 
 def _whole(read: Measurements) -> Measurements:

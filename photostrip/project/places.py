@@ -6,22 +6,39 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from photostrip.arrays import Numbers
 from photostrip.errors import Fault
-from photostrip.frozen import replace
+from photostrip.frozen import dataclass, replace
 from photostrip.notes import Finding
 from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.project.tables import Tables
 from photostrip.project.yaml.tree import Node, steps
 
 
+@dataclass(frozen=True, eq=False)
+class ListedPoints:
+    """Where the points of a control list stand: all that is kept of it while a project is run."""
+
+    file: str
+    ids: Sequence[str]
+    lines: Numbers  # (n,): line of each id, counted from 1
+
+
+def listed_points(tables: Tables) -> tuple[ListedPoints, ...]:
+    """Return where the points of all control lists stand that could be read."""
+    return tuple(
+        ListedPoints(read.table.file, read.ids, read.table.lines) for read in tables.control if read is not None
+    )
+
+
 def places_of(
-    findings: Iterable[Finding], tree: Node, tables: Tables, strips: Sequence[Strip | ModelStrip]
+    findings: Iterable[Finding], tree: Node, control: Sequence[ListedPoints], strips: Sequence[Strip | ModelStrip]
 ) -> Iterator[Finding]:
     """Return findings with the place of their key, else of the first point in a control list or photo in a strip."""
     for each in findings:
         if each.key:
             path, key = steps(each.key), each.key
-        elif each.points and (row := _given(each.points, tables)) is not None:
+        elif each.points and (row := _given(each.points, control)) is not None:
             yield replace(each, file=row[0], line=row[1])
             continue
         else:
@@ -34,20 +51,18 @@ def places_of(
         yield replace(each, file=place.file, line=place.line, column=place.column, key=key)
 
 
-def of_points(fault: Fault, tables: Tables) -> Fault:
+def of_points(fault: Fault, control: Sequence[ListedPoints]) -> Fault:
     """Return a fault that knows only its points with the place of the first of them in a control list."""
-    row = _given(fault.points, tables)
+    row = _given(fault.points, control)
     return fault if row is None else replace(fault, file=row[0], line=row[1])
 
 
-def _given(points: tuple[str, ...], tables: Tables) -> tuple[str, int] | None:
+def _given(points: tuple[str, ...], control: Sequence[ListedPoints]) -> tuple[str, int] | None:
     """File and line of the first of some points that a control list gives."""
-    for read in tables.control:
-        if read is None:
-            continue
-        rows = np.flatnonzero(np.isin(np.array(read.ids, str), points))
+    for listed in control:
+        rows = np.flatnonzero(np.isin(np.array(listed.ids, str), points))
         if len(rows):
-            return read.table.file, int(read.table.lines[rows[0]])
+            return listed.file, int(listed.lines[rows[0]])
     return None
 
 

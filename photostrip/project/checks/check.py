@@ -36,7 +36,8 @@ from photostrip.project.checks.models import (
     source_of,
 )
 from photostrip.project.checks.table_rows import gaps_of, observations_used, table_rows
-from photostrip.project.loading import Project, load_project
+from photostrip.project.loading import Project, read_project
+from photostrip.project.tables import Tables
 from photostrip.project.yaml.tree import fault_at
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.units import MILLIMETRES
@@ -73,7 +74,7 @@ class Checked:
 def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     """Check a project as far as that goes without adjusting it; nothing is raised for a faulty project."""
     try:
-        project = load_project(path, overrides)
+        project, tables = read_project(path, overrides)
     except InputError as error:
         return Checked(path=str(path), faults=error.faults, findings=error.findings, notes=(), document={})
     inputs, models = project.inputs, project.inputs.models
@@ -86,20 +87,20 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     faults += _neighbours(project) if models is None else links_of_models(project, models)
     if project.settings.adjustment != "bundle":  # strips of a block may hang on others
         faults += _control_of_strips(project, used)
-    frames = _frames(project, faults)
-    if models is not None and (read := project.tables.models) is not None:
+    frames = _frames(project, tables, faults)
+    if models is not None and (read := tables.models) is not None:
         sigma = {"model_sigma": sigma_of(project, "models", (read.points, read.centers), models.points.sigma)}
     else:
-        tables = (project.tables.observations,)
-        sigma = {"image_sigma": sigma_of(project, "observations", tables, inputs.observations.sigma)}
+        measured = (tables.observations,)
+        sigma = {"image_sigma": sigma_of(project, "observations", measured, inputs.observations.sigma)}
     document: Document = {
         "name": inputs.name,
         "angle_unit": project.settings.angle_unit,
         "counts": _counts(project, used),
         **sigma,
         "frames": frames,
-        "control": list(_control(project)),
-        "rows": table_rows(project, used),
+        "control": list(_control(project, tables)),
+        "rows": table_rows(project, tables, used),
     }
     counted = Findings()  # of too many faults in one file they only count the rest
     counted.add(*dict.fromkeys(faults))
@@ -225,7 +226,7 @@ def _counts(project: Project, used: Numbers) -> Document:
     }
 
 
-def _frames(project: Project, faults: list[Fault]) -> list[Document]:
+def _frames(project: Project, tables: Tables, faults: list[Fault]) -> list[Document]:
     """Decode the frame of each control list at its first point, there and back."""
     inputs = project.inputs
     with project.places():
@@ -233,7 +234,7 @@ def _frames(project: Project, faults: list[Fault]) -> list[Document]:
     faults += _refused(project, partial(require_whole, inputs, frames))
     found = []
     for number, frame in enumerate(frames):
-        read = project.tables.control[number]
+        read = tables.control[number]
         rows = np.flatnonzero((inputs.control.frame == number) & inputs.control.use[:, :2].all(axis=1))
         block: Document = {
             "file": "" if read is None else read.table.file,
@@ -284,7 +285,7 @@ def _decoded(project: Project, frame: GroundFrame, rows: Numbers) -> Document:
     return found
 
 
-def _control(project: Project) -> Iterator[Document]:
+def _control(project: Project, tables: Tables) -> Iterator[Document]:
     """Return the standard deviation of every control coordinate, in the user's order, and where it comes from."""
     if project.inputs.models is not None:
         photos = {name: len(each) for name, each in photos_of_points(project.inputs.models).items()}
@@ -293,7 +294,7 @@ def _control(project: Project) -> Iterator[Document]:
         count, total = len(measured.photo_ids), len(measured.point_ids)
         times = np.bincount(distinct(measured.point * count + measured.photo) // count, minlength=total)
         photos = dict(zip(measured.point_ids, times.tolist(), strict=True))
-    for number, read in enumerate(project.tables.control):
+    for number, read in enumerate(tables.control):
         if read is not None:
             yield from _of_list(project, number, read, photos)
 

@@ -69,12 +69,12 @@ def gaps_of(inputs: Inputs, used: Numbers) -> list[str]:
     return [observations.point_ids[code] for code in np.flatnonzero(~paired & (count > 1))]
 
 
-def table_rows(project: Project, used: Numbers) -> list[Document]:
+def table_rows(project: Project, tables: Tables, used: Numbers) -> list[Document]:
     """Count what became of the rows of each table; used and unused rows add up to all rows.
 
     The keys are ``file``, ``rows``, ``used`` and ``unused``: reason, number of rows, ids, first line.
     """
-    tables, inputs = project.tables, project.inputs
+    inputs = project.inputs
     photos = {photo for strip in inputs.strips for photo in strip.photos}
     if tables.models is not None and inputs.models is not None:
         return model_rows(tables, inputs.models)
