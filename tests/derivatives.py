@@ -13,6 +13,7 @@ from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
+from photostrip.triangulation.error_propagation.derivatives import MOVED
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 from tests.simulated import inputs_of
 
@@ -85,10 +86,12 @@ def written_out(rows: ErrorRows, errors: StripErrors) -> Floats:
     count = len(images.row)
     units = np.zeros((models + 3, 6, count, 2))
     for image in range(count):
+        components = np.zeros((2, 18))
+        components[:, MOVED] = images.components[image]
         for slot in range(3):
             model = images.photo[image] - 2 + slot
             if 0 <= model < models:
-                units[model, :, image] = images.components[image, :, slot].T
+                units[model, :, image] = components[:, 6 * slot : 6 * slot + 6].T
     flat = units.reshape(models + 3, 6, -1)
     steps = np.einsum("kab,kbc->kac", errors.steps, flat[:models])
     frames = np.concatenate([np.zeros((1, 7, count * 2)), np.cumsum(steps, axis=0)])

@@ -20,7 +20,7 @@ from photostrip.frozen import replace
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.covariance_adjustment.system import System
 from photostrip.triangulation.error_propagation.covariances import by_images
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows, add_rows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, MOVED, SHARING, SPAN, ErrorRows, add_rows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, y_parallaxes
@@ -44,7 +44,8 @@ def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Float
     """
     points, photos = errors.images, errors.models + 1
     moved = np.zeros((photos, SPAN, COMPONENTS))
-    add_rows(moved, points.photo, np.einsum("ni,nisc->nsc", images, points.components))
+    flat = moved.reshape(photos, -1)
+    add_rows(flat[:, MOVED], points.photo, np.einsum("ni,nic->nc", images, points.components))
     components = np.zeros((SHARING + errors.models + rows.by_component.shape[1], COMPONENTS))  # from model -SHARING on
     for slot in range(SPAN):
         components[slot : slot + photos] += moved[:, slot]

@@ -22,6 +22,7 @@ from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import (
     COMPONENTS,
+    MOVED,
     SHARING,
     SPAN,
     ErrorRows,
@@ -123,8 +124,8 @@ def by_images(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
     images, by_component = errors.images, _summed_components(errors, rows, weights[:, None])[:, :, 0]
     none = np.zeros((SHARING, COMPONENTS))
     padded = np.concatenate([none, by_component, none])
-    around = np.stack([padded[slot : slot + errors.models + 1] for slot in range(SPAN)], axis=1)
-    result: Floats = np.einsum("nisc,nsc->ni", images.components, around[images.photo])
+    around = np.concatenate([padded[slot : slot + errors.models + 1] for slot in range(SPAN)], axis=1)
+    result: Floats = np.einsum("nic,nc->ni", images.components, around[images.photo, MOVED])
     add_rows(result, rows.image, rows.by_image[:, 0] * weights[rows.item][:, None])
     return result
 
@@ -158,7 +159,7 @@ def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Sums:
     by_image = np.zeros((len(image), 2, len(operator)))
     add_rows(by_image, entry, rows.by_image[:, 0, :, None] * operator.T[rows.item][:, None, :])
     of_photos = np.zeros((errors.models + 1, SPAN * COMPONENTS, len(operator)))
-    add_products(of_photos, images.photo[image], images.components[image].reshape(len(image), 2, -1), by_image)
+    add_products(of_photos[:, MOVED], images.photo[image], images.components[image], by_image)
     of_images = np.zeros_like(by_component)
     for slot, part in enumerate(np.split(of_photos, SPAN, axis=1)):  # of the models photo - 2 + slot
         of_slot = part[SHARING - slot :][: errors.models]
@@ -256,9 +257,10 @@ class NearImages(NamedTuple):
         with_components = np.zeros((n, size, (photos + SHARING + 1) * COMPONENTS))
         for slot in range(photos):
             components = errors.images.components.take(image[:, slot], axis=0)
-            components = components.reshape(n, 2 * most, SPAN * COMPONENTS)
+            components = components.reshape(n, 2 * most, MOVED.stop - MOVED.start)
             products = by_image[:, slot].reshape(n, 2 * most, size).transpose(0, 2, 1) @ components
-            with_components[:, :, slot * COMPONENTS : (slot + SPAN) * COMPONENTS] += products
+            moved = slice(MOVED.start + slot * COMPONENTS, MOVED.stop + slot * COMPONENTS)
+            with_components[:, :, moved] += products
         return cls(
             by_image.reshape(n, 2 * photos * most, size).transpose(0, 2, 1),
             with_components.reshape(n, size, photos + SHARING + 1, COMPONENTS),

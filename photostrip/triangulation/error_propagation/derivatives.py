@@ -23,6 +23,9 @@ ELEMENTS, SCALE = slice(0, 5), 5
 # models between which error components share image coordinates: pairs share a photo, a scale transfer three
 SHARING = 2
 SPAN = SHARING + 1  # photos on which the image coordinates of an error component lie
+# of the components of the models photo - 2, photo - 1 and photo, one after the other, those that an image point moves:
+# of the first model nothing but its scale
+MOVED = slice(SCALE, SPAN * COMPONENTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,8 @@ class ImagePoints:
     row: Numbers  # (n,): row in the table of image points
     photo: Numbers  # (n,): place of its photo in the strip, ascending
     sigma: Floats  # (n, 2): stated standard deviations of x and y, mm
-    # (n, 2, 3, 6): by x and y in their standard deviations: components of the models photo - 2, photo - 1 and photo
+    # (n, 2, 13): by x and y in their standard deviations: scale of the model photo - 2, components of the models
+    # photo - 1 and photo (``MOVED``)
     components: Floats
 
     def rows_of(self, rows: Numbers) -> Numbers:

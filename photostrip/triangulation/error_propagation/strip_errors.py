@@ -28,6 +28,7 @@ from photostrip.triangulation.error_propagation import pair_errors
 from photostrip.triangulation.error_propagation.derivatives import (
     COMPONENTS,
     ELEMENTS,
+    MOVED,
     SCALE,
     SHARING,
     SPAN,
@@ -141,7 +142,7 @@ def _image_points(
     """
     row = distinct(orientation.rows)
     row = row[np.argsort(position[row], kind="stable")]
-    components = np.zeros((len(row), 2, SPAN, COMPONENTS))
+    components = np.zeros((len(row), 2, MOVED.stop - MOVED.start))
     images = ImagePoints(row=row, photo=position[row], sigma=sigma[row], components=components)
     joined, models = formed.junctions, orientation.pairs.size
     before, after = scale_shares(orientation, formed, pairs)
@@ -158,16 +159,17 @@ def _image_points(
         (by_parallax * shares[orientation.pairs.pair]).sum(axis=1) for shares in (of_scale, of_scale_before)
     )
     by_parallax = np.column_stack([by_parallax, scale])
+    of_model = np.split(components, [1, 1 + COMPONENTS], axis=2)  # photo - 2, photo - 1, photo: the last is the scale
     sides = (parallax[:, :2], place[:, 0], 2), (parallax[:, 2:], place[:, 1], 1)
     for by_image, image, slot in sides:
-        components[image, :, slot] = by_image[:, :, None] * by_parallax[:, None, :]
+        of_model[slot][image] = by_image[:, :, None] * by_parallax[:, None, :]
     for by_image, image, slot in sides:
-        components[image, :, slot - 1, SCALE] += by_image * scale_before[:, None]
+        of_model[slot - 1][image, :, -1] += by_image * scale_before[:, None]
     by_before = (before[:, None] @ pairs.point_by_image[joined.before])[:, 0] * stated[joined.before]
     by_after = (after[:, None] @ pairs.point_by_image[joined.after])[:, 0] * stated[joined.after]
-    components[place[joined.before, 0], :, 2, SCALE] += by_before[:, :2]
-    components[place[joined.before, 1], :, 1, SCALE] += by_before[:, 2:] - by_after[:, :2]
-    components[place[joined.after, 1], :, 0, SCALE] -= by_after[:, 2:]
+    of_model[2][place[joined.before, 0], :, -1] += by_before[:, :2]
+    of_model[1][place[joined.before, 1], :, -1] += by_before[:, 2:] - by_after[:, :2]
+    of_model[0][place[joined.after, 1], :, -1] -= by_after[:, 2:]
     return images
 
 
@@ -188,11 +190,11 @@ def _component_covariances(images: ImagePoints, models: int) -> Floats:
     rank = np.arange(len(images.photo)) - np.concatenate([[0], np.cumsum(counts)])[images.photo]
     gram = np.zeros((photos, SPAN * COMPONENTS, SPAN * COMPONENTS))
     for start, stop in runs(np.concatenate([[0], np.cumsum(counts)]), IMAGES):
-        padded = np.zeros((stop - start, int(counts.max()), 2, SPAN * COMPONENTS))
+        padded = np.zeros((stop - start, int(counts.max()), *images.components.shape[1:]))
         rows = slice(*np.searchsorted(images.photo, [start, stop]).tolist())
-        padded[images.photo[rows] - start, rank[rows]] = images.components[rows].reshape(-1, 2, SPAN * COMPONENTS)
-        flat = padded.reshape(stop - start, -1, SPAN * COMPONENTS)
-        gram[start:stop] = flat.transpose(0, 2, 1) @ flat
+        padded[images.photo[rows] - start, rank[rows]] = images.components[rows]
+        flat = padded.reshape(stop - start, -1, padded.shape[-1])
+        gram[start:stop, MOVED, MOVED] = flat.transpose(0, 2, 1) @ flat
     gram = gram.reshape(photos, SPAN, COMPONENTS, SPAN, COMPONENTS)
     result = np.zeros((models, SPAN, COMPONENTS, COMPONENTS))
     for apart in range(SPAN):
