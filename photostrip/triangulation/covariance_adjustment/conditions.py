@@ -162,7 +162,7 @@ def _distances(
     """
     joined, pairs, images = formed.junctions, errors.pairs, errors.images
     chosen = np.flatnonzero(joined.used)
-    share, _ = scale_shares(orientation, formed, pairs)
+    share, _ = scale_shares(joined, pairs)
     order = np.lexsort(((share[chosen] ** 2).sum(axis=1), joined.junction[chosen]))
     number = joined.junction[chosen][order]
     last = np.append(number[1:] != number[:-1], np.ones(min(len(number), 1), bool))

@@ -14,7 +14,6 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass, replace
-from photostrip.triangulation.error_propagation.pair_errors import PairErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
@@ -144,7 +143,6 @@ class PlacedStrip:
     xyz: Floats  # (q, 3)
     centers: Floats  # (p + 1, 3)
     rotations: Floats  # (p + 1, 3, 3)
-    pairs: PairErrors
     images: ImagePoints
     steps: Floats  # (p, 7, 6)
 

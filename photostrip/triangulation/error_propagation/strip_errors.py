@@ -15,15 +15,17 @@ Source: derived; see docs/precision.md, eq. 2 and 3.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property, partial
+from typing import Self
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.frozen import dataclass, replace
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
+from photostrip.points import take_rows
 from photostrip.triangulation.error_propagation import pair_errors
 from photostrip.triangulation.error_propagation.derivatives import (
     COMPONENTS,
@@ -40,9 +42,12 @@ from photostrip.triangulation.error_propagation.derivatives import (
 from photostrip.triangulation.error_propagation.pair_errors import PairErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.resection.resection import runs
+from photostrip.triangulation.strip_formation.scale_transfer import Junctions
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 IMAGES = 4096  # image points whose products are summed together: what fits into the processor's cache
+JUNCTION_ROWS = ("junction", "before", "after", "point", "ratio", "used", "limit", "weight")
+SECTION = 8192  # points of pairs differentiated together: what the pairs hold is let go section by section
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,36 +91,82 @@ def differentiate_strip(
     rotations = similarity.rotation @ formed.rotations
     across = formed.rotations[:-1, 1] if formed.left_ray else None
     scale = similarity.scale * formed.scale
-    make_pairs = partial(pair_errors.differentiate_pairs, orientation, rotations[:-1], scale, across)
-    pairs = make_pairs()
     centers = similarity(formed.centers)
     origin = centers.mean(axis=0)
+    row = distinct(orientation.rows)
+    row = row[np.argsort(position[row], kind="stable")]
     strip = PlacedStrip(
         orientation=orientation,
         formed=formed,
         xyz=similarity(formed.xyz) - origin,
         centers=centers - origin,
         rotations=rotations,
-        pairs=pairs,
-        images=_image_points(orientation, formed, pairs, position, sigma),
-        steps=_steps(pairs, centers[1:] - origin),
+        images=ImagePoints(
+            row=row,
+            photo=position[row],
+            sigma=sigma[row],
+            components=np.zeros((len(row), 2, MOVED.stop - MOVED.start)),
+        ),
+        steps=np.zeros((len(scale), SIMILARITY_PARAMETERS, COMPONENTS)),
     )
-    points = _point_rows(strip)
+    points = _PointRows.of(strip)
+    of_scale = np.zeros((2, len(scale), 5))
+    for section in _sections(orientation, formed.junctions):
+        own = section.numbers
+        part = pair_errors.differentiate_pairs(
+            section.orientation, rotations[own], scale[own], None if across is None else across[own]
+        )
+        strip.steps[own] = _steps(part, strip.centers[1:][own])
+        _add_components(strip.images, section, part, of_scale[:, own])
+        points.add(section, part)
+    rows = points.finished()
     if len(formed.bridging):
         from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
 
-        points = with_bridges(points, strip)
+        rows = with_bridges(rows, strip)
     return StripErrors(
         images=strip.images,
         steps=strip.steps,
         component_covariances=_component_covariances(strip.images, len(strip.steps)),
-        points=points,
-        make_pairs=make_pairs,
+        points=rows,
+        make_pairs=partial(pair_errors.differentiate_pairs, orientation, rotations[:-1], scale, across),
         origin=origin,
     )
 
 
-def scale_shares(orientation: Orientation, formed: FormedStrip, pairs: PairErrors) -> tuple[Floats, Floats]:
+class _Section(NamedTuple):
+    """Some neighbouring pairs, and the one behind them, which shares their last junction and opens the next section."""
+
+    numbers: slice  # of these pairs in the strip
+    orientation: Orientation  # of these pairs, renumbered
+    rows: slice  # in the table of the strip's pairs, of the points of these pairs
+    own: int  # how many of these rows belong to the pairs without the one behind
+    junctions: Junctions  # between these pairs; rows and junctions renumbered
+
+
+def _sections(orientation: Orientation, junctions: Junctions) -> Iterator[_Section]:
+    """Cut a strip into sections."""
+    ends = np.append(orientation.pairs.starts, len(orientation.pairs.pair))
+    for first, stop in runs(ends, SECTION):
+        last = min(stop + 1, orientation.pairs.size)
+        rows = slice(int(ends[first]), int(ends[last]))
+        inside = np.flatnonzero((junctions.junction >= first) & (junctions.junction < last - 1))
+        joined = take_rows(junctions, inside, JUNCTION_ROWS)
+        yield _Section(
+            numbers=slice(first, last),
+            orientation=orientation.take(np.arange(first, last)),
+            rows=rows,
+            own=int(ends[stop]) - rows.start,
+            junctions=replace(
+                joined,
+                junction=joined.junction - first,
+                before=joined.before - rows.start,
+                after=joined.after - rows.start,
+            ),
+        )
+
+
+def scale_shares(joined: Junctions, pairs: PairErrors) -> tuple[Floats, Floats]:
     """Differentiate the logarithm of the scale handed on by the pass points, seen from the common centre.
 
     The scale k is the weighted mean of the ratios r = |b| / |a| of the vectors before and after: d ln k = sum p r
@@ -124,43 +175,36 @@ def scale_shares(orientation: Orientation, formed: FormedStrip, pairs: PairError
     Returns before, after: (t, 3), by the point in the model before and after the junction, 1/metres; 0 for pass points
         that are not used.
     """
-    joined = formed.junctions
     shares = np.where(joined.used, joined.weight * joined.ratio, 0.0)
-    shares = shares / np.bincount(joined.junction, shares, max(orientation.pairs.size - 1, 1))[joined.junction]
+    shares = shares / np.bincount(joined.junction, shares)[joined.junction]
     vectors = (pairs.point[joined.before] - pairs.base[joined.junction], pairs.point[joined.after])
     before, after = (shares[:, None] * u / (u**2).sum(axis=1)[:, None] for u in vectors)
     return before, after
 
 
-def _image_points(
-    orientation: Orientation, formed: FormedStrip, pairs: PairErrors, position: Numbers, sigma: Floats
-) -> ImagePoints:
-    """Image points of the pairs, ordered by photo, with the error components that depend on them.
+def _add_components(images: ImagePoints, section: _Section, pairs: PairErrors, of_scale: Floats) -> None:
+    """Put in what the image points of a section do to the error components.
 
     A point on photo i enters the elements of the models i - 1 and i directly, and the scale of the models i - 2 to i:
     by its own ray, and by the elements of both models of a junction.
+
+    of_scale: (2, p, 5), scales handed on from these models, and from the models before them, by the elements of these;
+        after the last model none is. What the last junction adds for the pair behind it stays for the next section.
     """
-    row = distinct(orientation.rows)
-    row = row[np.argsort(position[row], kind="stable")]
-    components = np.zeros((len(row), 2, MOVED.stop - MOVED.start))
-    images = ImagePoints(row=row, photo=position[row], sigma=sigma[row], components=components)
-    joined, models = formed.junctions, orientation.pairs.size
-    before, after = scale_shares(orientation, formed, pairs)
-    # elements of a model, and of the next, by which the scale is handed on from it; after the last model it is not
-    of_scale, of_scale_before = (np.zeros((models, 5)) for _ in range(2))
+    orientation, joined, own = section.orientation, section.junctions, slice(section.own)
+    before, after = scale_shares(joined, pairs)
     center_to_point = pairs.point_by_elements[joined.before] - pairs.base_by_elements[joined.junction]
-    add_rows(of_scale, joined.junction, (before[:, None] @ center_to_point)[:, 0])
+    add_rows(of_scale[0], joined.junction, (before[:, None] @ center_to_point)[:, 0])
     by_next = after[:, None] @ pairs.point_by_elements[joined.after]
-    add_rows(of_scale_before, joined.junction + 1, -by_next[:, 0])
-    place, stated = images.rows_of(orientation.rows), sigma[orientation.rows].reshape(-1, 4)
-    by_parallax = pair_errors.elements_by_parallax(orientation, pairs.parallax_by_elements)
-    parallax = np.where(orientation.used[:, None], pairs.parallax_by_image * stated, 0.0)
-    scale, scale_before = (
-        (by_parallax * shares[orientation.pairs.pair]).sum(axis=1) for shares in (of_scale, of_scale_before)
-    )
+    add_rows(of_scale[1], joined.junction + 1, -by_next[:, 0])
+    place, stated = images.rows_of(orientation.rows), images.sigma[images.rows_of(orientation.rows)].reshape(-1, 4)
+    by_parallax = pair_errors.elements_by_parallax(orientation, pairs.parallax_by_elements)[own]
+    parallax = np.where(orientation.used[:, None], pairs.parallax_by_image * stated, 0.0)[own]
+    scale, scale_before = ((by_parallax * shares[orientation.pairs.pair[own]]).sum(axis=1) for shares in of_scale)
     by_parallax = np.column_stack([by_parallax, scale])
-    of_model = np.split(components, [1, 1 + COMPONENTS], axis=2)  # photo - 2, photo - 1, photo: the last is the scale
-    sides = (parallax[:, :2], place[:, 0], 2), (parallax[:, 2:], place[:, 1], 1)
+    # of the models photo - 2, photo - 1 and photo; the last of each is the scale
+    of_model = np.split(images.components, [1, 1 + COMPONENTS], axis=2)
+    sides = (parallax[:, :2], place[own, 0], 2), (parallax[:, 2:], place[own, 1], 1)
     for by_image, image, slot in sides:
         of_model[slot][image] = by_image[:, :, None] * by_parallax[:, None, :]
     for by_image, image, slot in sides:
@@ -170,7 +214,6 @@ def _image_points(
     of_model[2][place[joined.before, 0], :, -1] += by_before[:, :2]
     of_model[1][place[joined.before, 1], :, -1] += by_before[:, 2:] - by_after[:, :2]
     of_model[0][place[joined.after, 1], :, -1] -= by_after[:, 2:]
-    return images
 
 
 def _steps(pairs: PairErrors, next_centers: Floats) -> Floats:
@@ -204,45 +247,84 @@ def _component_covariances(images: ImagePoints, models: int) -> Floats:
     return result
 
 
-def _point_rows(strip: PlacedStrip) -> ErrorRows:
-    """Rows of the points: means over their k models, each brought back over the steps to the first of them (eq. 3)."""
-    orientation, formed, pairs, steps = strip.orientation, strip.formed, strip.pairs, strip.steps
-    rows = np.flatnonzero(orientation.used & np.isfinite(formed.model_xyz).all(axis=1))
-    item = np.searchsorted(formed.point, orientation.point[rows])
-    model, count = orientation.pairs.pair[rows], len(formed.point)
-    first = np.full(count, len(steps))
-    np.minimum.at(first, item, model)
-    if len(formed.home):
-        first = np.where(formed.model_count == 0, formed.home, first)
-    slot = model - first[item]
-    slots = int(slot.max()) + 1
-    share = 1 / formed.model_count[item]
-    place = strip.images.rows_of(orientation.rows)
-    by_image = np.zeros((len(strip.images.row), 3, 2))
-    point_of = np.full(len(strip.images.row), -1)
-    for side, columns in ((0, slice(0, 2)), (1, slice(2, 4))):
-        by_image[place[rows, side]] += share[:, None, None] * pairs.point_by_image[rows, :, columns]
-        point_of[place[rows, side]] = item
-    entries = np.flatnonzero(point_of >= 0)
-    entries = entries[np.argsort(point_of[entries], kind="stable")]
-    by_image = by_image[entries]
-    by_image *= strip.images.sigma[entries][:, None, :]
-    by_component = np.zeros((count, slots, 3, COMPONENTS))
-    by_component[item, slot, :, ELEMENTS] = pairs.point_by_elements[rows]
-    by_component *= (1 / np.maximum(formed.model_count, 1))[:, None, None, None]
-    held = np.zeros((count, slots + 1))
-    held[item, slot] = share
-    beyond = np.cumsum(held[:, ::-1], axis=1)[:, ::-1][:, 1:]  # share of the models after each slot
-    by_similarity = similarity_derivatives(strip.xyz, np.zeros(3))
-    for s in range(slots):
-        moved = np.flatnonzero(beyond[:, s] > 0)
-        for some in np.split(moved, range(IMAGES, len(moved), IMAGES)):  # the steps of all take twice the memory
-            by_component[some, s] += beyond[some, s, None, None] * (by_similarity[some] @ steps[first[some] + s])
-    return ErrorRows(
-        first=first,
-        by_similarity=by_similarity,
-        by_component=by_component,
-        item=point_of[entries],
-        image=entries,
-        by_image=by_image,
-    )
+@dataclass(frozen=True, eq=False)
+class _PointRows:
+    """Rows of the points in the making: means over their k models, each brought back over the steps to the first."""
+
+    strip: PlacedStrip
+    # rows, item, slot: (t,): rows of the pairs' table that count, the point of each, and its model from the first of
+    # the point on
+    rows: Numbers
+    item: Numbers
+    slot: Numbers
+    first: Numbers  # (q,): first model of each point
+    by_component: Floats  # (q, s, 3, 6)
+    point: Numbers  # (e,): point of each image point that enters directly, ascending
+    image: Numbers  # (e,): that image point
+    by_image: Floats  # (e, 3, 2): in mm so far
+    entry: Numbers  # (n,): place of each image point among these, -1 of those that do not enter
+
+    @classmethod
+    def of(cls, strip: PlacedStrip) -> Self:
+        """Lay out rows of zeros."""
+        orientation, formed = strip.orientation, strip.formed
+        rows = np.flatnonzero(orientation.used & np.isfinite(formed.model_xyz).all(axis=1))
+        item = np.searchsorted(formed.point, orientation.point[rows])
+        model, count = orientation.pairs.pair[rows], len(formed.point)
+        first = np.full(count, len(strip.steps))
+        np.minimum.at(first, item, model)
+        if len(formed.home):
+            first = np.where(formed.model_count == 0, formed.home, first)
+        slot = model - first[item]
+        point_of = np.full(len(strip.images.row), -1)
+        point_of[strip.images.rows_of(orientation.rows[rows])] = item[:, None]
+        image = np.flatnonzero(point_of >= 0)
+        image = image[np.argsort(point_of[image], kind="stable")]
+        entry = np.full(len(point_of), -1)
+        entry[image] = np.arange(len(image))
+        return cls(
+            strip=strip,
+            rows=rows,
+            item=item,
+            slot=slot,
+            first=first,
+            by_component=np.zeros((count, int(slot.max()) + 1, 3, COMPONENTS)),
+            point=point_of[image],
+            image=image,
+            by_image=np.zeros((len(image), 3, 2)),
+            entry=entry,
+        )
+
+    def add(self, section: _Section, pairs: PairErrors) -> None:
+        """Put in what the models of a section do to their points."""
+        start = section.rows.start
+        some = slice(*np.searchsorted(self.rows, [start, start + section.own]).tolist())
+        rows, item = self.rows[some], self.item[some]
+        share = (1 / self.strip.formed.model_count[item])[:, None, None]
+        place = self.entry[self.strip.images.rows_of(self.strip.orientation.rows[rows])]
+        for side, columns in ((0, slice(0, 2)), (1, slice(2, 4))):
+            self.by_image[place[:, side]] += share * pairs.point_by_image[rows - start, :, columns]
+        self.by_component[item, self.slot[some], :, ELEMENTS] = share * pairs.point_by_elements[rows - start]
+
+    def finished(self) -> ErrorRows:
+        """Return the rows, all models having been put in."""
+        steps, by_component, first = self.strip.steps, self.by_component, self.first
+        held = np.zeros(by_component.shape[:2])
+        held[self.item, self.slot] = 1 / self.strip.formed.model_count[self.item]
+        beyond = np.cumsum(held[:, ::-1], axis=1)[:, ::-1]
+        by_similarity = similarity_derivatives(self.strip.xyz, np.zeros(3))
+        for s in range(by_component.shape[1] - 1):  # share of the models after each slot
+            moved = np.flatnonzero(beyond[:, s + 1] > 0)
+            for some in np.split(moved, range(IMAGES, len(moved), IMAGES)):  # the steps of all take twice the memory
+                along = by_similarity[some] @ steps[first[some] + s]
+                by_component[some, s] += beyond[some, s + 1, None, None] * along
+        by_image = self.by_image
+        by_image *= self.strip.images.sigma[self.image][:, None, :]
+        return ErrorRows(
+            first=first,
+            by_similarity=by_similarity,
+            by_component=by_component,
+            item=self.point,
+            image=self.image,
+            by_image=by_image,
+        )
