@@ -11,19 +11,21 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from photostrip.arrays import median
+from photostrip.arrays import distinct, median
 from photostrip.camera import Camera
+from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.strips.stages import Stages
-from photostrip.points import PhotoPoints
+from photostrip.points import PhotoPoints, locate, take_rows
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.control import wrong_heights
 from photostrip.triangulation.plausibility.control.wrong_heights import HeightStretch
 from photostrip.triangulation.plausibility.finding import Evidence
+from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs
 
 Compare = Callable[[EvidenceStrip], HeightStretch | None]
 
@@ -38,6 +40,7 @@ BEND_POWER = 1.5  # of the number of photos: so does the bend of a strip grow, w
 TRIALS = 3  # of forming a strip anew
 GIVEN_UP_MISFIT = 60.0  # misfit after two of them
 MOST_PHOTOS = 40  # photos: a longer strip would take too long
+ENOUGH_POINTS = 100  # of a pair of a strip formed for trials, where it has more
 MOST_POINTS = 10_000  # image points of all strips formed for trials: of 20 photos with 100 points one start is followed
 FACTOR_RANGE = (0.05, 5.0)  # of the principal distance given
 FIX = "take it from the certificate"
@@ -59,6 +62,7 @@ def find_wrong_distance(
     formed: EvidenceStrip,
     as_given: HeightStretch | None,
     observations: PhotoPoints,
+    given: Sequence[str],
     settings: Settings,
     compare: Compare,
     stages: Stages | None,
@@ -70,6 +74,7 @@ def find_wrong_distance(
     It is tried where something asks for it: all control together, a misfit larger than a strip bends, or the pairs.
 
     as_given: how the strip fits those heights as it was formed, where that is known.
+    given: ids of given points.
     `compare` compares a formed strip with them.
     stretched: whether all control of the strip together shows that its heights are stretched, or the run doubts some.
     """
@@ -84,8 +89,9 @@ def find_wrong_distance(
     no_bend = first.misfit > len(formed.strip.photos) ** BEND_POWER
     if not (stretched or no_bend or pairs_ask(formed, observations)):
         return []
-    for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(observations)]:
-        trial = _followed(formed.strip, observations, settings, compare, stages, start)
+    some = _some_points(formed.orientation.pairs, observations, given)
+    for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(some)]:
+        trial = _followed(formed.strip, some, settings, compare, stages, start)
         if trial is None or trial.misfit > LEFT_SHARE * first.misfit or trial.sigma0 > MOST_SIGMA0_RATIO * sigma0:
             continue
         in_relief = no_bend or trial.in_relief < LEFT_SHARE * first.in_relief
@@ -104,16 +110,37 @@ def find_wrong_distance(
 
 
 def find_distance_without_pairs(
-    strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare, stages: Stages | None
+    strip: Strip,
+    observations: PhotoPoints,
+    given: Sequence[str],
+    settings: Settings,
+    compare: Compare,
+    stages: Stages | None,
 ) -> list[Finding]:
     """Try other principal distances on a strip whose pairs cannot be oriented (P105, at most one)."""
-    most = _most_starts(observations) if len(strip.photos) <= MOST_PHOTOS else 0
-    for start in FIRST_FACTORS[:most]:
-        trial = _followed(strip, observations, settings, compare, stages, start)
+    if len(strip.photos) > MOST_PHOTOS:
+        return []
+    try:
+        pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+    except GeometryError:
+        return []  # whatever the principal distance
+    some = _some_points(pairs, observations, given)
+    for start in FIRST_FACTORS[: _most_starts(some)]:
+        trial = _followed(strip, some, settings, compare, stages, start)
         if trial is not None and trial.misfit < LEAST_MISFIT:
             numbers: Evidence = {"misfit_then": trial.misfit, "pairs_sigma0_then_mm": trial.sigma0}
             return _finding(strip, trial.factor, "can be formed and fits the heights of its control only", numbers)
     return []
+
+
+def _some_points(pairs: Pairs, observations: PhotoPoints, given: Sequence[str]) -> PhotoPoints:
+    """Leave out what trials of a strip can do without, where its pairs have many points; given points stay."""
+    some = pairs.some_points(ENOUGH_POINTS)
+    if len(some) == len(distinct(pairs.point)):
+        return observations
+    chosen = np.zeros(len(observations.point_ids) + 1, bool)  # the last: given points that nobody measured
+    chosen[some] = chosen[locate(given, observations.point_ids)] = True
+    return take_rows(observations, chosen[observations.point], ("photo", "point", "xy", "sigma"))
 
 
 def _most_starts(observations: PhotoPoints) -> int:

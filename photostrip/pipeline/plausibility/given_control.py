@@ -130,12 +130,19 @@ def _of_distance(
     compare = partial(_compared_in_height, images=images, control=control)
     if formed is not None:
         return distance_trial.find_wrong_distance(
-            formed, stretch, images.observations, images.settings, compare, images.stages, stretched=stretched
+            formed,
+            stretch,
+            images.observations,
+            control.points.ids,
+            images.settings,
+            compare,
+            images.stages,
+            stretched=stretched,
         )
     if images.findings:
         return []
     return distance_trial.find_distance_without_pairs(
-        strip, images.observations, images.settings, compare, images.stages
+        strip, images.observations, control.points.ids, images.settings, compare, images.stages
     )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, median
+from photostrip.arrays import Flags, Floats, Numbers, distinct, median
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.notes import counted
@@ -54,6 +54,13 @@ class Pairs:
         """Leave out rows; each pair must keep one."""
         left = take_rows(self, ~gone, BY_ROW)
         return replace(left, starts=np.searchsorted(left.pair, np.arange(self.size)))
+
+    def some_points(self, most: int) -> Numbers:
+        """Draw points of which each pair has as many as that, or all it has."""
+        order = np.random.default_rng(0).permutation(int(self.point.max()) + 1)[self.point]  # the same in all its pairs
+        rows = np.lexsort((order, self.pair))
+        rank = np.arange(len(rows)) - self.starts[self.pair]
+        return distinct(self.point[rows[rank < most]])
 
     def sums(self, values: Floats) -> Floats:
         """Sum columns over each pair: values by row, shape (..., m), become sums by pair, shape (..., p)."""

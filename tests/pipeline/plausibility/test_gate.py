@@ -16,9 +16,10 @@ from photostrip.cli.main import main
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output.simulation import project_files
 from photostrip.geometry.rotation import angles
-from photostrip.pipeline.inputs import GivenOrientations, Settings
-from photostrip.pipeline.plausibility import evidence, gate, image_evidence
+from photostrip.pipeline.inputs import GivenOrientations, Settings, Strip
+from photostrip.pipeline.plausibility import distance_trial, evidence, gate, image_evidence
 from photostrip.pipeline.run import triangulate
+from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import PhotoPoints
 from photostrip.simulation import (
     DIGITAL,
@@ -234,6 +235,30 @@ def test_the_principal_distance_of_another_lens(factor: float) -> None:
     assert finding.code == "P105"
     if "would_fit_mm" in finding.evidence:
         assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=1.0)
+
+
+@pytest.mark.slow
+def test_trials_of_the_principal_distance_do_without_some_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    inputs = inputs_of(simulation("utm"))
+    strip, form = inputs.strips[0], evidence.form
+    tried: list[PhotoPoints] = []
+    wrong = replace(inputs, strips=(replace(strip, camera=replace(strip.camera, principal_distance=210.0)),))
+
+    def formed(
+        strip: Strip, observations: PhotoPoints, settings: Settings, stages: Stages
+    ) -> evidence.EvidenceStrip | None:
+        tried.append(observations)
+        return form(strip, observations, settings, stages)
+
+    monkeypatch.setattr(distance_trial, "ENOUGH_POINTS", 10)
+    monkeypatch.setattr(evidence, "form", formed)
+    (finding,) = [each for each in told(wrong) if each.severity == "error"]
+    assert finding.code == "P105"
+    assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=2.0)
+    fewest = min(tried, key=len)
+    assert len(fewest) < len(inputs.observations)
+    given = set(inputs.control.ids) & set(inputs.observations.point_ids)
+    assert given <= {fewest.point_ids[point] for point in fewest.point.tolist()}
 
 
 @pytest.mark.slow

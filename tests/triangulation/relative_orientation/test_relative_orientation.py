@@ -92,6 +92,18 @@ def single(observations: PhotoPoints, focal: float) -> Pairs:
     return collect_pairs(observations, observations.photo_ids, focal)
 
 
+def test_a_few_points_of_pairs_are_the_same_ones_in_all_pairs_that_have_them() -> None:
+    photos = {
+        photo: {f"p{k}": [0.1 * k, 0.2 * k] for k in range(count)} for photo, count in (("1", 90), ("2", 90), ("3", 8))
+    }
+    pairs = collect_pairs(measured(photos), tuple(photos), 100.0)
+    some = pairs.some_points(20)
+    chosen = [set(pairs.point[pairs.pair == number].tolist()) & set(some.tolist()) for number in range(2)]
+    assert len(chosen[1]) == 8
+    assert 20 <= len(chosen[0]) == len(some) < 28
+    assert pairs.some_points(90).tolist() == sorted(set(pairs.point.tolist()))
+
+
 # ------------------------------------------------------------------------------------------- published
 
 
