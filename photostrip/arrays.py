@@ -6,6 +6,7 @@ numpy, pyproj and yaml take together.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,6 +16,12 @@ Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]  # counts, and rows of other arrays
 Flags = NDArray[np.bool_]
 Kind = TypeVar("Kind", bound=np.generic)
+PIECE = 4096  # rows
+
+
+def pieces(count: int, most: int = PIECE) -> Iterator[slice]:
+    """Cut rows into pieces: what is worked out of one fits into the processor's cache, and goes before the next."""
+    return (slice(start, min(start + most, count)) for start in range(0, count, most))
 
 
 def distinct(values: NDArray[Kind]) -> NDArray[Kind]:

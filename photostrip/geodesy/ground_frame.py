@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photostrip.arrays import Floats
+from photostrip.arrays import Floats, pieces
 from photostrip.errors import GeometryError, PhotostripError
 from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import Ellipsoid, curvature_correction, meridian_radius, prime_vertical_radius
@@ -313,18 +313,22 @@ class GroundFrame:
         """
         if self._plane is None or self.ellipsoid is None:
             raise PhotostripError(f"{self.spec.name} has no grid")
-        n = len(geodetic)
         plan = self._plane.apply(geodetic[:, :2] / self._angle, inverse=True)
         step = _DERIVATIVE_STEP * self.ellipsoid[0] / self.plan_factor
         offsets = step * np.array([[2, 0], [1, 0], [-1, 0], [-2, 0], [0, 2], [0, 1], [0, -1], [0, -2]])
-        lonlat = self._plane.apply((plan + offsets[:, None, :]).reshape(-1, 2)) * self._angle
-        around = lonlat.reshape(8, n, 2).transpose(1, 0, 2).reshape(n, 16)
-        require_reached(finite_rows(around), f"outside, or at the edge of, the domain of {self.spec.name}", None)
-        # On the ellipsoid: with the height of the point, two lines that cross at right angles there would not here.
-        on_ellipsoid = np.column_stack([lonlat, np.zeros(len(lonlat))])
-        xyz = geocentric_from_geodetic(on_ellipsoid, self.ellipsoid).reshape(2, 4, n, 3)
         weights = np.array([-1.0, 8.0, -8.0, 1.0])
-        return axes_between(*np.einsum("k,aknc->anc", weights, xyz))
+        axes, reached = np.empty((len(geodetic), 3, 3)), np.zeros(len(geodetic), bool)
+        for rows in pieces(len(geodetic)):
+            n = len(plan[rows])
+            lonlat = self._plane.apply((plan[rows] + offsets[:, None, :]).reshape(-1, 2)) * self._angle
+            reached[rows] = finite_rows(lonlat.reshape(8, n, 2).transpose(1, 0, 2).reshape(n, 16))
+            if reached[rows].all():
+                # On the ellipsoid: with the height of the point, lines that cross at right angles there would not here.
+                on_ellipsoid = np.column_stack([lonlat, np.zeros(len(lonlat))])
+                xyz = geocentric_from_geodetic(on_ellipsoid, self.ellipsoid).reshape(2, 4, n, 3)
+                axes[rows] = axes_between(*np.einsum("k,aknc->anc", weights, xyz))
+        require_reached(reached, f"outside, or at the edge of, the domain of {self.spec.name}", None)
+        return axes
 
     def _shifted_axes(self, geodetic: Floats, axes: Floats) -> Floats:
         """Axes of the own datum, carried into the Cartesian frame through the datum shift."""

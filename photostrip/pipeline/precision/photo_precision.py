@@ -44,10 +44,13 @@ def of_photos(
     stated = strip.of_photos.sigma
     factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
-    points, wanted = np.full((len(xyz), 3, 3), np.nan), checks.rows if of_checks else np.arange(len(xyz))
+    wanted = checks.rows if of_checks else np.arange(len(xyz))
     table = errors.points.take(wanted) if of_checks else errors.points
-    of_points = covariances.covariances(errors, table, parameters, lambda rows: fit.influence(xyz[wanted[rows]]))
-    points[wanted] = of_points * factor
+    points = covariances.covariances(errors, table, parameters, lambda rows: fit.influence(xyz[wanted[rows]]))
+    points *= factor
+    if of_checks:
+        of_checked, points = points, np.full((len(xyz), 3, 3), np.nan)
+        points[wanted] = of_checked
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
     for some in () if of_checks else found.photos():
         of_some = covariances.covariances(errors, some.rows, parameters, some.influence.__getitem__)
@@ -113,7 +116,7 @@ def propagation(strip: StripResult, oriented: OrientedStrip[StripErrors], observ
         photo=flown.positions(observations)[rows],
         point=point,
         image=rows,
-        xyz=strip.xyz[point],
+        points=strip.xyz,
         focal=flown.camera.principal_distance,
     )
     return Propagation(

@@ -172,7 +172,7 @@ class FormedPhotos:
             xyz=xyz,
             cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
             rays=np.bincount(points, minlength=len(formed.point)),
-            depth=float(-(arm * resection.rotations[rays.photo][:, :, 2]).sum(axis=1).mean()),
+            depth=float(-(arm * resection.rotations[:, :, 2][rays.photo]).sum(axis=1).mean()),
             notes=(
                 *overruling.notes(settings.relative, strip.id, strip.photos),
                 *notes.screening_notes(strip, self.screened, self.sigma),
@@ -235,9 +235,9 @@ class FormedPhotos:
         """Orient every photo on its adjusted points, so that orientations and points belong together."""
         strip, formed, similarity = self.strip, self.formed, oriented.absolute.similarity
         # A polynomial can move a long strip by much: a photo starts where its points went, on the average.
-        moved = adjusted[points] - similarity(formed.xyz[points])
+        moved = adjusted - similarity(formed.xyz)
         count = np.maximum(np.bincount(rays.photo, minlength=len(strip.photos)), 1)
-        shift = [np.bincount(rays.photo, moved[:, axis], len(strip.photos)) / count for axis in range(3)]
+        shift = [np.bincount(rays.photo, moved[points, axis], len(strip.photos)) / count for axis in range(3)]
         centers = similarity(formed.centers) + np.column_stack(shift)
         start = strip.oriented(centers, similarity.rotation @ formed.rotations)
         resection = resect(self.observations.xy[rays.rows], adjusted[points], rays.photo, start)

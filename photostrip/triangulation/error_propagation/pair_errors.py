@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Floats, Numbers, pieces
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import angle_rates, cross_matrix, from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.orientation import Orientation
@@ -51,7 +51,7 @@ def differentiate_pairs(
     held, count = to_ground @ left.rates / scale[:, None, None], len(pairs.pair)
     point, by_elements, by_image = np.empty((count, 3)), np.empty((count, 3, 5)), np.empty((count, 3, 4))
     parallax_by_elements, parallax_by_image = np.empty((5, count)), np.empty((count, 4))
-    for rows in (slice(start, start + ROWS) for start in range(0, count, ROWS)):
+    for rows in pieces(count, ROWS):
         pair = pairs.pair[rows]
         of_row = _by_row(to_ground, pair)
         with np.errstate(all="ignore"):

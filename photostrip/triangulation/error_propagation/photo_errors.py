@@ -14,7 +14,7 @@ from photostrip.frozen import NamedTuple, dataclass
 from photostrip.points import take_rows
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, ranges
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-from photostrip.triangulation.resection.collinearity import partials
+from photostrip.triangulation.resection.collinearity import distances, partials
 from photostrip.triangulation.resection.resection import Resection, runs
 
 SIGHTINGS = 2048  # gone through at a time; 3000 photos of 30 points take 160 MB less than all at once
@@ -27,11 +27,16 @@ class UsedRays:
     photo: Numbers  # (e,): place of the photo in the strip, ascending
     point: Numbers  # (e,): row of the point in the strip's points
     image: Numbers  # (e,): row in the table of image points
-    xyz: Floats  # (e, 3): adjusted point, metres
+    points: Floats  # (q, 3): adjusted points, metres
     focal: float  # principal distance, mm
 
+    @property
+    def xyz(self) -> Floats:
+        """Adjusted point (e, 3) of each."""
+        return self.points[self.point]
+
     def take(self, rows: Numbers | Flags) -> UsedRays:
-        return take_rows(self, rows, ("photo", "point", "image", "xyz"))
+        return take_rows(self, rows, ("photo", "point", "image"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +57,9 @@ def differentiate_photos(
 
     The points carry the photo with them, and its measurements move it once more: do = sum by_point dX + by_image dl.
     """
-    sightings = sightings.take(resection.solved[sightings.photo])
-    distance = float(np.linalg.norm(sightings.xyz - resection.centers[sightings.photo], axis=1).mean())
+    if not resection.solved.all():
+        sightings = sightings.take(resection.solved[sightings.photo])
+    distance = float(distances(sightings.xyz, resection.centers, sightings.photo).mean())
     ends = np.searchsorted(sightings.photo, np.arange(len(resection.centers) + 1))
     for low, high in runs(ends, SIGHTINGS):
         some = sightings.take(np.arange(ends[low], ends[high]))

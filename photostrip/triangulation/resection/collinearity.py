@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Floats, Numbers, pieces
 from photostrip.frozen import NamedTuple
 
 
@@ -28,8 +28,20 @@ class PhotoPartials(NamedTuple):
 
 def project(points: Floats, photos: KnownPhotos, photo: Numbers) -> Floats:
     """Ideal image coordinates (m, 2), relative to the principal point, of a point and a photo in each row."""
-    ray = np.einsum("mi,mij->mj", points - photos.centers[photo], photos.rotations[photo])
-    return np.asarray(-photos.focal[photo, None] * ray[:, :2] / ray[:, 2:], float)
+    found = np.empty((len(photo), 2))
+    for rows in pieces(len(photo)):
+        some = photo[rows]
+        ray = np.einsum("mi,mij->mj", points[rows] - photos.centers[some], photos.rotations[some])
+        found[rows] = -photos.focal[some, None] * ray[:, :2] / ray[:, 2:]
+    return found
+
+
+def distances(points: Floats, centers: Floats, photo: Numbers) -> Floats:
+    """Distances (m,) of points (m, 3) from the perspective centre of the photo in each row."""
+    found = np.empty(len(photo))
+    for rows in pieces(len(photo)):
+        found[rows] = np.linalg.norm(points[rows] - centers[photo[rows]], axis=1)
+    return found
 
 
 def derivatives(points: Floats, photos: KnownPhotos, photo: Numbers) -> tuple[Floats, Floats]:

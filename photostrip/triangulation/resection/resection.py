@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_vector
-from photostrip.triangulation.resection.collinearity import KnownPhotos, partials, project
+from photostrip.triangulation.resection.collinearity import KnownPhotos, distances, partials, project
 
 ITERATIONS = 20
 CONVERGED = 1e-10  # rad, and of the distance to the points; the next step would be its square
@@ -72,7 +72,7 @@ def resect(
     present = np.flatnonzero(counts)
     starts = np.searchsorted(photo, present)
     distance = np.ones(len(centers))
-    distance[present] = np.add.reduceat(np.linalg.norm(points - centers[photo], axis=1), starts) / counts[present]
+    distance[present] = np.add.reduceat(distances(points, centers, photo), starts) / counts[present]
     converged = np.zeros(len(centers), bool)
     for _ in range(ITERATIONS):
         step = _steps(xy, points, photo, KnownPhotos(centers, rotations, focal), distance, (present, starts))
