@@ -104,7 +104,7 @@ def by_fit(
 
 def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> CheckErrors:
     """Return the errors at the check points of a strip that was adjusted with its own covariance."""
-    return _errors(compared, adjusted.joint_covariance(compared.coordinates.rows), 1.0)
+    return _errors(compared, adjusted.joint_covariance_at(compared.checks.rows, compared.coordinates), 1.0)
 
 
 def _errors(compared: CheckDifferences, covariance: Floats, factor: float) -> CheckErrors:

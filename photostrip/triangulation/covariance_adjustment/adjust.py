@@ -16,7 +16,7 @@ from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, T
 from photostrip.triangulation.covariance_adjustment import conditions as strip_conditions
 from photostrip.triangulation.covariance_adjustment import prediction, relinearisation
 from photostrip.triangulation.covariance_adjustment import system as strip_system
-from photostrip.triangulation.covariance_adjustment.left_out import Without
+from photostrip.triangulation.covariance_adjustment.left_out import PointsLeftOut, Without
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
 from photostrip.triangulation.error_propagation import control_errors, strip_errors
 from photostrip.triangulation.error_propagation.covariances import image_variance
@@ -37,6 +37,7 @@ class CovarianceAdjustment:
     centers: Floats  # (m, 3): perspective centres, metres
     rotations: Floats  # (m, 3, 3): photo to intermediate frame
     control: control_errors.Misclosures  # control coordinates that counted
+    control_rows: Numbers  # (c,): points of the strip that the control gives
     tested: prediction.AdjustmentTest  # test of the whole, and of each of these coordinates
     factor: float  # variance factor of the image coordinates
     basis: str  # where it comes from
@@ -57,6 +58,10 @@ class CovarianceAdjustment:
         rows = self.system.errors.points.take(points)
         if self.left_out is None or self.whole is None:
             return prediction.covariances(self.system, rows) * self.factor
+        predicted = self._predicted(points)
+        if predicted is not None:
+            at = np.arange(len(points))
+            return predicted[at, :, at]
         explained = self.left_out.explained(rows)
         return self.whole.points[points] + explained @ explained.transpose(0, 2, 1) * self.factor
 
@@ -67,6 +72,28 @@ class CovarianceAdjustment:
             explained = self.left_out.explained(rows)[:, 0]
             covariance += explained @ explained.T
         return covariance * self.factor
+
+    def joint_covariance_at(self, points: Numbers, coordinates: control_errors.Misclosures) -> Floats:
+        """Covariances (w, w) of coordinates of some of the points (n,), metres^2."""
+        predicted = self._predicted(points)
+        if predicted is None:
+            return self.joint_covariance(coordinates.rows)
+        point, direction = coordinates.point, coordinates.direction
+        one = np.einsum("wi,wiqj->wqj", direction, predicted[point])[:, point]
+        return np.einsum("wvj,vj->wv", one, direction)
+
+    def _predicted(self, points: Numbers) -> Floats | None:
+        """Covariances (n, 3, n, 3) of some of the points; None where not all are control that is left out."""
+        if self._points_left_out is None:
+            return None
+        place = np.full(len(self.xyz), -1)
+        place[self.control_rows[self._points_left_out.point]] = np.arange(len(self._points_left_out.point))
+        at = place[points]
+        return None if (at < 0).any() else self._points_left_out.covariance[at][:, :, at] * self.factor
+
+    @cached_property
+    def _points_left_out(self) -> PointsLeftOut | None:
+        return None if self.left_out is None else self.left_out.points(self.control, self.factor)
 
     @cached_property
     def photos(self) -> Floats:
@@ -154,6 +181,7 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
         centers=similarity(formed.centers) - photos[:, :3],
         rotations=from_vector(-photos[:, 3:]) @ similarity.rotation @ formed.rotations,
         control=one.strip.misclosures,
+        control_rows=start.control_rows,
         tested=prediction.tested(one.system, len(one.strip.misclosures.point), settings.level),
         factor=factor,
         basis=basis,

@@ -2,12 +2,14 @@
 
 Source: derived. With Pi the part of K^-1 (docs/precision.md, eq. 7) that belongs to a group of conditions and lambda
 their correlates, everything else predicts the group with the error Pi^-1 lambda, whose covariance is Pi^-1. With E the
-unit vectors of the group, K^-1 - K^-1 E Pi^-1 E^T K^-1 takes the place of K^-1 where the group is left out.
+unit vectors of the group, K^-1 - K^-1 E Pi^-1 E^T K^-1 takes the place of K^-1 where the group is left out. Without the
+variances of the given coordinates Pi^-1 is the covariance of the strip at the group.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
 from typing import Self
 
@@ -15,10 +17,12 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass, replace
-from photostrip.triangulation.covariance_adjustment.prediction import with_columns
-from photostrip.triangulation.covariance_adjustment.system import System
+from photostrip.triangulation.covariance_adjustment.prediction import CHECKED, with_columns
+from photostrip.triangulation.covariance_adjustment.system import System, solved_for
+from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
+AXES = 3
 UNCHECKED = 1e-9  # smallest eigenvalue of the scaled Pi of a group that the others determine
 
 
@@ -32,7 +36,7 @@ class LeftOut(NamedTuple):
 def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[LeftOut]:
     """Predict groups of control coordinates (rows of the misclosures), each from all the others."""
     rows = found.conditions.of_control(np.concatenate(groups))
-    inverse = found.columns_of_inverse(rows)[found.layout.block[rows], found.layout.position[rows]]
+    inverse = found.part_of_inverse(rows)
     ends = np.cumsum([0, *(len(group) for group in groups)])
     return [
         _predicted(inverse[start:stop, start:stop], found.correlates[rows[start:stop]])
@@ -40,13 +44,20 @@ def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[LeftOut]:
     ]
 
 
+class PointsLeftOut(NamedTuple):
+    """Points of the control that take no part, as all else predicts them."""
+
+    point: Numbers  # (n,): in the control, ascending
+    covariance: Floats  # (n, 3, n, 3): intermediate frame, for a variance factor of 1
+
+
 @dataclass(frozen=True, eq=False)
 class Without:
     """A solved system without some of its control coordinates."""
 
     system: System  # with them
+    coordinates: Numbers  # (c,): their rows in the misclosures
     rows: Numbers  # (c,): their conditions
-    columns: Floats  # (g, b, c): K^-1 E
     inverse: Floats  # (c, c): Pi^-1
 
     @classmethod
@@ -56,18 +67,37 @@ class Without:
         Raises numpy.linalg.LinAlgError where the others do not determine them.
         """
         rows = found.conditions.of_control(coordinates)
-        columns = found.columns_of_inverse(rows)
-        cofactors = columns[found.layout.block[rows], found.layout.position[rows]]
-        inverse = _inverse(cofactors)
+        inverse = _inverse(found.part_of_inverse(rows))
         if inverse is None:
             raise np.linalg.LinAlgError("the control that is left does not determine what is left out")
-        return cls(system=found, rows=rows, columns=columns, inverse=inverse)
+        return cls(system=found, coordinates=coordinates, rows=rows, inverse=inverse)
 
     @property
     def change(self) -> System:
         """The system with what leaving them out adds to its solution."""
-        added = -(self.columns @ (self.inverse @ self.system.correlates[self.rows]))
-        return replace(self.system, solution=added)
+        value = np.zeros(len(self.system.conditions.value))
+        value[self.rows] = -self.inverse @ self.system.correlates[self.rows]
+        return solved_for(self.system, replace(self.system.conditions, value=value))
+
+    @cached_property
+    def columns(self) -> Floats:
+        """K^-1 E by blocks, shape (g, b, c)."""
+        return self.system.columns_of_inverse(self.rows)
+
+    def points(self, control: Misclosures, factor: float) -> PointsLeftOut:
+        """Predict the points of the control of which all three coordinates are left out.
+
+        control: all coordinates of the control.
+        factor: variance factor of the image coordinates.
+        """
+        point, noise = control.point[self.coordinates], control.variance[self.coordinates] / factor
+        known = np.diag(self.inverse) > (1.0 + CHECKED) * noise  # else nothing is left without the noise
+        order = np.lexsort((control.axis[self.coordinates], point))
+        order = order[np.bincount(point, known)[point[order]] == AXES]
+        turn = np.linalg.inv(control.direction[self.coordinates[order]].reshape(-1, AXES, AXES))
+        along = (self.inverse - np.diag(noise))[np.ix_(order, order)].reshape(len(turn), AXES, -1, AXES)
+        covariance = np.einsum("pia,paqb,qjb->piqj", turn, along, turn)
+        return PointsLeftOut(point[order[::AXES]], covariance)
 
     def influence(self, rows: ErrorRows, conditions: Numbers) -> Floats:
         """Return the part of the influence (n, d, k) of conditions that goes through what is left out."""

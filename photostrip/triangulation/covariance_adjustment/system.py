@@ -204,6 +204,10 @@ class System:
         right[self.layout.block[rows], self.layout.position[rows], np.arange(len(rows))] = 1.0
         return self.factors.solve(right)
 
+    def part_of_inverse(self, rows: Numbers) -> Floats:
+        """Entries (c, c) of K^-1 between conditions."""
+        return self.factors.part_of_inverse(self.layout.block[rows], self.layout.position[rows])
+
     @property
     def unknowns(self) -> Floats:
         """Small similarities y of the models, shape (p, 7)."""

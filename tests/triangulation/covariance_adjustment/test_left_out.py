@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photostrip.triangulation.covariance_adjustment import columns, conditions, prediction, relinearisation, system
-from photostrip.triangulation.covariance_adjustment.left_out import _predicted, left_out_errors
+from photostrip.triangulation.covariance_adjustment import (
+    block_tridiagonal,
+    columns,
+    conditions,
+    prediction,
+    relinearisation,
+    system,
+)
+from photostrip.triangulation.covariance_adjustment.left_out import Without, _predicted, left_out_errors
 from tests.derivatives import errors_of
 from tests.loops import nonempty
 from tests.triangulation.covariance_adjustment.test_covariance_adjustment import noisy
@@ -66,3 +73,44 @@ def test_a_coordinate_of_no_information_cannot_be_predicted() -> None:
     """Image coordinates in another unit left such a one, and a warning of numpy in the user's face."""
     left_out = _predicted(np.array([[0.0, 1e-9], [1e-9, 1.0]]), np.ones(2))
     assert not np.isfinite(left_out.errors).any()
+
+
+def test_points_that_take_no_part_have_the_covariances_of_an_adjustment_without_them() -> None:
+    result = noisy(5, 62.0, 4)
+    (strip,), found = result.strips, errors_of(result)
+    control = found.control
+    given = strip.absolute.misclosures[control.point, control.axis]
+    parts = (found.errors, strip.of_photos.orientation, strip.of_photos.formed)
+    solved = system.system(found.errors, conditions.conditions(*parts, control, given), FACTOR)
+    gone = np.flatnonzero(np.isin(control.point, [1, 4, 7]) & ~((control.point == 4) & (control.axis == 2)))
+    rest = np.setdiff1d(np.arange(len(given)), gone)
+    alone = system.system(found.errors, conditions.conditions(*parts, control.take(rest), given[rest]), FACTOR)
+    left_out = Without.of(solved, gone)
+    points, covariance = left_out.points(control, FACTOR)
+    assert points.tolist() == [1, 7]  # the height of point 4 takes part
+    there = control.take(np.flatnonzero(np.isin(control.point, points)))
+    direction = there.direction.reshape(2, 3, 3)
+    along = np.einsum("pai,piqj,qbj->paqb", direction, covariance, direction)
+    assert along.reshape(6, 6) == pytest.approx(prediction.joint_covariance(alone, there.rows), rel=1e-6, abs=1e-9)
+    assert left_out.change.solution == pytest.approx(
+        -np.einsum("gbc,cd,d->gb", left_out.columns, left_out.inverse, solved.correlates[left_out.rows]), abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("blocks", [[0], [0, 1, 1, 3], [3, 0, 3, 2]])
+def test_a_part_of_the_inverse_is_that_of_the_whole_inverse(blocks: list[int]) -> None:
+    rng, n, b = np.random.default_rng(5), 4, 3
+    whole = np.zeros((n * b, n * b))
+    diagonal, beside = rng.normal(size=(n, b, b)), rng.normal(size=(n, b, b))
+    diagonal += diagonal.transpose(0, 2, 1) + 6 * np.eye(b)
+    for number in range(n):
+        own = slice(number * b, (number + 1) * b)
+        whole[own, own] = diagonal[number]
+        if number + 1 < n:
+            after = slice(own.stop, own.stop + b)
+            whole[own, after], whole[after, own] = beside[number], beside[number].T
+    block, position = np.array(blocks), np.array([1, 0, 2, 2])[: len(blocks)]
+    place = block * b + position
+    expected = np.linalg.inv(whole)[np.ix_(place, place)]
+    factors = block_tridiagonal.eliminate(diagonal, beside, [[]] * n)
+    assert factors.part_of_inverse(block, position) == pytest.approx(expected)
