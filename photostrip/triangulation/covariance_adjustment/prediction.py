@@ -102,14 +102,16 @@ def _explained(of_rows: Columns) -> Floats:
         if not count:
             continue
         before, after = max(number - 1, 0), min(number + 1, found.layout.blocks - 1)
-        first, own, last = columns  # beyond the ends they are 0
-        own = own - found.factors.shares[before].T @ first
-        last = last - found.factors.shares[number].T @ own
-        reduced = np.concatenate([first, own, last])
+        # beyond the ends columns are 0; made for this loop, they give room to what they become
+        columns[1] -= found.factors.shares[before].T @ columns[0]
+        columns[2] -= found.factors.shares[number].T @ columns[1]
         inverses, later = found.factors.inverses, found.factors.diagonal_of_inverse
-        weights = inverses[before], inverses[number], later[after]
-        weighted = np.concatenate([weight @ each for weight, each in zip(weights, (first, own, last), strict=True)])
-        left, right = (each.reshape(-1, count, size) for each in (reduced, weighted))
+        weighted = np.empty_like(columns)
+        for weight, one, result in zip(
+            (inverses[before], inverses[number], later[after]), columns, weighted, strict=True
+        ):
+            np.matmul(weight, one, out=result)
+        left, right = (each.reshape(-1, count, size) for each in (columns, weighted))
         known[rows] = left.transpose(1, 2, 0) @ right.transpose(1, 0, 2)
     return known
 

@@ -167,15 +167,15 @@ class BlockMatrix:
     diagonal: Floats
     beside: Floats
 
-    def add(self, model: int, rows: slice, other: int, columns: slice, values: Floats) -> None:
-        """Add values at rows of a model's block, columns of that of the same or a later model, and mirrored."""
-        block, target = model // self.layout.width, other // self.layout.width
-        if target > block:
-            self.beside[block, rows, columns] += values
+    def put(self, model: int, rows: slice, other: int, columns: slice, values: Floats) -> None:
+        """Put values at rows of a model's block, columns of that of the same or a later model, and mirrored."""
+        block = model // self.layout.width
+        if other // self.layout.width > block:
+            self.beside[block, rows, columns] = values
         else:
-            self.diagonal[block, rows, columns] += values
+            self.diagonal[block, rows, columns] = values
             if other != model:  # or the values have both sides
-                self.diagonal[block, columns, rows] += values.T
+                self.diagonal[block, columns, rows] = values.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +227,7 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     padded = PaddedRows.of(errors, rows, NearImages.of(errors, rows).with_components, slots, range(errors.models))
     shape = (layout.blocks, layout.height, layout.height)
     matrix = BlockMatrix(layout, np.zeros(shape), np.zeros(shape))
-    _add_covariances(matrix, padded, rows)
+    _put_covariances(matrix, padded, rows)
     _add_design(matrix, wanted)
     matrix.diagonal[layout.block, layout.position, layout.position] += wanted.noise / factor
     blocks, places = layout.empty()
@@ -256,15 +256,15 @@ def _solution(layout: SystemLayout, factors: block_tridiagonal.Factors, value: F
     return np.asarray(factors.solve(right)[:, :, 0], float)
 
 
-def _add_covariances(matrix: BlockMatrix, padded: PaddedRows, rows: ErrorRows) -> None:
-    """Add Q, the covariances of the conditions."""
+def _put_covariances(matrix: BlockMatrix, padded: PaddedRows, rows: ErrorRows) -> None:
+    """Put Q, the covariances of the conditions, into an empty matrix."""
     layout = matrix.layout
     inside = [slice(*bounds) for bounds in zip(layout.start.tolist(), layout.unknown.tolist(), strict=True)]
     for apart in range(min(layout.width, len(inside) - 1) + 1):
         values = products(padded, padded, range(len(inside) - apart), apart)
         for model, (one, other, value) in enumerate(zip(inside, inside[apart:], values, strict=False)):
             part = value[: one.stop - one.start, : other.stop - other.start]
-            matrix.add(model, one, model + apart, other, part)
+            matrix.put(model, one, model + apart, other, part)
     shared = same_images(rows, rows)  # every pair in both orders
     block, position = ((each[shared.first], each[shared.second]) for each in (layout.block, layout.position))
     place = (block[0] * layout.height + position[0]) * layout.height + position[1]

@@ -121,7 +121,10 @@ def of_parameters(
 
 def by_images(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
     """Coefficients (k, 2) of all image coordinates in a weighted sum of rows with d = 1."""
-    images, by_component = errors.images, _summed_components(errors, rows, weights[:, None])[:, :, 0]
+    images, coefficients = errors.images, by_model(rows)[:, 0]
+    by_first = np.zeros((errors.models + 1, coefficients.shape[1]))
+    add_rows(by_first, rows.first, coefficients * weights[:, None])
+    by_component = _summed_components(errors, by_first[:, :, None])[:, :, 0]
     none = np.zeros((SHARING, COMPONENTS))
     padded = np.concatenate([none, by_component, none])
     around = np.concatenate([padded[slot : slot + errors.models + 1] for slot in range(SPAN)], axis=1)
@@ -154,7 +157,10 @@ def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Sums:
     model by model, of the image points on the photos around it.
     """
     images = errors.images
-    by_component = _summed_components(errors, rows, operator.T)
+    coefficients = by_model(rows)
+    by_first = np.zeros((errors.models + 1, coefficients.shape[2], len(operator)))
+    add_products(by_first, rows.first, coefficients, operator.T[:, None])
+    by_component = _summed_components(errors, by_first)
     image, entry = np.unique(rows.image, return_inverse=True)
     by_image = np.zeros((len(image), 2, len(operator)))
     add_rows(by_image, entry, rows.by_image[:, 0, :, None] * operator.T[rows.item][:, None, :])
@@ -173,18 +179,18 @@ def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Sums:
     )
 
 
-def _summed_components(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
-    """Coefficients of the components in weighted sums of rows with d = 1, shape (p, 6, t)."""
-    models, count = errors.models, weights.shape[1]
-    by_first = np.zeros((models + 1, SIMILARITY_PARAMETERS + rows.by_component.shape[1] * COMPONENTS, count))
-    add_products(by_first, rows.first, by_model(rows), weights[:, None])
+def _summed_components(errors: StripErrors, by_first: Floats) -> Floats:
+    """Coefficients of the components (p, 6, t) in sums of rows with d = 1.
+
+    by_first: (p + 1, 7 + 6 s, t), for each first model the sum of what ``by_model`` gives of its rows.
+    """
     by_similarity, *by_component = np.split(
         by_first, range(SIMILARITY_PARAMETERS, by_first.shape[1], COMPONENTS), axis=1
     )
     after = np.cumsum(by_similarity[::-1], axis=0)[::-1][1:]  # rows whose first model comes after each model
     result: Floats = errors.steps.transpose(0, 2, 1) @ after
     for slot, part in enumerate(by_component):
-        result[slot:] += part[: max(models - slot, 0)]
+        result[slot:] += part[: max(errors.models - slot, 0)]
     return result
 
 
