@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 LARGEST_SCATTER = 0.01
 # of what was taken out as the worst for each one more that goes at a time: the work grows with its logarithm
 OUT_TO_ONE_MORE = 8
-AT_ONCE = 64  # pairs, or points to decide on, for the sake of memory; it changes no result
+AT_ONCE = 64  # pairs, for the sake of memory; it changes no result
 
 
 @dataclass(frozen=True, eq=False)

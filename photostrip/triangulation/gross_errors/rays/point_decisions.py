@@ -22,8 +22,8 @@ from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.quality.reliability import Limit
 from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST_SET, subsets
-from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
 
+RAYS_AT_ONCE = 2048  # of points that are decided on together, for the sake of memory; it changes no result
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
 TWO = 2  # rays
 REGULARISATION = 1e-9  # keeps a point that holds its photos alone from stopping the others
@@ -70,7 +70,8 @@ def alike(rays: Numbers, known: Numbers) -> Iterator[Numbers]:
     size = rays * (known.max(initial=0) + 1) + known
     for each in distinct(size):
         places = np.flatnonzero(size == each)
-        yield from np.split(places, range(AT_ONCE, len(places), AT_ONCE))
+        at_once = max(1, RAYS_AT_ONCE // int(rays[places[0]]))
+        yield from np.split(places, range(at_once, len(places), at_once))
 
 
 def decide(points: PointRays, limit: Limit) -> Decisions:

@@ -17,7 +17,6 @@ from photostrip.geometry.rotation import from_vector
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.statistics import chi2_quantile, normal_quantile
 from photostrip.triangulation.bundle.quality.reliability import Limit
-from photostrip.triangulation.gross_errors.pairs.pair_search import AT_ONCE
 from photostrip.triangulation.gross_errors.rays import point_decisions
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
     CAUSES,
@@ -274,11 +273,12 @@ def test_points_are_decided_on_together_as_one_by_one() -> None:
     assert {each.cause for each in decided} == {"", WRONG_RAY, SEVERAL_RAYS}
 
 
-def test_points_with_as_many_rays_are_taken_some_at_a_time() -> None:
-    sizes = [(2, 0), (3, 0), (2, 3), (3, 0)] * AT_ONCE
+def test_points_with_as_many_rays_are_taken_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(point_decisions, "RAYS_AT_ONCE", 12)
+    sizes = [(2, 0), (3, 0), (2, 3), (3, 0), (20, 0)] * 6
     rays, known = np.array(sizes).T
     found = [each.tolist() for each in point_decisions.alike(rays, known)]
-    assert [len(each) for each in found] == [AT_ONCE] * 4
+    assert [len(each) for each in found] == [6, 6, 4, 4, 4, *[1] * 6]
     assert sorted(place for each in found for place in each) == list(range(len(sizes)))
     assert all(len({sizes[place] for place in each}) == 1 for each in nonempty(found))
 
