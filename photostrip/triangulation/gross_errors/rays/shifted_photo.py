@@ -103,7 +103,8 @@ class _Network:
                 continue  # it would explain less
             freed = solve(selected(self._freed([photo]), rays), rough=True)
             explained = (plain.chi_square - freed.chi_square) / _unit(freed) ** 2
-            if explained > most:
+            size = np.abs(self.problem.images.xy[self.problem.images.photo == photo]).max()
+            if explained > most and np.abs(freed.common).max() < size:  # no photo lies beside all that it shows
                 best, most = photo, explained
         limit = limit_of(self.solution, SEARCH, 0).value
         return self._screened(best) if most > len(PRINCIPAL_POINT) * limit**2 else None
