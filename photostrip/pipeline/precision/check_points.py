@@ -47,10 +47,15 @@ class Propagation:
 
 
 class CheckPoints(NamedTuple):
-    """Check points that a strip holds, along it, and their rows (c,) in ``strip.formed.point``."""
+    """Check points that a strip holds, along it."""
 
-    points: ControlPoints
-    rows: Numbers
+    control: ControlPoints  # all given points
+    chosen: Numbers  # (c,): rows of the check points there
+    rows: Numbers  # (c,): their rows in ``strip.formed.point``
+
+    @property
+    def points(self) -> ControlPoints:
+        return self.control.take(self.chosen)
 
     def spread(self) -> CheckPoints:
         """Those that are tested together."""
@@ -58,7 +63,7 @@ class CheckPoints(NamedTuple):
         if count <= MOST_TESTED:
             return self
         some = np.linspace(0, count - 1, MOST_TESTED).round().astype(int)
-        return CheckPoints(self.points.take(some), self.rows[some])
+        return self._replace(chosen=self.chosen[some], rows=self.rows[some])
 
 
 def check_points(strip: StripResult, control: ControlPoints, observations: PhotoPoints) -> CheckPoints:
@@ -66,7 +71,7 @@ def check_points(strip: StripResult, control: ControlPoints, observations: Photo
     rows = rows_of_given(control.ids, strip.formed.point, observations.point_ids)
     found = np.flatnonzero(control.check & (rows >= 0) & control.use.any(axis=1))
     found = found[np.argsort(strip.xyz[rows[found], 0], kind="stable")]
-    return CheckPoints(control.take(found), rows[found])
+    return CheckPoints(control, found, rows[found])
 
 
 @dataclass(frozen=True, eq=False)

@@ -310,7 +310,8 @@ def form_strip(
             point_weight=point_weight,
         )
         rejections = with_readmitted(screened.rejections, oriented.used)
-        screened = replace(screened, orientation=oriented, rejections=rejections)
+        # as a fresh value: the rays of the old one, 48 bytes for each of its rows, are not needed again
+        screened = replace(screened, orientation=replace(oriented), rejections=rejections)
     return FormedPhotos(
         strip=strip,
         observations=observations,

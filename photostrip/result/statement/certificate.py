@@ -9,15 +9,19 @@ latitude 8, angles of photos 4 (radians 6).
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
+from itertools import chain, groupby, islice
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photostrip import __version__
+from photostrip.arrays import pieces
 from photostrip.geodesy.proj_operation import proj_versions
 from photostrip.notes import Document
 from photostrip.result.records import Records
@@ -56,18 +60,26 @@ def certificate_of(
 
 def result_hash(document: Document) -> str:
     """Return the hash of the numbers of a result as reports print them; the same on every machine."""
-    return hashlib.sha256("\n".join(_lines(document)).encode()).hexdigest()
+    found, before = hashlib.sha256(), ""
+    for lines in _lines(document):
+        found.update(f"{before}{lines}".encode())
+        before = "\n"
+    return found.hexdigest()
 
 
 def _lines(document: Document) -> Iterator[str]:
+    """Give the lines that are hashed, one or some together."""
     frame = document["frame"]
     yield f"{document['adjustment']} {frame['crs']} {' '.join(frame['axes'])}"
     places = [DEGREES if frame["kind"] == "geographic" and axis != "up" else METRES for axis in frame["axes"]]
     yield from _rows("point", document["points"], ("id", "role"), dict(zip("xyz", places, strict=True)))
     yield from _rows("photo", document["photos"], ("id",), dict(zip("xyz", places, strict=True)))
-    for photo in document["photos"]:
-        angles = photo["angles"]
-        yield f"angles {' '.join(_written(angles['values'] or (), ANGLES[angles['unit']]))}"
+    photos = document["photos"]
+    angles = photos.columns["angles"] if isinstance(photos, Records) else [photo["angles"] for photo in photos]
+    for unit, of_unit in groupby(angles, itemgetter("unit")):
+        values = [each["values"] or () for each in of_unit]
+        written = iter(_written(chain.from_iterable(values), ANGLES[unit]))
+        yield "\n".join(f"angles {' '.join(islice(written, len(each)))}" for each in values)
     yield from _rows("given", document["control"], ("id", "role", "use"), dict.fromkeys(("dx", "dy", "dz"), METRES))
     yield from _rows("rejected", document["rejected"], ("photo", "point", "stage"), {})
     yield f"verdict {document['status']}"
@@ -91,18 +103,23 @@ def _figures(value: Any) -> Iterator[str]:  # noqa: ANN401 (any value)
 
 def _rows(what: str, rows: Records | list[Document], texts: Sequence[str], numbers: Mapping[str, int]) -> Iterator[str]:
     """Write a line for each record, with these texts and these numbers."""
+    keys = (*texts, *numbers)
+    columns = [rows.columns[key] if isinstance(rows, Records) else [row[key] for row in rows] for key in keys]
+    for part in pieces(len(rows)):
+        cells = [list(map(str, column[part])) for column in columns[: len(texts)]]
+        cells += [
+            _written(column[part], number)
+            for column, number in zip(columns[len(texts) :], numbers.values(), strict=True)
+        ]
+        yield "\n".join(f"{what} {' '.join(row)}" for row in zip(*cells, strict=True))
 
-    def column(key: str) -> Sequence[Any]:
-        return rows.columns[key] if isinstance(rows, Records) else [row[key] for row in rows]
 
-    cells = [[str(value) for value in column(key)] for key in texts]
-    cells += [_written(column(key), places) for key, places in numbers.items()]
-    yield from (f"{what} {' '.join(row)}" for row in zip(*cells, strict=True))
-
-
-def _written(values: Sequence[float | None], decimals: int) -> list[str]:
-    form = f"z.{decimals}f"
-    return ["-" if value is None else format(value, form) for value in values]
+def _written(values: Iterable[float | None], decimals: int) -> list[str]:
+    """Write numbers with these decimals, ``-`` for those that do not exist, never ``-0``: all by one form."""
+    known = [math.nan if value is None else value for value in values]
+    zero = f"{0.0:.{decimals}f}\n"
+    text = f"%.{decimals}f\n" * len(known) % tuple(known)
+    return text.replace(f"-{zero}", zero).replace("nan", "-").split("\n")[:-1]
 
 
 @cache
