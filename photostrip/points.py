@@ -39,8 +39,11 @@ def take_rows(table: T, rows: Sequence[int] | Numbers | Flags, columns: Iterable
     chosen: dict[str, Any] = {}
     for name in columns:
         column = getattr(table, name)
-        numbers = np.arange(len(column))[np.asarray(rows)] if len(column) else np.zeros(0, np.intp)
-        chosen[name] = tuple(column[i] for i in numbers) if isinstance(column, tuple) else column[numbers]
+        numbers = np.asarray(rows) if len(column) else np.zeros(0, np.intp)
+        if isinstance(column, tuple):
+            chosen[name] = tuple(column[row] for row in np.arange(len(column))[numbers].tolist())
+        else:
+            chosen[name] = column[numbers]
     return replace(cast("Any", table), **chosen)
 
 

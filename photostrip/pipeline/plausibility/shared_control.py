@@ -102,16 +102,17 @@ def find_shifted_checks(result: Result) -> Iterator[Finding]:
 def _common_shift(checks: Sequence[CheckErrors]) -> tuple[Numbers, Shared | None]:
     """Test one shift of all check points against none, and against one wrong point; along the axes that are given."""
     axes = distinct(np.array([axis for each in checks for axis in each.axis], np.intp))
-    normal, pull, alone = np.zeros((len(axes), len(axes))), np.zeros(len(axes)), 0.0
+    normal, pull, squares, alone = np.zeros((len(axes), len(axes))), np.zeros(len(axes)), 0.0, 0.0
     for each in checks:
         weight = np.linalg.inv(each.covariance)
         columns, pulled = (each.axis[:, None] == axes).astype(float), weight @ each.difference
         normal, pull = normal + columns.T @ weight @ columns, pull + columns.T @ pulled
+        squares += float(each.difference @ pulled)
         for point in distinct(each.point):
             rows = np.flatnonzero(each.point == point)
             alone = max(alone, float(pulled[rows] @ np.linalg.solve(weight[np.ix_(rows, rows)], pulled[rows])))
     count = sum(each.coordinates for each in checks)
-    return axes, significant(normal, pull, sum(each.squares for each in checks), count - len(axes), alone)
+    return axes, significant(normal, pull, squares, count - len(axes), alone)
 
 
 def _stretched(strip: Strip, stretch: StretchedHeights, then: str) -> Finding:

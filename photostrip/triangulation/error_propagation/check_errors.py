@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import cached_property
 
 import numpy as np
 
@@ -45,7 +46,7 @@ class CheckErrors:
         """Number of coordinates, which is the expectation of the sum of squares."""
         return len(self.difference)
 
-    @property
+    @cached_property
     def squares(self) -> float:
         """e^T C^-1 e with the covariance C of the differences e."""
         return float(self.difference @ np.linalg.solve(self.covariance, self.difference))

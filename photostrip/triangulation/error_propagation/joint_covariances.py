@@ -23,7 +23,7 @@ from photostrip.triangulation.error_propagation.covariances import (
     steps_before,
     with_parameters,
 )
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, ErrorRows, ranges
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
@@ -81,8 +81,9 @@ def after_fit(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, i
 
 def _same_images(rows: ErrorRows) -> Floats:
     """Products (n, n) of the image coordinates that enter two rows directly."""
-    image, entry = np.unique(rows.image, return_inverse=True)
-    by_image = np.zeros((len(image), len(rows.first), 2))
-    np.add.at(by_image, (entry, rows.item), rows.by_image[:, 0])
-    flat = by_image.transpose(1, 0, 2).reshape(len(rows.first), -1)
-    return np.asarray(flat @ flat.T, float)
+    count, order = len(rows.first), np.argsort(rows.image, kind="stable")
+    image = rows.image[order]
+    first, place = ranges(np.searchsorted(image, image), np.searchsorted(image, image, side="right"))
+    by_image, item = rows.by_image[order, 0], rows.item[order]
+    values = (by_image[first] * by_image[place]).sum(axis=1)
+    return np.asarray(np.bincount(item[first] * count + item[place], values, count**2).reshape(count, count), float)

@@ -39,7 +39,10 @@ class Sizes:
 def columns(xyz: Floats, terms: Sequence[str]) -> Floats:
     """Design columns (n, k) of the terms, powers of X and Y of positions (n, 3), unscaled."""
     x, y = xyz[:, 0], xyz[:, 1]  # eq. 150
-    return np.column_stack([x**i * y**j for i, j in (POWERS[t] for t in terms)] or [np.zeros((len(xyz), 0))])
+    result = np.empty((len(xyz), len(terms)))
+    for column, (i, j) in enumerate(POWERS[term] for term in terms):
+        np.multiply(x**i, y**j, out=result[:, column])
+    return result
 
 
 def count_stations(x: Floats, spacing: float) -> int:

@@ -27,7 +27,6 @@ from photostrip.triangulation.bundle.selection import Selection, restarted, sele
 from photostrip.triangulation.bundle.settings import CALIBRATION, BundleSettings
 from photostrip.triangulation.bundle.solution import BundleSolution
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.gross_errors.rays.snooping import screen_bundle
 from photostrip.triangulation.gross_errors.rays.strip_network import STRIP_LEVEL, free_network
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -139,6 +138,8 @@ class _Network:
         return self.selection(self.used | np.isin(self.rows, self.oriented.rows[(pair == photo) | (pair == photo - 1)]))
 
     def _screened(self, photo: int) -> ShiftedPhoto | None:
+        from photostrip.triangulation.gross_errors.rays.snooping import screen_bundle  # with 10 modules more
+
         rays = self._put_back(photo)
         after = screen_bundle(self._freed([photo]), rays, SEARCH, rough=True)
         unit = _unit(after.solution)

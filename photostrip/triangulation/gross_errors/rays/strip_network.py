@@ -19,7 +19,6 @@ from photostrip.triangulation.bundle.observations.problem import (
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.gross_errors.pairs.global_test import ALPHA, FIFTH_WRONG
-from photostrip.triangulation.gross_errors.rays.snooping import screen_bundle
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
@@ -35,6 +34,8 @@ def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> t
 
     None where what is left holds the photos too badly for an adjustment.
     """
+    from photostrip.triangulation.gross_errors.rays.snooping import screen_bundle  # with 10 modules more
+
     rows = distinct(oriented.rows)
     sigma = rays.observations.sigma[rows] * _spread_of_photos(oriented, rays)[rays.position[rows], None]
     problem = free_network(oriented, formed, rays.observations, rays.position, rows, sigma)
