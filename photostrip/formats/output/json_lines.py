@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 kind_of = attrgetter("__class__")  # in a third of the time of a loop
 
 
-def lines(columns: Mapping[str, Sequence[Plain]], encode: Encoder) -> str:
-    """Write records, given as columns, each on a line of its own."""
+def joined(columns: Mapping[str, Sequence[Plain]], between: str, encode: Encoder) -> str:
+    """Write records, given as columns, one after the other with something between them."""
     count = len(next(iter(columns.values())))
-    return number_columns.joined([*_objects(columns, encode), number_columns.repeated(",\n", count)])[:-2]
+    return number_columns.joined([*_objects(columns, encode), number_columns.repeated(between, count)])[: -len(between)]
 
 
 def columns_of(records: Sequence[Mapping[str, Plain]]) -> dict[str, list[Plain]] | None:

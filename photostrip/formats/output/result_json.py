@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
@@ -49,37 +50,58 @@ def _pieces(document: Document, encode: Encoder) -> Iterator[str]:
 
 def _block(value: Plain, encode: Encoder) -> Iterator[str]:
     if value and (isinstance(value, Records) or (isinstance(value, list) and isinstance(value[0], dict))):
-        columns = value.columns.values() if isinstance(value, Records) else ()
-        listed = max((len(column.values) for column in columns if isinstance(column, Grouped)), default=0)
-        at_once = max(min(LINES, LISTED * len(value) // max(listed, 1)), 1)
-        for start in range(0, len(value), at_once):
-            yield ",\n" if start else "[\n"
-            yield _lines(value[start : start + at_once], encode, by_columns=len(value) >= FEW_LINES)
+        yield "[\n"
+        yield from _records(value, ",\n", encode)
         yield "\n]"
         return
     if isinstance(value, dict):
-        parts = [f"{encode.text(key)}: {_text(each, encode)}" for key, each in value.items()]
-        if sum(map(len, parts)) + 2 * len(parts) > LONGEST_LINE:
-            yield "{\n" + ",\n".join(f"  {part}" for part in parts) + "\n}"
+        parts = [[f"{encode.text(key)}: ", *_on_one_line(each, encode)] for key, each in value.items()]
+        if sum(map(len, chain.from_iterable(parts))) + 2 * len(parts) > LONGEST_LINE:
+            before = "{\n  "
+            for part in parts:
+                yield before
+                yield from part
+                before = ",\n  "
+            yield "\n}"
             return
-    yield _text(value, encode)
+    yield from _on_one_line(value, encode)
 
 
-def _lines(records: Records | list[Document], encode: Encoder, *, by_columns: bool) -> str:
-    """Write each record on a line of its own."""
+def _records(records: Records | list[Document], between: str, encode: Encoder) -> Iterator[str]:
+    """Write records, some at a time."""
+    columns = records.columns.values() if isinstance(records, Records) else ()
+    listed = max((len(column.values) for column in columns if isinstance(column, Grouped)), default=0)
+    at_once = max(min(LINES, LISTED * len(records) // max(listed, 1)), 1)
+    for start in range(0, len(records), at_once):
+        if start:
+            yield between
+        yield _joined(records[start : start + at_once], between, encode, by_columns=len(records) >= FEW_LINES)
+
+
+def _joined(records: Records | list[Document], between: str, encode: Encoder, *, by_columns: bool) -> str:
     if by_columns:
         from photostrip.formats.output import json_lines  # with numpy, which nobody needs who reads a result
 
         columns = records.columns if isinstance(records, Records) else json_lines.columns_of(records)
         if columns is not None:
-            return json_lines.lines(columns, encode)
-    return ",\n".join(map(encode.value, records))
+            return json_lines.joined(columns, between, encode)
+    return between.join(map(encode.value, records))
 
 
-def _text(value: Plain, encode: Encoder) -> str:
-    if isinstance(value, dict):
-        return f"{{{', '.join(f'{encode.text(key)}: {_text(each, encode)}' for key, each in value.items())}}}"
-    return encode.value(value)
+def _on_one_line(value: Plain, encode: Encoder) -> Iterator[str]:
+    if value and isinstance(value, dict):
+        before = "{"
+        for key, each in value.items():
+            yield f"{before}{encode.text(key)}: "
+            yield from _on_one_line(each, encode)
+            before = ", "
+        yield "}"
+    elif value and isinstance(value, Records):
+        yield "["
+        yield from _records(value, ", ", encode)
+        yield "]"
+    else:
+        yield encode.value(value)
 
 
 def parsed(file: str, block: Callable[[Document], Document] | None = None) -> Any:  # noqa: ANN401 (any JSON)
