@@ -52,6 +52,6 @@ def alike(one: object, other: object) -> bool:
         return np.array_equal(one, np.asarray(other), equal_nan=one.dtype.kind == "f")
     if names := names_of(type(one)):
         return all(alike(getattr(one, name), getattr(other, name)) for name in names)
-    if isinstance(one, tuple) and isinstance(other, tuple):
+    if isinstance(one, tuple) and isinstance(other, tuple) and set(map(type, one)) != {str}:
         return len(one) == len(other) and all(map(alike, one, other))
     return bool(one == other)

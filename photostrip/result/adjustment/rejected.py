@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
@@ -12,7 +14,7 @@ from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY, Rejection
 from photostrip.result.adjustment.bundle import GroupKind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
-from photostrip.result.numbers import natural, rounded
+from photostrip.result.numbers import Plain, natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record, records
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.strip_formation.scale_transfer import depths
@@ -63,9 +65,7 @@ def rejected_of(result: Result) -> list[Document]:
     if result.bundle is None:
         return found
     written = kinds(result.settings.angle_unit)
-    return _after_bundle(result.bundle, found) + [
-        _from_bundle(result.bundle, each, written[each.kind]) for each in result.bundle.screened.rejections
-    ]
+    return _after_bundle(result.bundle, found) + _from_bundle(result.bundle, written)
 
 
 def _entry(**values: object) -> Document:
@@ -288,28 +288,43 @@ def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
     return rows
 
 
-def _from_bundle(found: Bundle, each: Rejection, kind: GroupKind) -> Document:
-    photo, point = names_of_observation(found.block.problem, each.kind, each.row)
-    size = rounded(each.worst * kind.factor, DECIMALS_BY_UNIT[kind.unit])
+def _from_bundle(found: Bundle, written: Mapping[str, GroupKind]) -> list[Document]:
+    """Observations that the search in the bundle took out, in its order."""
+    every, problem = found.screened.rejections, found.block.problem
+    strip_of = {photo: strip.strip.id for strip in reversed(found.start.strips) for photo in strip.strip.photos}
+    entries: list[Document] = [{}] * len(every)
+    for name, kind in written.items():
+        places = [place for place, each in enumerate(every) if each.kind == name]
+        some = [every[place] for place in places]
+        names = [names_of_observation(problem, name, each.row) for each in some]
+        size = [rounded(each.worst * kind.factor, DECIMALS_BY_UNIT[kind.unit]) for each in some]
+        made = _entries(
+            strip=[strip_of.get(photo or "", "") for photo, _ in names],
+            photo=[photo for photo, _ in names],
+            point=[point for _, point in names],
+            stage="bundle",
+            test=[each.test for each in some],
+            value=np.array([each.value for each in some]),
+            limit=np.array([each.limit for each in some]),
+            size=size,
+            size_unit=[kind.unit] * len(some),
+            readmitted=[each.readmitted for each in some],
+            blamed=[
+                [photo] if each.cause == WRONG_RAY and not each.readmitted else []
+                for each, (photo, _) in zip(some, names, strict=True)
+            ],
+            reason=[_reason_of_bundle(each, kind, shift) for each, shift in zip(some, size, strict=True)],
+        )
+        for place, entry in zip(places, made, strict=True):
+            entries[place] = entry
+    return entries
+
+
+def _reason_of_bundle(each: Rejection, kind: GroupKind, size: Plain) -> str:
     if each.readmitted:
-        reason = "taken back: it fits after the others went"
-    elif each.cause in {TWO_RAYS, SEVERAL_RAYS}:
-        reason = REASONS[each.cause]
-    elif size is None:
-        reason = "does not fit the other observations"
-    else:
-        reason = f"{kind.axes[each.axes[0]]} is wrong by about {size:+g} {kind.unit.replace('um', 'µm')}"
-    return _entry(
-        strip=next((strip.strip.id for strip in found.start.strips if photo in strip.strip.photos), ""),
-        photo=photo,
-        point=point,
-        stage="bundle",
-        test=each.test,
-        value=each.value,
-        limit=each.limit,
-        size=size,
-        size_unit=kind.unit,
-        readmitted=each.readmitted,
-        blamed=[photo] if each.cause == WRONG_RAY and not each.readmitted else [],
-        reason=reason,
-    )
+        return "taken back: it fits after the others went"
+    if each.cause in {TWO_RAYS, SEVERAL_RAYS}:
+        return REASONS[each.cause]
+    if size is None:
+        return "does not fit the other observations"
+    return f"{kind.axes[each.axes[0]]} is wrong by about {size:+g} {kind.unit.replace('um', 'µm')}"
