@@ -27,6 +27,7 @@ SIGNIFICANT = 4  # digits of what has no natural size
 EXACT = 12  # digits of what others compute with
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}  # units of angles
 AT_ONCE = 2000  # numbers of a column that are read together, for the sake of memory
+SIGNS = ("utf-32-le", "surrogatepass")
 WHOLE_NUMBERS = re.compile("([0-9]+)")
 TENS = 10.0 ** np.arange(23)  # those that a float holds exactly
 TIE = 1e-3  # parts of the last digit by which a number must be off the middle between two
@@ -132,12 +133,17 @@ def _padded(names: Sequence[str]) -> list[Any]:
     text = "\n".join(names)
     if text.count("\n") != len(names) - 1 or "\0" in text:
         return []
-    parts = WHOLE_NUMBERS.split(text)
-    width = max((len(part.lstrip("0")) for part in parts[1::2]), default=0)
-    parts[1::2] = ["\0" + part.lstrip("0").rjust(width, "0") for part in parts[1::2]]  # a number before any other sign
-    text = "".join(parts)
-    del parts  # with tens of thousands of points its texts take as much memory as the keys
-    return list(zip(text.split("\n"), names, strict=True))
+    signs = np.frombuffer(text.encode(*SIGNS), np.uint32)
+    digit = signs - np.uint32(ord("0")) < len("0123456789")  # what stands before 0 has wrapped around
+    first, end = np.flatnonzero(np.diff(digit, prepend=False, append=False)).reshape(-1, 2).T
+    missing = int((end - first).max(initial=0)) - (end - first)
+    before = np.zeros(len(signs), np.intp)
+    before[first] = missing + 1
+    place = np.arange(len(signs)) + np.cumsum(before)
+    filled = np.full(len(signs) + int(before.sum()), ord("0"), np.uint32)
+    filled[place] = signs
+    filled[place[first] - missing - 1] = 0  # a number before any other sign
+    return list(zip(filled.tobytes().decode(*SIGNS).split("\n"), names, strict=True))
 
 
 def rms(values: Floats) -> float:
