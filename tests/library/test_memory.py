@@ -1,0 +1,54 @@
+"""Memory that one more check point takes, counted by allocation: the same on every machine, busy or not."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+from photostrip.formats.output.result_files import beside_json
+from photostrip.formats.output.result_json import json_pieces
+from photostrip.frozen import replace
+from photostrip.pipeline.run import triangulate
+from photostrip.result.document import document_of
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Control, Flight, Points, Spec
+from tests.loops import nonempty
+from tests.simulated import inputs_of, settings_of
+
+FEW, MANY = (2000, 40), (10_000, 180)  # check points, and points of each model beside its rows of Gruber points
+RUN, RESULT = 2100, 1700  # bytes a check point at most; 1990 and 1580 when this was written
+
+
+def peaks(check: int, extra: int) -> tuple[int, int]:
+    """Bytes at the peak of a run of 60 photos, and of what is made of its result."""
+    spec = Spec(
+        flight=Flight(photos=60, end_lap_percent=62.0),
+        points=Points(rows=5, extra_per_model=extra, reach_percent=75.0),
+        control=Control(every=12, check=check),
+    )
+    simulation = simulate(spec)
+    inputs, settings = inputs_of(simulation), replace(settings_of(simulation), adjustment="polynomial")
+    tracemalloc.start()
+    try:
+        result = triangulate(inputs, settings)
+        of_run = peak_since_last()
+        document = document_of(result)
+        for pieces in nonempty((json_pieces(document), *beside_json(document, "", result).values())):
+            for _ in pieces:
+                pass  # each is written and goes
+        return of_run, peak_since_last()
+    finally:
+        tracemalloc.stop()
+
+
+def peak_since_last() -> int:
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.reset_peak()
+    return peak
+
+
+def test_one_more_check_point_takes_two_kilobytes() -> None:
+    peaks(100, 10)  # what is loaded and kept once does not count
+    (run_few, result_few), (run_many, result_many) = peaks(*FEW), peaks(*MANY)
+    more = MANY[0] - FEW[0]
+    assert (run_many - run_few) / more < RUN
+    assert (result_many - result_few) / more < RESULT
