@@ -19,6 +19,7 @@ from photostrip.result.verdict import GOOD, LOOK, UNVERIFIED
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Models
 from photostrip.triangulation.bundle.solve import solve
+from photostrip.triangulation.covariance_adjustment import left_out
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.rays import snooping
 from tests.loops import nonempty
@@ -61,6 +62,24 @@ def test_a_fold_is_the_run_without_its_point(adjustment: str, strips: int) -> No
         found = {key: rows[name][key] for key in expected}
         # the system of the covariance is not made again: its derivatives stand at another solution
         assert found == (pytest.approx(expected, rel=2e-3) if adjustment == "covariance" else expected)
+
+
+@pytest.mark.parametrize("strips", [1, 2])
+def test_what_covariances_of_points_left_out_say_is_what_the_correlates_say(
+    strips: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Points given in part, of which folds ended as an internal error, stand beside points given as a whole."""
+    inputs, settings = without_checks(strips=strips), replace(TURNED, adjustment="covariance")
+    use = inputs.control.use.copy()
+    use[1::4, 2] = use[3::4, :2] = False
+    inputs = replace(inputs, control=replace(inputs.control, use=use))
+    found = solved(inputs, settings).document["cross_validation"]["points"]
+    monkeypatch.setattr(left_out, "CHECKED", np.inf)  # then every point goes by the columns of the system
+    expected = solved(inputs, settings).document["cross_validation"]["points"]
+    for one, other in nonempty(zip(found, expected, strict=True)):
+        assert {key: value for key, value in one.items() if isinstance(value, float)} == pytest.approx(
+            {key: value for key, value in other.items() if isinstance(value, float)}, rel=1e-3, abs=1e-4
+        )
 
 
 @pytest.mark.slow

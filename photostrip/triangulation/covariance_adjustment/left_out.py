@@ -95,7 +95,7 @@ class Without:
         order = np.lexsort((control.axis[self.coordinates], point))
         order = order[np.bincount(point, known)[point[order]] == AXES]
         turn = np.linalg.inv(control.direction[self.coordinates[order]].reshape(-1, AXES, AXES))
-        along = (self.inverse - np.diag(noise))[np.ix_(order, order)].reshape(len(turn), AXES, -1, AXES)
+        along = (self.inverse - np.diag(noise))[np.ix_(order, order)].reshape(len(turn), AXES, len(turn), AXES)
         covariance = np.einsum("pia,paqb,qjb->piqj", turn, along, turn)
         return PointsLeftOut(point[order[::AXES]], covariance)
 

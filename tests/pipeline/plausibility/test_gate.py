@@ -34,6 +34,8 @@ from photostrip.simulation import (
     Terrain,
     simulate,
 )
+from photostrip.triangulation.bundle.solve import solve
+from photostrip.triangulation.gross_errors.rays import shifted_photo
 from photostrip.triangulation.image_coordinates.corrections import undistort
 from photostrip.triangulation.plausibility import KINDS
 from photostrip.triangulation.plausibility.control.straightening import StripPoints
@@ -50,6 +52,8 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Inputs
     from photostrip.simulation import Simulation
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution
 
     Floats = NDArray[np.float64]
 
@@ -729,6 +733,20 @@ def test_a_shifted_photo_is_named_with_its_shift(make: Callable[[int], plausibil
     assert set(finding.photos) == ids
     found = [float(finding.evidence[f"shift_{axis}_mm"]) for axis in "xy"]
     assert found == pytest.approx(shift, abs=0.8)
+
+
+@pytest.mark.slow
+def test_no_photo_is_shifted_by_more_than_it_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = plausibility.sound(43003)
+    planted = plausibility.one_shifted(case)
+    assert planted is not None
+
+    def far(problem: BundleProblem, *, rough: bool) -> BundleSolution:
+        found = solve(problem, rough=rough)
+        return replace(found, common=100.0 * found.common)
+
+    monkeypatch.setattr(shifted_photo, "solve", far)
+    assert "P109" not in plausibility.told(planted[0], case.settings).after
 
 
 @pytest.mark.slow

@@ -92,6 +92,8 @@ def test_points_that_take_no_part_have_the_covariances_of_an_adjustment_without_
     direction = there.direction.reshape(2, 3, 3)
     along = np.einsum("pai,piqj,qbj->paqb", direction, covariance, direction)
     assert along.reshape(6, 6) == pytest.approx(prediction.joint_covariance(alone, there.rows), rel=1e-6, abs=1e-9)
+    of_height = Without.of(solved, np.flatnonzero((control.point == 4) & (control.axis == 2)))
+    assert of_height.points(control, FACTOR).covariance.shape == (0, 3, 0, 3)
     assert left_out.change.solution == pytest.approx(
         -np.einsum("gbc,cd,d->gb", left_out.columns, left_out.inverse, solved.correlates[left_out.rows]), abs=1e-9
     )
