@@ -57,7 +57,8 @@ class Pairs:
 
     def some_points(self, most: int) -> Numbers:
         """Draw points of which each pair has as many as that, or all it has."""
-        order = np.random.default_rng(0).permutation(int(self.point.max()) + 1)[self.point]  # the same in all its pairs
+        points = int(self.point.max(initial=-1)) + 1
+        order = np.random.default_rng(0).permutation(points)[self.point]  # the same in all its pairs
         rows = np.lexsort((order, self.pair))
         rank = np.arange(len(rows)) - self.starts[self.pair]
         return distinct(self.point[rows[rank < most]])
