@@ -16,7 +16,8 @@ Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]  # counts, and rows of other arrays
 Flags = NDArray[np.bool_]
 Kind = TypeVar("Kind", bound=np.generic)
-PIECE = 4096  # rows
+# rows; all at once take 9 MB more of 198 with 50 000 check points, a quarter and four times as many take the same
+PIECE = 4096
 
 
 def pieces(count: int, most: int = PIECE) -> Iterator[slice]:
