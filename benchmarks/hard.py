@@ -109,10 +109,13 @@ CASES: dict[str, tuple[Spec, Callable[[Path], None], tuple[str, ...]]] = {
     "94 % end lap, 813 points, 30 % 5 mm wrong": (spec(LAP, 60, 3), images(0.3, 5.0), (ALL,)),
     "94 % end lap, 813 points, 30 % 0.1 mm wrong": (spec(LAP, 60, 3), images(0.3, 0.1), (FOLDS,)),
     "94 % end lap, 813 points, 0.1 mm wrong, bundle": (spec(LAP, 60, 3), images(0.3, 0.1), (*BUNDLE, FOLDS)),
+    "94 % end lap, 813 points, 0.1 mm wrong, all methods": (spec(LAP, 60, 3), images(0.3, 0.1), (ALL, FOLDS)),
     "6 photos on 1300 control points": (MANY, sound, (*COVARIANCE, FOLDS)),
     "strip of 2000 points": (spec(STRIP, 1500, 3), sound, ()),
     "strip of 2000 points, 10 % 0.1 mm wrong": (spec(STRIP, 1500, 3), images(0.1, 0.1), ()),
     "strip of 2000 points, 30 % 0.1 mm wrong": (spec(STRIP, 1500, 3), images(0.3, 0.1), ()),
+    "strip of 2000 points, 30 % 0.1 mm wrong, bundle": (spec(STRIP, 1500, 3), images(0.3, 0.1), (*BUNDLE, FOLDS)),
+    "strip of 2000 points, 30 % 5 mm wrong": (spec(STRIP, 1500, 3), images(0.3, 5.0), (ALL,)),
 }  # fmt: skip
 
 
@@ -151,7 +154,7 @@ def main() -> int:
             seconds, megabytes, code = timed("-m", "photostrip", "run", f"{place}/project.yaml", *options)
         shown = " ".join(each.removeprefix("processing.") for each in options if each != "--set")
         print(
-            f"{seconds:6.1f} s {seconds / unit:4.0f} L {megabytes:4d} MB  exit {code}  {name:46s} {shown}", flush=True
+            f"{seconds:6.1f} s {seconds / unit:4.0f} L {megabytes:4d} MB  exit {code}  {name:51s} {shown}", flush=True
         )
         slow += seconds > LIMIT * unit
     return 1 if slow else 0

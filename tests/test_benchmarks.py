@@ -56,6 +56,14 @@ def test_strip_prints_seconds_memory_parts_and_growth() -> None:
 
 
 @pytest.mark.slow
+def test_dense_prints_what_a_constant_costs_and_what_it_loses() -> None:
+    out = printed("dense.py", "1", "--only", "AGAIN")
+    assert "RAYS_TO_DECIDE_AGAIN, 1 projects, 0 with a value refused" in out
+    assert re.search(r"^ +100 +\d+\.\d s +rms 1\.000 1\.000, worst 1\.000 +\d+ left in, \d+ lost$", out, re.MULTILINE)
+    assert re.search(r"^ +never +\d+\.\d s +rms \d\.\d{3} ", out, re.MULTILINE)
+
+
+@pytest.mark.slow
 def test_auto_prints_the_best_and_what_was_taken() -> None:
     out = printed("auto.py", "--seeds", "1", "--photos", "6", "--overlap", "60", "--errors", "none")
     rows = re.findall(

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 LARGEST_SCATTER = 0.01
 # of what was taken out as the worst for each one more that goes at a time: the work grows with its logarithm
 OUT_TO_ONE_MORE = 8
+AMPLE = 200  # points of a pair or photo that orient it: those beyond it count as if they were out already
 AT_ONCE = 64  # pairs, for the sake of memory; it changes no result
 
 
@@ -149,7 +150,8 @@ class _Log:
                 if len(gone):
                     self._remove(weight, gone, "deletion", float(total[place]), float(limit))
                 elif worst:
-                    most_at_once = min(1 + int(self.worst[pair]) // OUT_TO_ONE_MORE, max(number - MINIMUM_LEFT, 0))
+                    more = (int(self.worst[pair]) + max(number - AMPLE, 0)) // OUT_TO_ONE_MORE
+                    most_at_once = min(1 + more, max(number - MINIMUM_LEFT, 0))
                     for row in rows[place, np.argsort(-size[rows[place]], kind="stable")[:most_at_once]].tolist():
                         if size[row] > most[pair]:
                             self._remove(weight, np.array([row]), "residual", float(size[row]), float(most[pair]))

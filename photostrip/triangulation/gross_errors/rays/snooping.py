@@ -29,13 +29,14 @@ from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, res
 from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.gross_errors.pairs.pair_search import OUT_TO_ONE_MORE
+from photostrip.triangulation.gross_errors.pairs.pair_search import AMPLE, OUT_TO_ONE_MORE
 from photostrip.triangulation.gross_errors.rays.point_decisions import cause_of_all
 from photostrip.triangulation.gross_errors.rays.ray_decisions import Adjusted, RayDecisions, decide_rays
 from photostrip.triangulation.gross_errors.rays.ray_log import ROBUST, START, RayLog, WrongRays
 
 RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
 PHOTOS_ENOUGH = 3  # on which a point is among the worst, for it to go, whatever more it is on
+RAYS_TO_DECIDE_AGAIN = 100  # of a photo, for each by which it may change before its points are decided on again
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
@@ -277,7 +278,8 @@ class _Search:
         photo, point = self.problem.images.photo[selection.images], self.problem.images.point[selection.images]
         out = self.problem.images.photo[self.begin & ~selection.images]
         more = np.bincount(out, minlength=self.problem.photos)
-        more += np.bincount(photo, minlength=self.problem.photos) // RAYS_TO_ONE_MORE
+        rays = np.bincount(photo, minlength=self.problem.photos)
+        more += rays // RAYS_TO_ONE_MORE + np.maximum(rays - AMPLE, 0) // OUT_TO_ONE_MORE
         order = np.lexsort((-value[point], photo))
         worse = np.arange(len(order)) - np.searchsorted(photo[order], photo[order])
         among = np.bincount(point[order[worse <= more[photo[order]]]], minlength=len(value))
@@ -316,12 +318,14 @@ class _Search:
         """Put back what fits the adjustment without it; None when there is nothing new."""
         point, images = self.problem.images.point, done.selection.images.copy()
         limit, xyz = done.limit, self.problem.start.points.copy()
+        photo = self.problem.images.photo
         changed = np.full(self.problem.photos, done.selection.given != self.decided.given)
-        changed[self.problem.images.photo[images != self.decided.images]] = True
-        self.decided = done.selection
+        moved = np.bincount(photo[images != self.decided.images], minlength=len(changed))
+        changed |= moved > np.bincount(photo[images], minlength=len(changed)) // RAYS_TO_DECIDE_AGAIN
+        self.decided = replace(done.selection, images=np.where(changed[photo], images, self.decided.images))
         rays = np.bincount(point, minlength=len(xyz))
-        within = self.beyond <= limit.of(rays)  # the limit rises where less is established
-        numbers = distinct(point[~images & (changed[self.problem.images.photo] | within[point])])
+        asked = (self.beyond <= limit.of(rays)) | np.isinf(self.beyond)  # the limit rises where less is established
+        numbers = distinct(point[~images & (changed[photo] | asked[point])])
         placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] > 1
         place = np.where(placed, done.solution.points[numbers], np.nan)
         place = np.where(rays[numbers, None] < LEAST_RAYS, xyz[numbers], place)

@@ -131,6 +131,51 @@ def test_one_point_of_a_photo_more_goes_at_a_time_for_every_fifty_rays_that_hold
     assert np.flatnonzero(found).tolist() == np.sort(held)[-3:].tolist()
 
 
+def test_of_the_rays_beyond_two_hundred_of_a_photo_more_go_at_a_time_as_if_they_were_out() -> None:
+    """An eighth of them: a photo is oriented by 200, and what was wrong of 1000 took twenty rounds."""
+    result = adjusted(simulate(Spec(flight=Flight(photos=3), points=Points(extra_per_model=300))))
+    assert result.bundle is not None
+    problem = result.bundle.block.problem
+    every, points = Selection.everything(problem), np.arange(problem.points)
+    held = problem.images.point[problem.images.photo == 0]
+    assert min(np.bincount(problem.images.photo)) == 351  # the points of the first photo named here are on all three
+    search = snooping._Search(problem, every, BundleSettings(), None, rough=False)
+    found = search._worst_nearby(every, np.where(np.isin(points, held), 1.0 + points, 0.0))
+    assert np.flatnonzero(found).tolist() == np.sort(held)[-1 - 351 // 50 - (351 - 200) // 8 :].tolist()
+
+
+@pytest.mark.parametrize(("changed", "again"), [(1, False), (2, True)])
+def test_points_are_decided_on_again_where_more_than_one_ray_of_a_hundred_has_changed(
+    changed: int, *, again: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = adjusted(simulate(Spec(flight=Flight(photos=3), points=Points(extra_per_model=100))))
+    assert result.bundle is not None
+    problem = result.bundle.block.problem
+    every, images = Selection.everything(problem), problem.images
+    rays = np.bincount(images.point)[images.point]
+    of_first, *others = np.flatnonzero((images.photo == 0) & (rays == 2))[: 1 + changed].tolist()
+    held = ~np.isin(images.point, images.point[of_first])
+    search = snooping._Search(problem, every, BundleSettings(), None, rough=False)
+    done = search.adjust(replace(every, images=held))
+    search.beyond[images.point[of_first]] = 2.0 * done.limit.value  # as decided on before
+    search.decided = replace(every, images=held & ~np.isin(np.arange(len(held)), others))
+    asked: list[int] = []
+    decide = search._decided
+    monkeypatch.setattr(search, "_decided", lambda *given: asked.extend(given[1].tolist()) or decide(*given))
+    search.fitting(done)
+    assert (of_first in asked) == again
+
+
+def test_a_point_that_nothing_was_decided_about_is_decided_on_wherever_it_is() -> None:
+    """Rays of it alone, of a hundred on each photo, began outside: it stayed there without a word."""
+    result = adjusted(simulate(Spec(flight=Flight(photos=3), points=Points(extra_per_model=100))))
+    assert result.bundle is not None
+    problem = result.bundle.block.problem
+    every, point = Selection.everything(problem), int(np.bincount(problem.images.point).argmax())
+    begin = replace(every, images=problem.images.point != point)
+    assert snooping.screen_bundle(problem, begin, BundleSettings()).selection.images.all()
+
+
 @pytest.mark.parametrize(("free", "goes"), [(3, True), (2, False)])
 def test_a_point_goes_that_is_among_the_worst_on_three_of_its_photos(free: int, *, goes: bool) -> None:
     """On the photos after the first ones another point is worse."""
