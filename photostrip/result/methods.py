@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from photostrip import __version__
 from photostrip.errors import PhotostripError
@@ -12,32 +12,33 @@ SCHEMA = 1
 PARTS = ("count", "rms", "max", "worst", "rms_um")
 
 
-def methods_document(
-    name: str, found: Mapping[str, Document | PhotostripError], auto: Document | PhotostripError
-) -> Document:
-    """Put the results of several adjustments side by side.
+def methods_document(name: str, methods: Mapping[str, Document], choices: Sequence[Document]) -> Document:
+    """Put what several adjustments of one project leave side by side.
 
-    `found` has for each adjustment the document of its result, or why there is none. ``methods`` says what is left at
-    check and at control points, ``best`` which adjustment has the smallest rms at check points, None without these,
-    ``choices`` what `auto` takes for each strip and why.
+    methods: by adjustment what ``method_of`` and ``refused_method`` give.
+    choices: what `auto` takes for each strip and why.
+    ``methods`` says what is left at check and at control points, ``best`` which adjustment has the smallest rms at
+    check points, None without these.
     """
-    rows = [_method(adjustment, each) for adjustment, each in found.items()]
+    rows = [{"adjustment": adjustment} | each for adjustment, each in methods.items()]
     return {
         "photostrip_methods": SCHEMA,
         "version": __version__,
         "name": name,
         "methods": rows,
         "best": {part: _best(rows, part) for part in ("plan", "height")},
-        "choices": auto.get("choices", []) if isinstance(auto, dict) else [],
+        "choices": list(choices),
     }
 
 
-def _method(adjustment: str, found: Document | PhotostripError) -> Document:
-    if not isinstance(found, dict):
-        return {"adjustment": adjustment, "status": "refused", "reason": str(found)}
+def refused_method(error: PhotostripError) -> Document:
+    return {"status": "refused", "reason": str(error)}
+
+
+def method_of(found: Document) -> Document:
+    """Return what is compared of the document of a result."""
     summary, precision = found["summary"], found.get("precision")
     return {
-        "adjustment": adjustment,
         "status": found["status"],
         "points": found["counts"]["points"],
         "sigma0_um": summary["sigma0_um"],

@@ -11,12 +11,14 @@ from photostrip.cli.stderr import Messages
 from photostrip.cli.stdout import Document, Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
 from photostrip.formats.text.writing import write_text
-from photostrip.library.project import loaded_from
+from photostrip.library.project import Project, loaded_from
 from photostrip.pipeline.inputs import AUTO, METHODS
 from photostrip.pipeline.strips.stages import Stages
+from photostrip.project.loading import adjust_project
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
-from photostrip.result.methods import methods_document
+from photostrip.result.adjustment.choices import choices_of
+from photostrip.result.methods import method_of, methods_document, refused_method
 
 
 def compare_methods(
@@ -35,7 +37,8 @@ def compare_methods(
     each its report and all of them ``methods.html``. An adjustment that refuses the project, or its key in the project
     file, is named with its reason; when none succeeds, the first failure is raised.
     """
-    found: dict[str, Document | PhotostripError] = {}
+    found: dict[str, Document] = {}
+    failures: list[PhotostripError] = []
     name = ""
     with failures_as(form), progress(sys.stderr, quiet=messages.quiet) as waiting:
         if html:
@@ -43,25 +46,27 @@ def compare_methods(
 
             check_html()
         stages = Stages("pairs", "strip", "control", "covariance", "shifted", "failure")
-        for adjustment in (*METHODS, AUTO):
+        for adjustment in METHODS:
             waiting.at(f"adjusting: {adjustment}")
-            # of auto only the choice is asked
-            more = ["processing.cross_validation=false", "processing.precision=false"] if adjustment == AUTO else []
-            wanted = [*assignments, f"processing.adjustment={adjustment}", *more]
             try:
-                result = loaded_from(project, wanted, stages=stages).run()
+                result = _loaded(project, assignments, adjustment, stages).run()
             except (GeometryError, InputError) as error:
-                found[adjustment] = error
+                found[adjustment] = refused_method(error)
+                failures.append(error)
                 continue
             name = result.name
-            found[adjustment] = result.in_columns
-            if output is not None and adjustment != AUTO:  # one of the others
+            found[adjustment] = method_of(result.in_columns)
+            if output is not None:
                 result.write(output / adjustment, html=html)
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
-        failures = [each for each in found.values() if not isinstance(each, dict)]
         if len(failures) == len(found):
             raise failures[0]
-        document = methods_document(name, found, found.pop(AUTO))
+        waiting.at(f"adjusting: {AUTO}")
+        try:
+            chosen = _chosen(project, assignments, stages)
+        except (GeometryError, InputError):
+            chosen = []
+        document = methods_document(name, found, chosen)
         if html and output is not None:
             write_text(output / "methods.html", methods_html(document))
     if form is Format.JSON:
@@ -70,3 +75,15 @@ def compare_methods(
         title = f"Methods: {document['name']}"
         print_sections(title, methods_sections(document), width, markdown=form is not Format.TEXT)
     return EXIT_DONE
+
+
+def _loaded(project: Path, assignments: Sequence[str], adjustment: str, stages: Stages) -> Project:
+    return loaded_from(project, [*assignments, f"processing.adjustment={adjustment}"], stages=stages)
+
+
+def _chosen(project: Path, assignments: Sequence[str], stages: Stages) -> list[Document]:
+    """Say what `auto` takes for each strip and why; the rest of its result is one of the others."""
+    quick = ["processing.cross_validation=false", "processing.precision=false"]
+    loaded = _loaded(project, [*assignments, *quick], AUTO, stages).loaded
+    chosen: list[Document] = choices_of(adjust_project(loaded, stages)).get("choices", [])
+    return chosen

@@ -14,7 +14,7 @@ from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY, Rejection
 from photostrip.result.adjustment.bundle import GroupKind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
-from photostrip.result.numbers import Plain, natural, rounded
+from photostrip.result.numbers import Plain, natural_rank, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record, records
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.strip_formation.scale_transfer import depths
@@ -81,7 +81,8 @@ def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]
     ids, photos, oriented = observations.point_ids, strip.strip.photos, strip.of_photos.orientation
     wrong_rays = {each.row for each in strip.of_photos.wrong_rays if each.cause == WRONG_RAY}
     pair, point, rays = oriented.pairs.pair.tolist(), oriented.point.tolist(), oriented.rows.tolist()
-    every = sorted(strip.of_photos.rejections, key=lambda each: (pair[each.row], natural(ids[point[each.row]])))
+    rank = natural_rank(ids).tolist()
+    every = sorted(strip.of_photos.rejections, key=lambda each: (pair[each.row], rank[point[each.row]]))
     found: list[Document] = [{}] * len(every)
     for unit, factor in (("um", MICROMETRES), ("", 1.0)):
         places = [n for n, each in enumerate(every) if (each.test == "parallax") == (unit == "um")]
@@ -133,7 +134,8 @@ def _from_junctions(strip: StripResult, observations: PhotoPoints) -> list[Docum
     stages, ids = strip.of_photos, observations.point_ids
     joined, oriented = stages.formed.junctions, stages.orientation
     out: list[int] = np.flatnonzero(~joined.used).tolist()
-    out.sort(key=lambda row: (int(joined.junction[row]), natural(ids[int(joined.point[row])])))
+    rank = natural_rank(ids)
+    out.sort(key=lambda row: (int(joined.junction[row]), int(rank[joined.point[row]])))
     rows = np.array(out, np.intp)
     base, _ = oriented.relative
     deviation = joined.ratio[rows] / joined.factor[joined.junction[rows]] - 1
@@ -192,7 +194,8 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
     found = dict(zip(rays, entries, strict=True))
     for place in sorted(set(range(len(every))) - found.keys()):
         found[place] = _from_control(strip, every[place], points[place], photos[place])
-    order = sorted(range(len(every)), key=lambda place: (natural(points[place]), photo_of[photos[place]]))
+    rank = natural_rank(observations.point_ids)[observations.point[[each.row for each in every]]].tolist()
+    order = sorted(range(len(every)), key=lambda place: (rank[place], photo_of[photos[place]]))
     return [found[place] for place in order]
 
 
