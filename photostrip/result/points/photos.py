@@ -131,7 +131,8 @@ def photos_of(result: Result, images: Sequence[ImageResiduals]) -> list[Document
 def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> Records:
     photos, resection = strip.strip.photos, strip.of_photos.resection
     centers = strip.intermediate.cartesian_from_intermediate(resection.centers)
-    rotations = result.output.axes_at(centers) @ strip.intermediate.cartesian_rotations(resection.rotations)
+    axes = result.output.axes_at(centers)
+    rotations = axes @ strip.intermediate.cartesian_rotations(resection.rotations)
     ground = result.output.ground_from_cartesian(centers, ids=[f"at the center of photo {photo}" for photo in photos])
     known = result.precision
     columns = {
@@ -139,7 +140,7 @@ def _photos_of_strip(result: Result, number: int, strip: StripResult, image: Ima
         "points": np.bincount(image.photo[image.used], minlength=len(photos)),
         "resected": resection.solved,
     }
-    sigmas = {"sigma": None} if known is None else photo_columns(result, centers, rotations, known.photos[number])
+    sigmas = {"sigma": None} if known is None else photo_columns(result, axes, rotations, known.photos[number])
     head = {"id": photos, "strip": strip.strip.id, **coordinates(result.output, ground)}
     return records("photos", head | _turned(result, rotations) | sigmas | columns)
 
@@ -150,7 +151,8 @@ def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Doc
     singles = result.bundle.singles
     photos = [single.strip.photos[0] for single in singles]
     centers = np.array([single.center for single in singles])
-    rotations = result.output.axes_at(centers) @ np.array([single.rotation for single in singles])
+    axes = result.output.axes_at(centers)
+    rotations = axes @ np.array([single.rotation for single in singles])
     ground = result.output.ground_from_cartesian(centers, ids=[f"of photo {photo}" for photo in photos])
     rows = [result.bundle.start.photos.index(photo) for photo in photos]
     columns = {
@@ -162,7 +164,7 @@ def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Doc
         "resected": True,
     }
     head = {"id": photos, "strip": [single.strip.id for single in singles], **coordinates(result.output, ground)}
-    sigmas = photo_columns(result, centers, rotations, result.bundle.photo_covariances[rows])
+    sigmas = photo_columns(result, axes, rotations, result.bundle.photo_covariances[rows])
     return list(records("photos", head | _turned(result, rotations) | sigmas | columns))
 
 

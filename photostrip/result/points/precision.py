@@ -66,19 +66,18 @@ def point_columns(result: Result) -> Document:
     }
 
 
-def photo_columns(result: Result, place: Floats, rotations: Floats, given: Floats) -> Document:
+def photo_columns(result: Result, axes: Floats, rotations: Floats, given: Floats) -> Document:
     """Return columns of ``photos``: standard deviations of centre and angles, and their covariances.
 
     An angle's rows take the small rotation about the axes of the output to the angles of the system.
 
-    place, rotations: (m, 3), (m, 3, 3), perspective centres in the Cartesian frame; photo to the axes of the output at
-        the centres.
+    axes, rotations: (m, 3, 3), axes of the output at the perspective centres, rows in the Cartesian frame; photo to
+        those axes.
     given: (m, 6, 6), covariances in the axes of the Cartesian frame, as in ``pipeline.Precision``.
     Returns ``sigma`` with x, y, z in metres and the angles in their exported unit; ``covariance``, the upper triangle,
         row by row, of the matrix of x, y, z and the three angles.
     """
-    axes = result.output.axes_at(place)
-    turn = np.zeros((len(place), 6, 6))
+    turn = np.zeros((len(axes), 6, 6))
     turn[:, :3, :3] = axes[:, list(result.output.order)]
     turn[:, 3:, 3:] = _rates(rotations, result.settings.angle_system) @ axes * PER_RADIAN[result.settings.angle_unit]
     covariances = turn @ given @ turn.transpose(0, 2, 1)
