@@ -87,7 +87,7 @@ def written_out(rows: ErrorRows, errors: StripErrors) -> Floats:
     units = np.zeros((models + 3, 6, count, 2))
     for image in range(count):
         components = np.zeros((2, 18))
-        components[:, MOVED] = images.components(np.array(image))
+        components[:, MOVED] = images.components[image]
         for slot in range(3):
             model = images.photo[image] - 2 + slot
             if 0 <= model < models:

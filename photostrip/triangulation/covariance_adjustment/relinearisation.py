@@ -45,7 +45,7 @@ def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Float
     points, photos = errors.images, errors.models + 1
     moved = np.zeros((photos, SPAN, COMPONENTS))
     flat = moved.reshape(photos, -1)
-    add_rows(flat[:, MOVED], points.photo, np.einsum("ni,nic->nc", images, points.components(slice(None))))
+    add_rows(flat[:, MOVED], points.photo, np.einsum("ni,nic->nc", images, points.components))
     components = np.zeros((SHARING + errors.models + rows.by_component.shape[1], COMPONENTS))  # from model -SHARING on
     for slot in range(SPAN):
         components[slot : slot + photos] += moved[:, slot]

@@ -15,7 +15,7 @@ from typing import Self
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct, pieces
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
@@ -29,7 +29,7 @@ from photostrip.triangulation.error_propagation.derivatives import (
     add_products,
     add_rows,
 )
-from photostrip.triangulation.error_propagation.strip_errors import IMAGES, StripErrors
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
@@ -128,9 +128,7 @@ def by_images(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
     none = np.zeros((SHARING, COMPONENTS))
     padded = np.concatenate([none, by_component, none])
     around = np.concatenate([padded[slot : slot + errors.models + 1] for slot in range(SPAN)], axis=1)
-    result = np.empty(images.sigma.shape)
-    for some in pieces(len(result), IMAGES):
-        result[some] = np.einsum("nic,nc->ni", images.components(some), around[images.photo[some], MOVED])
+    result: Floats = np.einsum("nic,nc->ni", images.components, around[images.photo, MOVED])
     add_rows(result, rows.image, rows.by_image[:, 0] * weights[rows.item][:, None])
     return result
 
@@ -167,7 +165,7 @@ def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Sums:
     by_image = np.zeros((len(image), 2, len(operator)))
     add_rows(by_image, entry, rows.by_image[:, 0, :, None] * operator.T[rows.item][:, None, :])
     of_photos = np.zeros((errors.models + 1, SPAN * COMPONENTS, len(operator)))
-    add_products(of_photos[:, MOVED], images.photo[image], images.components(image), by_image)
+    add_products(of_photos[:, MOVED], images.photo[image], images.components[image], by_image)
     of_images = np.zeros_like(by_component)
     for slot, part in enumerate(np.split(of_photos, SPAN, axis=1)):  # of the models photo - 2 + slot
         of_slot = part[SHARING - slot :][: errors.models]
@@ -264,7 +262,7 @@ class NearImages(NamedTuple):
         by_image[rows.item, photo, place] = rows.by_image.transpose(0, 2, 1)
         with_components = np.zeros((n, size, (photos + SHARING + 1) * COMPONENTS))
         for slot in range(photos):
-            components = errors.images.components(image[:, slot])
+            components = errors.images.components.take(image[:, slot], axis=0)
             components = components.reshape(n, 2 * most, MOVED.stop - MOVED.start)
             products = by_image[:, slot].reshape(n, 2 * most, size).transpose(0, 2, 1) @ components
             moved = slice(MOVED.start + slot * COMPONENTS, MOVED.stop + slot * COMPONENTS)

@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass, replace
@@ -35,45 +34,9 @@ class ImagePoints:
     row: Numbers  # (n,): row in the table of image points
     photo: Numbers  # (n,): place of its photo in the strip, ascending
     sigma: Floats  # (n, 2): stated standard deviations of x and y, mm
-    pair_row: NDArray[np.int32]  # (n, 2): row in the table of the strip's pairs, of the models photo - 1 and photo
-    # (n, 2, 5): by x and y in their standard deviations: y parallaxes of these two rows, mm, 0 where there is none, and
-    # scales of the models photo - 2, photo - 1 and photo
-    moved: Floats
-    elements: Floats  # (m, 5): elements of its pair by the y parallax of each row of that table, radians per mm
-
-    @classmethod
-    def of_zeros(cls, row: Numbers, photo: Numbers, sigma: Floats, pair_rows: int) -> Self:
-        """Image points that move nothing yet."""
-        return cls(
-            row=row,
-            photo=photo,
-            sigma=sigma,
-            pair_row=np.zeros((len(row), 2), np.int32),
-            moved=np.zeros((len(row), 2, SHARING + SPAN)),
-            elements=np.zeros((pair_rows, COMPONENTS - 1)),
-        )
-
-    @property
-    def parallax(self) -> Floats:
-        return self.moved[:, :, :SHARING]
-
-    @property
-    def scales(self) -> Floats:
-        return self.moved[:, :, SHARING:]
-
-    def components(self, images: Numbers | slice) -> Floats:
-        """Error components (..., 2, 13) by x and y of some image points in their standard deviations.
-
-        Scale of the model photo - 2, components of the models photo - 1 and photo (``MOVED``). Elements of both are
-        products: held as such, they take half the memory.
-        """
-        moved, rows = self.moved[images], self.pair_row[images]
-        result = np.empty((*moved.shape[:-1], MOVED.stop - MOVED.start))
-        result[..., ::COMPONENTS] = moved[..., SHARING:]
-        for side, start in enumerate((1, 1 + COMPONENTS)):
-            elements = self.elements[rows[..., side]]
-            result[..., start : start + COMPONENTS - 1] = moved[..., side, None] * elements[..., None, :]
-        return result
+    # (n, 2, 13): by x and y in their standard deviations: scale of the model photo - 2, components of the models
+    # photo - 1 and photo (``MOVED``)
+    components: Floats
 
     def rows_of(self, rows: Numbers) -> Numbers:
         """Places here of rows in the table of image points."""

@@ -103,7 +103,12 @@ def differentiate_strip(
         xyz=similarity(formed.xyz) - origin,
         centers=centers - origin,
         rotations=rotations,
-        images=ImagePoints.of_zeros(row, position[row], sigma[row], len(orientation.pairs.pair)),
+        images=ImagePoints(
+            row=row,
+            photo=position[row],
+            sigma=sigma[row],
+            components=np.zeros((len(row), 2, MOVED.stop - MOVED.start)),
+        ),
         steps=np.zeros((len(scale), SIMILARITY_PARAMETERS, COMPONENTS)),
     )
     points = _PointRows.of(strip)
@@ -198,20 +203,19 @@ def _add_components(images: ImagePoints, section: _Section, pairs: PairErrors, o
     by_parallax = pair_errors.elements_by_parallax(orientation, pairs.parallax_by_elements)[own]
     parallax = np.where(orientation.used[:, None], pairs.parallax_by_image * stated, 0.0)[own]
     scale, scale_before = ((by_parallax * shares[orientation.pairs.pair[own]]).sum(axis=1) for shares in of_scale)
-    table = np.arange(section.rows.start, section.rows.start + section.own)
-    images.elements[table] = by_parallax
-    # in ``scales`` the models photo - 2, photo - 1 and photo
+    by_parallax = np.column_stack([by_parallax, scale])
+    # of the models photo - 2, photo - 1 and photo; the last of each is the scale
+    of_model = np.split(images.components, [1, 1 + COMPONENTS], axis=2)
     sides = (parallax[:, :2], place[own, 0], 2), (parallax[:, 2:], place[own, 1], 1)
     for by_image, image, slot in sides:
-        images.pair_row[image, slot - 1], images.parallax[image, :, slot - 1] = table, by_image
-        images.scales[image, :, slot] = by_image * scale[:, None]
+        of_model[slot][image] = by_image[:, :, None] * by_parallax[:, None, :]
     for by_image, image, slot in sides:
-        images.scales[image, :, slot - 1] += by_image * scale_before[:, None]
+        of_model[slot - 1][image, :, -1] += by_image * scale_before[:, None]
     by_before = (before[:, None] @ pairs.point_by_image[joined.before])[:, 0] * stated[joined.before]
     by_after = (after[:, None] @ pairs.point_by_image[joined.after])[:, 0] * stated[joined.after]
-    images.scales[place[joined.before, 0], :, 2] += by_before[:, :2]
-    images.scales[place[joined.before, 1], :, 1] += by_before[:, 2:] - by_after[:, :2]
-    images.scales[place[joined.after, 1], :, 0] -= by_after[:, 2:]
+    of_model[2][place[joined.before, 0], :, -1] += by_before[:, :2]
+    of_model[1][place[joined.before, 1], :, -1] += by_before[:, 2:] - by_after[:, :2]
+    of_model[0][place[joined.after, 1], :, -1] -= by_after[:, 2:]
 
 
 def _steps(pairs: PairErrors, next_centers: Floats) -> Floats:
@@ -231,9 +235,9 @@ def _component_covariances(images: ImagePoints, models: int) -> Floats:
     rank = np.arange(len(images.photo)) - np.concatenate([[0], np.cumsum(counts)])[images.photo]
     gram = np.zeros((photos, SPAN * COMPONENTS, SPAN * COMPONENTS))
     for start, stop in runs(np.concatenate([[0], np.cumsum(counts)]), IMAGES):
-        padded = np.zeros((stop - start, int(counts.max()), 2, MOVED.stop - MOVED.start))
+        padded = np.zeros((stop - start, int(counts.max()), *images.components.shape[1:]))
         rows = slice(*np.searchsorted(images.photo, [start, stop]).tolist())
-        padded[images.photo[rows] - start, rank[rows]] = images.components(rows)
+        padded[images.photo[rows] - start, rank[rows]] = images.components[rows]
         flat = padded.reshape(stop - start, -1, padded.shape[-1])
         gram[start:stop, MOVED, MOVED] = flat.transpose(0, 2, 1) @ flat
     gram = gram.reshape(photos, SPAN, COMPONENTS, SPAN, COMPONENTS)

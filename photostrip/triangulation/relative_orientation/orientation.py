@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photostrip.arrays import Flags, Floats, Numbers, pieces
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
@@ -162,10 +162,7 @@ def assess_pairs(elements: Floats, pairs: Pairs, iterations: Numbers) -> Orienta
         freedom = pairs.sums((pairs.weight > 0).astype(float)) - MINIMUM_POINTS
         variance = pairs.sums(pairs.weight * q**2) / freedom  # of a y parallax: twice that of an image coordinate
         variance[freedom < 1] = np.nan
-        spread = np.empty(len(q))
-        for rows in pieces(len(q)):  # the cofactors of all rows are the largest block of a run
-            by, of_row = jacobian[:, rows], cofactors[pairs.pair[rows]]
-            spread[rows] = np.einsum("im,mij,jm->m", by, of_row, by)
+        spread = np.einsum("im,mij,jm->m", jacobian, cofactors[pairs.pair], jacobian)
         return Orientation(
             pairs=pairs,
             elements=elements,
