@@ -40,12 +40,19 @@ def json_pieces(document: Document, *, ascii_only: bool = False) -> Iterator[str
 
 
 def _pieces(document: Document, encode: Encoder) -> Iterator[str]:
-    before = "{\n"
-    for key, value in document.items():
+    return _object(document, ("{\n", ",\n", "\n}\n"), _block, encode)
+
+
+def _object(
+    values: Document, around: tuple[str, str, str], write: Callable[[Plain, Encoder], Iterator[str]], encode: Encoder
+) -> Iterator[str]:
+    """Write keys with their values; around: what stands before, between and behind them."""
+    before, between, behind = around
+    for key, value in values.items():
         yield f"{before}{encode.text(key)}: "
-        yield from _block(value, encode)
-        before = ",\n"
-    yield "\n}\n"
+        yield from write(value, encode)
+        before = between
+    yield behind
 
 
 def _block(value: Plain, encode: Encoder) -> Iterator[str]:
@@ -90,12 +97,7 @@ def _joined(records: Records | list[Document], between: str, encode: Encoder, *,
 
 def _on_one_line(value: Plain, encode: Encoder) -> Iterator[str]:
     if value and isinstance(value, dict):
-        before = "{"
-        for key, each in value.items():
-            yield f"{before}{encode.text(key)}: "
-            yield from _on_one_line(each, encode)
-            before = ", "
-        yield "}"
+        yield from _object(value, ("{", ", ", "}"), _on_one_line, encode)
     elif value and isinstance(value, Records):
         yield "["
         yield from _records(value, ", ", encode)
