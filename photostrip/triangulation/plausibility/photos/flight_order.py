@@ -56,22 +56,26 @@ def find_wrong_order(
     Returns the strip as its photos lie.
     """
     links = mosaic.link(observations, photos)
-    plane = mosaic.lay_out(links, len(photos))
     odd = _unlike(links, len(photos))
-    plane.size[odd] = 1.0  # nothing is known of their scale
-    findings = [*_scaled(plane, strip, photos), *_mirrored(plane, strip, photos)]
+    findings: list[Finding] = []
+    mirrored: frozenset[str] = frozenset()
+    size: dict[str, float] = {}
+    if not links.alike:
+        plane = mosaic.lay_out(links, len(photos))
+        plane.size[odd] = 1.0  # nothing is known of their scale
+        findings += [*_scaled(plane, strip, photos), *_mirrored(plane, strip, photos)]
+        mirrored = frozenset(photos[number] for number in np.flatnonzero(plane.mirrored).tolist())
+        size = {photos[number]: float(plane.size[number]) for number in _other_size(plane)}
     findings += _of_other_points(observations, odd, links, strip, photos)
     twice = _twice(links)
     findings += [_twin(links, pair, strip, photos) for pair in twice]
     left = [number for number in range(len(photos)) if number not in {other for _, other in twice}]
     against = partial(turned_back, links, closer=_by_number(closer, photos))
-    order = _order(links, plane, left, against)
+    order = _order(links, left, against, len(photos))
     moved = _moved(order, left)
     if moved:
         findings.append(_out_of_order(links, order, moved, strip, photos, against))
     findings += _gaps(links, order, strip, photos)
-    mirrored = frozenset(photos[number] for number in np.flatnonzero(plane.mirrored).tolist())
-    size = {photos[number]: float(plane.size[number]) for number in _other_size(plane)}
     return findings, PhotoOrder(
         photos=tuple(photos[number] for number in order), steps=_steps(links, order), mirrored=mirrored, size=size
     )
@@ -265,11 +269,12 @@ def _unlinked(links: mosaic.PhotoLinks, order: Sequence[int]) -> int:
     return sum((min(pair), max(pair)) not in links.index for pair in pairwise(order))
 
 
-def _order(links: mosaic.PhotoLinks, plane: mosaic.Mosaic, listed: list[int], contradictions: Against) -> list[int]:
+def _order(links: mosaic.PhotoLinks, listed: list[int], contradictions: Against, photos: int) -> list[int]:
     """Photos as they lie, where the list is contradicted; else as listed."""
     against = len(contradictions(listed)) + _unlinked(links, listed)
     if not against or len(listed) < LEAST_PHOTOS:
         return listed
+    plane = mosaic.lay_out(links, photos)
     order: list[int] = []
     for part in dict.fromkeys(plane.part[listed].tolist()):  # as they are listed
         order += _along(plane, [number for number in listed if plane.part[number] == part])

@@ -55,6 +55,16 @@ class PhotoLinks:
         """Whether two photos show the same points at all."""
         return np.asarray(self.share < MOST_SHARE)
 
+    @property
+    def jumps(self) -> Flags:
+        """Whether two photos that show the same points are at scales that no flight explains."""
+        return np.asarray(self.fits & (np.abs(np.log(np.maximum(np.abs(self.turn), TINY))) >= np.log(SCALE_JUMP)))
+
+    @property
+    def alike(self) -> bool:
+        """Whether no photo is a mirror image of another, nor at another scale."""
+        return not (self.mirrored.any() or self.jumps.any())
+
     @cached_property
     def bases(self) -> tuple[Complex, Complex]:
         """Centre of the second photo as it would lie on the first, and of the first on the second."""
@@ -94,25 +104,34 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
             mirrored=np.zeros(0, bool),
             share=none,
         )
-    starts = np.concatenate([[0], np.cumsum(count)[:-1]])
-    plain, mirror = (_similar(each, z_b, near, starts) for each in (z_a, np.conj(z_a)))
-    spread, narrow = _shape(z_b, mirror.weight, starts)
-    mirrored = (
-        (mirror.misfit < MIRROR_MISFIT_SHARE * plain.misfit)
-        & (mirror.misfit < MOST_MIRROR_MISFIT * spread)
-        & (count >= LEAST_COMMON_OF_MIRROR)
-        & ~narrow
-    )
-    misfit = np.where(mirrored, mirror.misfit, plain.misfit)
-    kept = np.where(mirrored, spread, _shape(z_b, plain.weight, starts)[0])
+    plain = _similar(z_a, z_b, near, count)
+    turn, shift, misfit = plain.turn, plain.shift, plain.misfit
+    spread, _ = _shape(z_b, plain.weight, count)
+    mirrored = np.zeros(len(pairs), bool)
+    # where the plain one leaves no more than relief and tilts do, the mirrored one leaves far more
+    asked = np.flatnonzero((count >= LEAST_COMMON_OF_MIRROR) & (misfit > MOST_MIRROR_MISFIT * spread))
+    if len(asked):
+        points = np.isin(np.repeat(np.arange(len(pairs)), count), asked)
+        mirror = _similar(np.conj(z_a[points]), z_b[points], near[points], count[asked])
+        of_mirror, narrow = _shape(z_b[points], mirror.weight, count[asked])
+        better = (mirror.misfit < MIRROR_MISFIT_SHARE * misfit[asked]) & ~narrow
+        better &= mirror.misfit < MOST_MIRROR_MISFIT * of_mirror
+        mirrored[asked] = better
+        for values, of_mirrored in (
+            (turn, mirror.turn),
+            (shift, mirror.shift),
+            (misfit, mirror.misfit),
+            (spread, of_mirror),
+        ):
+            values[mirrored] = of_mirrored[better]
     return PhotoLinks(
         photo=np.column_stack(np.divmod(pairs, len(photos))).astype(np.intp),
         count=count.astype(np.intp),
-        turn=np.where(mirrored, mirror.turn, plain.turn),
-        shift=np.where(mirrored, mirror.shift, plain.shift),
+        turn=turn,
+        shift=shift,
         misfit=misfit,
         mirrored=mirrored,
-        share=misfit / np.maximum(kept, TINY),
+        share=misfit / np.maximum(spread, TINY),
     )
 
 
@@ -155,11 +174,16 @@ def _common_points(observations: PhotoPoints, photos: Sequence[str]) -> _CommonP
 
 def _near(size: Floats, photo: Numbers) -> Floats:
     """Weights of image points, by their distances from the centres of their photos: next to nothing far outside."""
-    order = np.lexsort((size, photo))
     count = np.bincount(photo)
-    last = np.cumsum(count) - count + (FAR_SHARE * (count - 1)).astype(np.intp)
-    reach = np.zeros(len(count))
-    reach[count > 0] = size[order[last[count > 0]]]
+    within = (FAR_SHARE * (count - 1)).astype(np.intp)
+    outer = np.bincount(photo[FAR_OUTSIDE * size >= size.max(initial=0.0)], minlength=len(count))
+    asked = outer < count - within  # the others reach far enough for the farthest point of all photos
+    rows = np.flatnonzero(asked[photo])
+    order = rows[np.lexsort((size[rows], photo[rows]))]
+    held = np.where(asked, count, 0)
+    last = np.cumsum(held) - held + within
+    reach = np.full(len(count), np.inf)
+    reach[asked] = size[order[last[asked]]]
     return np.where(size > FAR_OUTSIDE * reach[photo], TINY, 1.0)
 
 
@@ -172,9 +196,9 @@ class _Similarities(NamedTuple):
     weight: Floats  # of each point, which falls with its residual
 
 
-def _similar(z_a: Complex, z_b: Complex, near: Floats, starts: Numbers) -> _Similarities:
-    """Fit a plane similarity to each segment of points, with weights that fall with the residual."""
-    segment = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(z_a))))
+def _similar(z_a: Complex, z_b: Complex, near: Floats, count: Numbers) -> _Similarities:
+    """Fit a plane similarity to each segment of so many points, with weights that fall with the residual."""
+    segment, starts = np.repeat(np.arange(len(count)), count), np.cumsum(count) - count
     weight = near
     turn, shift = np.zeros(len(starts), complex), np.zeros(len(starts), complex)
     misfit = np.zeros(len(starts))
@@ -191,10 +215,10 @@ def _similar(z_a: Complex, z_b: Complex, near: Floats, starts: Numbers) -> _Simi
     return _Similarities(turn=turn, shift=shift, misfit=misfit, weight=weight)
 
 
-def _shape(z: Complex, weight: Floats, starts: Numbers) -> tuple[Floats, Flags]:
+def _shape(z: Complex, weight: Floats, count: Numbers) -> tuple[Floats, Flags]:
     """Rms distance from the centre, and whether the points stand nearly on one line; by the points that a fit kept."""
+    segment, starts = np.repeat(np.arange(len(count)), count), np.cumsum(count) - count
     total = np.add.reduceat(weight, starts)
-    segment = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(z))))
     d = z - (np.add.reduceat(weight * z, starts) / total)[segment]
     squares = np.add.reduceat(weight * np.abs(d) ** 2, starts)
     skew = np.abs(np.add.reduceat(weight * d**2, starts))  # length squared minus breadth squared
@@ -247,7 +271,7 @@ def lay_out(links: PhotoLinks, photos: int) -> Mosaic:
 
 def _grow(start: int, around: Sequence[Sequence[tuple[int, int]]], links: PhotoLinks, plane: Mosaic) -> None:
     """Place all photos that hang together with one, strongest links first; the rows of `plane` are filled in."""
-    fits, links_mirrored = links.fits.tolist(), links.mirrored.tolist()
+    jumps, links_mirrored = links.jumps.tolist(), links.mirrored.tolist()
     turns, shifts, rank = links.turn.tolist(), links.shift.tolist(), np.where(links.fits, -links.count, 0).tolist()
     queue = [(rank[row], row, start, other) for row, other in around[start]]
     heapq.heapify(queue)
@@ -265,8 +289,7 @@ def _grow(start: int, around: Sequence[Sequence[tuple[int, int]]], links: PhotoL
         if plane.mirrored[known]:  # the plane takes conj(z_known)
             turn, shift = turn.conjugate(), shift.conjugate()
         plane.mirrored[new] = plane.mirrored[known] ^ mirrored
-        jumps = fits[row] and not 1 / SCALE_JUMP < abs(turn) < SCALE_JUMP
-        plane.size[new] = plane.size[known] * (1 / max(abs(turn), TINY) if jumps else 1.0)
+        plane.size[new] = plane.size[known] * (1 / max(abs(turn), TINY) if jumps[row] else 1.0)
         plane.factor[new] = plane.factor[known] * turn
         plane.offset[new] = plane.factor[known] * shift + plane.offset[known]
         for link_row, other in around[new]:
