@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
     from photostrip.triangulation.resection import resection as exterior
 
-NEW, CONTROL, CHECK = "new", "control", "check"
+ROLES = NEW, CONTROL, CHECK = "new", "control", "check"
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,13 +317,12 @@ class Result:
         return np.asarray(level @ self.precision.points @ level.transpose(0, 2, 1), float)
 
     @property
-    def roles(self) -> tuple[str, ...]:
-        """Role of each point of ``points``: new, control or check."""
-        roles = [NEW] * len(self.points.number)
-        for row, check in zip(self.control_rows, self.inputs.control.check, strict=True):
-            if row >= 0:
-                roles[row] = CHECK if check else CONTROL
-        return tuple(roles)
+    def roles(self) -> Numbers:
+        """Role of each point of ``points``, a place in ``ROLES``."""
+        roles, known = np.zeros(len(self.points.number), np.intp), self.control_rows >= 0
+        of_given = np.where(self.inputs.control.check, ROLES.index(CHECK), ROLES.index(CONTROL))
+        roles[self.control_rows[known]] = of_given[known]
+        return roles
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
+from typing import Any, cast
 
 from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Document
 from photostrip.result.description import Quantity, table_at
+from photostrip.result.numbers import RoundedColumn
 from photostrip.result.quantities import angle_decimals, coordinate_decimals
+from photostrip.result.records import Records
 
 AZIMUTH_DECIMALS = {"deg": 1, "gon": 1, "rad": 3}
 MATRIX = [f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)]
@@ -68,17 +71,31 @@ def photos_csv(angles: Document) -> list[Column]:
     ]
 
 
-def flat_photo(photo: Document) -> Document:
-    """Return a photo with a key for each angle, each number of the matrix and each standard deviation."""
-    angles, sigma = photo["angles"], photo["sigma"] or Document()
+def flat_photos(photos: Records | Sequence[Document], listed: Iterable[Column]) -> Records:
+    """Return photos with the keys of photos.csv: one for each angle, number of the matrix and standard deviation."""
+    angles = photos[0]["angles"]
     names = [f"{name}_{angles['unit']}" for name in angles["system"].split("-")]
-    return {
-        **photo,
-        **dict(zip(names, angles["values"] or (), strict=False)),
-        **dict(zip(MATRIX, photo["rotation"] or (), strict=False)),
-        **{f"sigma_{axis}": sigma.get(axis) for axis in "xyz"},
-        **{f"sigma_{name}": value for name, value in zip(names, sigma.get("angles") or (), strict=False)},
+    paths: dict[str, tuple[str | int, ...]] = {
+        **{name: ("angles", "values", place) for place, name in enumerate(names)},
+        **{name: ("rotation", place) for place, name in enumerate(MATRIX)},
+        **{f"sigma_{axis}": ("sigma", axis) for axis in "xyz"},
+        **{f"sigma_{name}": ("sigma", "angles", place) for place, name in enumerate(names)},
     }
+    return Records({each.key: _at(photos, paths.get(each.key, (each.key,))) for each in listed})
+
+
+def _at(found: Any, path: Iterable[str | int]) -> Sequence[Any]:  # noqa: ANN401 (records or a column)
+    """Return the column that keys and places of numbers lead to; None where something on the way is not known."""
+    for step in path:
+        if isinstance(found, Records):
+            found = found.columns[str(step)]
+        elif isinstance(found, RoundedColumn):
+            found = RoundedColumn(found.values[:, int(step)])
+        elif isinstance(step, int):
+            found = [None if each is None else each[step] for each in found]
+        else:
+            found = [None if each is None else each.get(step) for each in found]
+    return cast("Sequence[Any]", found)
 
 
 def in_frame(listed: Iterable[Column], frame: Document) -> list[Column]:

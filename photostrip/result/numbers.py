@@ -10,7 +10,7 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.units import MICROMETRES
@@ -47,9 +47,12 @@ def to_decimals(values: ArrayLike, decimals: int) -> Floats:
 
 
 class RoundedColumn(Sequence[Plain]):
-    """Rounded numbers, or rows of them, kept as an array in a quarter of the memory; None for what is no number."""
+    """Rounded numbers, or rows of them, counts or flags, kept as an array in a quarter of the memory.
 
-    def __init__(self, values: Floats) -> None:
+    None stands for what is no number.
+    """
+
+    def __init__(self, values: NDArray[Any]) -> None:
         self.values = values
 
     def __len__(self) -> int:
@@ -58,10 +61,10 @@ class RoundedColumn(Sequence[Plain]):
     def __getitem__(self, place: int | slice) -> Plain:
         if isinstance(place, slice):
             return RoundedColumn(self.values[place])
-        found = self.values[place].tolist()
-        if isinstance(found, float):
-            return found if isfinite(found) else None
-        return plain(self.values[place])
+        if self.values.ndim > 1:
+            return plain(self.values[place])
+        found = self.values.item(place)
+        return found if isfinite(found) else None
 
     def __iter__(self) -> Iterator[Plain]:
         parts = (plain(self.values[start : start + AT_ONCE]) for start in range(0, len(self), AT_ONCE))
@@ -74,7 +77,7 @@ class RoundedColumn(Sequence[Plain]):
         return RoundedColumn(self.values[order])
 
 
-def plain(values: Floats) -> Plain:
+def plain(values: NDArray[Any]) -> Plain:
     """Return an array as plain lists, None where a number is not finite."""
     finite = np.isfinite(values)
     if finite.all():

@@ -24,10 +24,11 @@ from photostrip.result.numbers import (
     to_decimals,
     to_digits,
 )
-from photostrip.result.records import Grouped, Records
+from photostrip.result.records import Grouped, Named, Records
 
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
 DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES, "gon": DEGREES, "rad": RADIANS}
+COUNTS_AND_FLAGS = "iub"  # kinds of arrays
 
 
 def rounded_as(entry: Quantity, value: ArrayLike, unit: str = "") -> Plain:
@@ -93,14 +94,14 @@ def _cells(
     if isinstance(column, Mapping) and isinstance(entry, dict):
         return Records({key: _cells(entry[key], part, size) for key, part in column.items()})
     if not isinstance(column, list | tuple | np.ndarray):
-        return column if isinstance(column, RoundedColumn | Grouped) else [column] * size
+        return column if isinstance(column, RoundedColumn | Named | Grouped) else [column] * size
     if isinstance(entry, Quantity):
         unit = next(iter(beside.get(entry.unit_key, ())), "")
-        decimals = _decimals(entry, unit)
-        if decimals is not None and isinstance(column, np.ndarray):
-            return RoundedColumn(to_decimals(column, decimals))
-        if entry.digits is not None and isinstance(column, np.ndarray):
-            return RoundedColumn(to_digits(column, entry.digits))
+        if isinstance(column, np.ndarray):
+            decimals, digits = _decimals(entry, unit), entry.digits
+            if decimals is not None:
+                column = to_decimals(column, decimals)
+            return RoundedColumn(column if decimals is not None or digits is None else to_digits(column, digits))
         cells: Sequence[Plain] = rounded_as(entry, column, unit)
         return cells
     return [None if each is None else _record(entry, each) for each in column]

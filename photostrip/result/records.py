@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, cast, overload
 from photostrip.notes import Document
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from photostrip.arrays import Numbers
     from photostrip.result.numbers import Plain
 
@@ -30,6 +32,31 @@ class Row(Mapping[str, Any]):
 
     def __len__(self) -> int:
         return len(self.columns)
+
+
+class Named(Sequence[str]):
+    """A column of texts of which many are the same: each text stands once, the column holds its number."""
+
+    def __init__(self, names: Sequence[Any] | NDArray[Any], numbers: Numbers) -> None:
+        self.names, self.numbers = names, numbers
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @overload
+    def __getitem__(self, place: int) -> str: ...
+    @overload
+    def __getitem__(self, place: slice) -> Named: ...
+    def __getitem__(self, place: int | slice) -> str | Named:
+        if isinstance(place, slice):
+            return Named(self.names, self.numbers[place])
+        return str(self.names[self.numbers[place]])
+
+    def __iter__(self) -> Iterator[str]:
+        return map(self.names.__getitem__, self.numbers.tolist())
+
+    def taken(self, order: Numbers) -> Named:
+        return Named(self.names, self.numbers[order])
 
 
 class Grouped(Sequence[list[Any]]):
@@ -125,6 +152,11 @@ def as_lists(value: Plain) -> Plain:
     if isinstance(value, dict):
         return {key: as_lists(each) for key, each in value.items()}
     return list(value) if isinstance(value, Records) else value
+
+
+def column_of(rows: Records | Sequence[Mapping[str, Plain]], key: str) -> Sequence[Plain]:
+    """Return the values of a key in all records."""
+    return rows.columns[key] if isinstance(rows, Records) and len(rows) else [row[key] for row in rows]
 
 
 def as_records(columns: Mapping[str, Sequence[Plain]]) -> list[Document]:

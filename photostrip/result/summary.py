@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats
 from photostrip.notes import Document
-from photostrip.pipeline.results import Result
+from photostrip.pipeline.results import NEW, ROLES, Result
 from photostrip.result.adjustment import links
 from photostrip.result.adjustment.bundle import image_fit
 from photostrip.result.adjustment.pairs import Parallaxes, sigma0
@@ -46,7 +46,7 @@ def counts_of(result: Result, measurements: int) -> Document:
         "photos": sum(len(strip.photos) for strip in result.inputs.flights),
         "models": sum(len(strip.strip.photos) - 1 for strip in result.strips),
         "points": len(roles),
-        "new_points": roles.count("new"),
+        "new_points": int((roles == ROLES.index(NEW)).sum()),
         "control_points": int(part.sum()),
         "control_plan": int((part & control.use[:, 0]).sum()),
         "control_height": int((part & control.use[:, 2]).sum()),

@@ -49,12 +49,11 @@ def table_of(document: Document, name: str) -> list[ResultColumn]:
     records = list(document.get(block) or ())
     units = _ground_units(document)
     if name == "photos" and records:
-        flat = [columns.flat_photo(each) for each in records]
+        listed = columns.photos_csv(records[0]["angles"])
+        flat = columns.flat_photos(records, listed).columns
         found = [
-            ResultColumn(
-                "id" if each.key == "id" else each.name, each.quantity, [photo.get(each.key) for photo in flat]
-            )
-            for each in columns.photos_csv(records[0]["angles"])
+            ResultColumn("id" if each.key == "id" else each.name, each.quantity, list(flat[each.key]))
+            for each in listed
         ]
         return [_in_frame(each, units) for each in found]
     if records and "points" in records[0] and isinstance(records[0].get("used"), list):

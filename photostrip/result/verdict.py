@@ -12,7 +12,7 @@ from operator import itemgetter
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
 from photostrip.notes import Document, before, counted, listed
-from photostrip.result.records import Records
+from photostrip.result.records import Records, column_of
 from photostrip.statistics import SECOND_LOOK, TEST_LEVEL, chi2_quantile, f_p_value
 
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
@@ -286,22 +286,22 @@ def _pairs(document: Document) -> Iterator[str]:
     given = _stated(document)
     # said of the whole project already, or explained by what the photos have in common
     quiet = any(True for _ in _sigma0(document)) or bool(document.get("bundle", {}).get("calibration"))
-    pairs = [model for model in document["models"] if model["sigma0_um"] is not None]
+    models = document["models"]
+    columns = (column_of(models, key) for key in ("sigma0_um", "redundancy"))
+    pairs = [each for each in zip(*columns, range(len(models)), strict=True) if each[0] is not None]
     level = TEST_LEVEL / max(2 * len(pairs), 1)  # two tests of each pair
-    squares = sum(pair["redundancy"] * pair["sigma0_um"] ** 2 for pair in pairs)
-    redundancy = sum(pair["redundancy"] for pair in pairs)
+    squares, redundancy = sum(own * found**2 for found, own, _ in pairs), sum(own for _, own, _ in pairs)
     odd = []
-    for pair in pairs:
-        found, own = pair["sigma0_um"], pair["redundancy"]
+    for found, own, place in pairs:
         left = redundancy - own
         others = (max(squares - own * found**2, 0.0) / left) ** 0.5 if left else 0.0
         if (others and found > PAIR_RATIO * others and f_p_value((found / others) ** 2, own, left) < level) or (
             not quiet and found > PAIR_RATIO * given and (found / given) ** 2 * own > chi2_quantile(1 - level, own)
         ):
-            odd.append((found, others, pair))
+            odd.append((found, others, place))
     odd.sort(key=itemgetter(0), reverse=True)
-    for found, others, pair in odd[:NAMED]:
-        beside = f", the other pairs have {others:.1f} µm" if others else ""
+    for found, others, place in odd[:NAMED]:
+        pair, beside = models[place], f", the other pairs have {others:.1f} µm" if others else ""
         yield (
             f"photos {pair['left']} and {pair['right']}: sigma0 {found:.1f} µm, stated {given:.1f} µm{beside}; the "
             f"largest y parallax is at point {pair['max_parallax_point']}"
@@ -344,22 +344,21 @@ def _photos(document: Document) -> Iterator[str]:
     whole = document["summary"]["image_rms_um"]
     rejected = {(row["photo"], row["point"]) for row in document["rejected"] if not row.get("readmitted")}
     lost, poor, losing = Counter(photo for photo, _ in rejected), [], []
-    for photo in document["photos"]:
-        name, rms, count = photo["id"], photo["image_rms_um"] or 0, lost[photo["id"]]
-        measured = count + photo["points"]
+    columns = (column_of(document["photos"], key) for key in ("id", "image_rms_um", "points"))
+    for name, known, points in zip(*columns, strict=True):
+        rms, out, measured = known or 0, lost[name], lost[name] + points
         if whole and rms > PHOTO_RATIO * whole:
             text = f"image residuals of {rms:.1f} µm under the final orientation, {whole:.1f} µm in the whole project"
             poor.append((rms / whole, f"photo {name}: {text}"))
-        elif count > MANY_OF_PHOTO * measured:
-            losing.append((count / measured, f"photo {name}: {count} of its {measured} points were rejected"))
+        elif out > MANY_OF_PHOTO * measured:
+            losing.append((out / measured, f"photo {name}: {out} of its {measured} points were rejected"))
     for odd, kind in ((poor, " with large residuals"), (losing, " that lost points")):
         yield from (text for _, text in sorted(odd, reverse=True)[:NAMED])
         yield from _more(len(odd), "photo", kind)
 
 
 def _rejected(document: Document) -> Iterator[str]:
-    used = sum(model["points_used"] for model in document["models"])
-    gone = sum(model["points_rejected"] for model in document["models"])
+    used, gone = (sum(column_of(document["models"], key)) for key in ("points_used", "points_rejected"))
     if gone > MANY_REJECTED * (used + gone):
         yield f"{gone} of {used + gone} points in pairs were rejected, {100 * gone / (used + gone):.0f} %"
 

@@ -21,6 +21,7 @@ from photostrip.cli.main import main
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.pipeline.inputs import Strip
+from photostrip.pipeline.results import ROLES
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.project.loading import Project, load_project
@@ -584,7 +585,7 @@ def true_errors(*roles: str) -> Floats:
     found = result(SIMULATED)
     ids = np.array(found.refined.observations.point_ids)[found.points.number]
     true = {row["id"]: [row["x"], row["y"], row["z"]] for row in truth()["points"]}
-    rows = [row for row, role in enumerate(found.roles) if role in roles]
+    rows = [row for row, role in enumerate(found.roles.tolist()) if ROLES[role] in roles]
     errors: Floats = found.points.ground[rows] - np.array([true[name] for name in ids[rows]])
     return errors
 

@@ -17,7 +17,7 @@ from photostrip.result.description import Quantity, described, quantity_at
 from photostrip.result.numbers import RoundedColumn
 from photostrip.result.quantities import rounded_as
 from photostrip.result.reading import faults_of
-from photostrip.result.records import Records
+from photostrip.result.records import Grouped, Named, Records
 from photostrip.simulation import Models, simulate
 from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline
@@ -156,6 +156,28 @@ def test_records_are_written_as_a_list_of_them() -> None:
         assert json.loads(to_json(document)) == plain
     with pytest.raises(ValueError, match="JSON"):
         to_json({"a": Records({"x": [1.0, float("nan")]})})
+
+
+def test_columns_kept_as_arrays_are_written_as_their_records() -> None:
+    """With few records, which are written one by one, and with many, whose columns are written together."""
+    for count in (3, 900):
+        number = np.arange(count)
+        names = Named(("a", 'b"], [', "§\x85", "Höhe"), number % 4)
+        square = np.where(number % 3 == 1, np.nan, number - 2.5)
+        columns = {
+            "id": names,
+            "ids": Grouped(names, [0, *range(2, count + 1), count]),
+            "parts": Records({"x": RoundedColumn(square), "ids": names, "none": [[]] * count}),
+            "square": RoundedColumn(np.column_stack([square, -square])),
+            "count": RoundedColumn(number - 1),
+            "flag": RoundedColumn(number % 2 == 0),
+            "flags": Grouped(RoundedColumn(number % 2 == 0), [0] * count + [count]),
+        }
+        records = Records(columns)
+        plain = json.loads(json.dumps(list(records), default=list))
+        assert json.loads(to_json({"a": records})) == {"a": plain}
+        assert to_json({"a": records}) == to_json({"a": plain})
+        assert list(records.taken(number[::-1].copy()).columns["id"]) == [row["id"] for row in plain[::-1]]
 
 
 def test_records_are_a_list_of_what_stands_beside_each_other() -> None:

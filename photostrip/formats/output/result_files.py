@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache
 from itertools import chain, compress
 from typing import Any
 
 import numpy as np
 
 from photostrip.formats.text import number_columns
-from photostrip.formats.text.number_columns import Cells
+from photostrip.formats.text.number_columns import Cells, Texts
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result
 from photostrip.result import columns as tables
 from photostrip.result.columns import Column
 from photostrip.result.description import Quantity
-from photostrip.result.numbers import PER_RADIAN
+from photostrip.result.numbers import PER_RADIAN, RoundedColumn
 from photostrip.result.points.image_coordinates import refined_rows
-from photostrip.result.records import Grouped, Records
+from photostrip.result.quantities import COUNTS_AND_FLAGS
+from photostrip.result.records import Grouped, Named, Records
 
 ODD = re.compile(r'[",\s]')  # without these no id needs quotes
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
@@ -33,10 +35,13 @@ def beside_json(document: Document, resolved: str, result: Result | None) -> dic
     """
     frame, photos = document["frame"], document["photos"]
     angles = photos[0]["angles"] if photos else {"system": "alpha-omega-kappa", "unit": "deg"}
+    of_photos = tables.photos_csv(angles)
     unit = angles["unit"]
     files: dict[str, Iterable[str]] = {
         "points.csv": _table(tables.in_frame(tables.points_csv(unit), frame), _flat_points(document["points"], unit)),
-        "photos.csv": _table(tables.in_frame(tables.photos_csv(angles), frame), map(tables.flat_photo, photos)),
+        "photos.csv": _table(
+            tables.in_frame(of_photos, frame), tables.flat_photos(photos, of_photos) if photos else ()
+        ),
         "residuals.csv": _grouped(tables.residuals_csv(), document["residuals"]),
         "parallaxes.csv": _grouped(tables.parallaxes_csv(), document["parallaxes"]),
         "rejected.csv": rejected_csv(document),
@@ -54,15 +59,7 @@ def beside_json(document: Document, resolved: str, result: Result | None) -> dic
 
 def refined_csv(result: Result) -> Iterator[str]:
     """Give refined.csv: the ideal image coordinates of all points."""
-    found = refined_rows(result)
-    listed = tables.refined_csv()
-    ids = [(_cells(column.quantity, names), numbers) for column in listed[:2] for names, numbers in [found[column.key]]]
-
-    def cells(part: slice) -> list[Cells]:
-        coordinates = [_cells(column.quantity, found[column.key][part]) for column in listed[2:]]
-        return [*(names[:, numbers[part]] for names, numbers in ids), *coordinates]
-
-    yield from _pieces(listed, len(found["x_mm"]), LINES, cells)
+    return _table(tables.refined_csv(), refined_rows(result))
 
 
 def rejected_csv(document: Document) -> Iterator[str]:
@@ -94,7 +91,7 @@ def _table(columns: Sequence[Column], rows: Iterable[Document]) -> Iterator[str]
         listed = list(rows)
         rows = Records({column.key: [row.get(column.key) for row in listed] for column in columns})
     nothing = [None] * len(rows)
-    found = [(column.quantity, rows.columns.get(column.key, nothing)) for column in columns]
+    found = [(column.quantity, _with_texts(rows.columns.get(column.key, nothing))) for column in columns]
     return _pieces(columns, len(rows), LINES, lambda part: [_cells(quantity, cells[part]) for quantity, cells in found])
 
 
@@ -107,7 +104,8 @@ def _pieces(
         found = cells(slice(start, start + at_once))
         lines = found[0].shape[1]
         parts = [part for each in found for part in (each, number_columns.repeated(",", lines))]
-        yield number_columns.joined([*parts[:-1], number_columns.repeated("\n", lines)])
+        yield number_columns.joined(parts[:-1], "\n")
+        yield "\n"
 
 
 def _header(columns: Iterable[Column]) -> str:
@@ -119,11 +117,27 @@ def _cells(quantity: Quantity, values: Sequence[Any]) -> Cells:
     decimals = BY_UNIT_DECIMALS if quantity.unit_key else quantity.decimals
     if decimals is None and quantity.kind in {"count", "flag"}:
         decimals = 0
+    if isinstance(values, Named):
+        return number_columns.as_texts(np.asarray(values.names)[values.numbers])
+    if isinstance(values, RoundedColumn) and values.values.dtype.kind in COUNTS_AND_FLAGS:
+        return number_columns.as_whole(values.values.astype(np.int64))
     if decimals is not None:
         return number_columns.as_fixed(np.array(values, float), decimals, "")
     if quantity.kind == "text":
         return number_columns.as_texts(_texts(values))
     return number_columns.as_texts(["" if value is None else str(value) for value in values])
+
+
+def _with_texts(column: Sequence[Any]) -> Sequence[Any]:
+    """Write the texts that stand once for all lines, however many of these are written at a time."""
+    if isinstance(column, Grouped):
+        return Grouped(_with_texts(column.values), column.ends)
+    return Named(_quoted(tuple(column.names)), column.numbers) if isinstance(column, Named) else column
+
+
+@lru_cache(maxsize=2)  # the points of a result stand in several tables
+def _quoted(names: tuple[str, ...]) -> Texts:
+    return number_columns.texts_of(_texts(names))
 
 
 def _texts(values: Sequence[Any]) -> Sequence[Any]:
@@ -145,7 +159,7 @@ def _cell(text: str | Sequence[str] | None) -> str:
 def _grouped(columns: Sequence[Column], groups: Records | list[Document]) -> Iterator[str]:
     """Write points that stand together under a photo or a pair: its ids, then a line for each point."""
     first = [column.key for column in columns].index("points")
-    found = [_column(groups, column.key) for column in columns]
+    found = [_with_texts(_column(groups, column.key)) for column in columns]
     points = found[first]
     counts = np.diff(points.ends).tolist() if isinstance(points, Grouped) else list(map(len, points))
 

@@ -79,15 +79,20 @@ def _records(records: Records | list[Document], between: str, encode: Encoder) -
     columns = records.columns.values() if isinstance(records, Records) else ()
     listed = max((len(column.values) for column in columns if isinstance(column, Grouped)), default=0)
     at_once = max(min(LINES, LISTED * len(records) // max(listed, 1)), 1)
+    by_columns = len(records) >= FEW_LINES
+    if by_columns and isinstance(records, Records):
+        from photostrip.formats.output import json_lines  # with numpy, which nobody needs who reads a result
+
+        records = json_lines.with_texts(records, encode)
     for start in range(0, len(records), at_once):
         if start:
             yield between
-        yield _joined(records[start : start + at_once], between, encode, by_columns=len(records) >= FEW_LINES)
+        yield _joined(records[start : start + at_once], between, encode, by_columns=by_columns)
 
 
 def _joined(records: Records | list[Document], between: str, encode: Encoder, *, by_columns: bool) -> str:
     if by_columns:
-        from photostrip.formats.output import json_lines  # with numpy, which nobody needs who reads a result
+        from photostrip.formats.output import json_lines
 
         columns = records.columns if isinstance(records, Records) else json_lines.columns_of(records)
         if columns is not None:

@@ -7,14 +7,18 @@ together. Matrices are put on each other for lines; what fills them is taken out
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from photostrip.arrays import Floats
+from photostrip.arrays import Flags, Floats
 
 Cells = NDArray[np.uint8]  # (w, n)
+Lists = list[bytes]  # n lists of cells, one text each
+Column = Cells | Lists
+Texts = NDArray[np.bytes_]  # (n,)
 Count = NDArray[np.uint64]
 
 MOST_DIGITS = 15  # of a decimal number that no other one of as many shares its float with
@@ -26,8 +30,8 @@ TIE = 1e-3  # parts of the last digit by which a number must be off the middle b
 
 
 def as_repr(values: Floats, missing: str) -> Cells:
-    """Write numbers as ``repr`` does, NaN as ``missing``."""
-    size, least = np.minimum(np.abs(values), EXPONENT_FROM), 0.9 * (len(values) - np.count_nonzero(np.isnan(values)))
+    """Write numbers as ``repr`` does, what is not finite as ``missing``."""
+    size, least = np.minimum(np.abs(values), EXPONENT_FROM), 0.9 * np.count_nonzero(np.isfinite(values))
     for decimals in DECIMALS_TRIED:
         scaled = np.rint(size * 10.0**decimals)
         known = (scaled / 10.0**decimals == size) & (scaled < 10.0**MOST_DIGITS)
@@ -39,7 +43,7 @@ def as_repr(values: Floats, missing: str) -> Cells:
 
 
 def as_fixed(values: Floats, decimals: int, missing: str) -> Cells:
-    """Write numbers with this many decimals as ``%.3f`` does, NaN as ``missing``."""
+    """Write numbers with this many decimals as ``%.3f`` does, what is not finite as ``missing``."""
     scaled = np.minimum(np.abs(values), EXPONENT_FROM) * 10.0**decimals
     known = (scaled < 10.0 ** (MOST_DIGITS - 3)) & (np.abs(scaled - np.floor(scaled) - 0.5) > TIE)
     cells = _written(np.signbit(values), np.where(known, np.rint(scaled), 0.0).astype(np.uint64), decimals, short=False)
@@ -50,13 +54,22 @@ def as_whole(values: NDArray[np.int64]) -> Cells:
     return _written(values < 0, np.abs(values).astype(np.uint64), 0, short=False)
 
 
-def as_texts(texts: Sequence[str] | Sequence[bytes]) -> Cells:
+def as_texts(texts: Sequence[str] | Texts) -> Cells:
     """Take texts as they are; none may hold a NUL."""
-    try:
-        cells = np.array(texts, "S")
-    except UnicodeEncodeError:
-        cells = np.array([text.encode() for text in map(str, texts)])
+    cells = texts_of(texts)
     return cells.view(np.uint8).reshape(len(texts), cells.itemsize).T
+
+
+def texts_of(texts: Sequence[str] | Texts) -> Texts:
+    try:
+        return np.asarray(texts, "S")
+    except UnicodeEncodeError:
+        return np.array([text.encode() for text in map(str, texts)])
+
+
+def as_flags(values: Flags, texts: tuple[str, str]) -> Cells:
+    """Write one text for no and another for yes."""
+    return as_texts(texts_of(texts)[values.view(np.uint8)])
 
 
 def repeated(text: str, count: int) -> Cells:
@@ -64,30 +77,40 @@ def repeated(text: str, count: int) -> Cells:
     return np.broadcast_to(np.frombuffer(text.encode(), np.uint8)[:, None], (len(text.encode()), count))
 
 
-def joined(columns: Sequence[Cells]) -> str:
-    """Join the cells of columns, line by line."""
-    return _joined(columns).decode()
+def joined(columns: Sequence[Column], between: str) -> str:
+    """Join the cells of columns line by line, with something between the lines.
+
+    Beside lists no cell may hold a line end.
+    """
+    matrices = [column for column in columns if not isinstance(column, list)]
+    if len(matrices) == len(columns):
+        return _joined(matrices, between)[: -len(between)].decode()
+    parts: list[Lists] = []
+    for kind, group in groupby(columns, type):
+        some: list[Any] = list(group)
+        parts += some if kind is list else [_joined(some, "\n").split(b"\n")[:-1]]
+    return between.encode().join(map(b"".join, zip(*parts, strict=True))).decode()
 
 
-def _joined(columns: Sequence[Cells]) -> bytes:
-    return np.concatenate(columns).T.tobytes().translate(None, b"\0")
+def _joined(columns: Sequence[Cells], end: str) -> bytes:
+    lines = np.concatenate([*columns, repeated(end, columns[0].shape[1])])
+    return lines.T.tobytes().translate(None, b"\0")
 
 
-def listed(cells: Cells, ends: Sequence[int]) -> Cells:
-    """Write the cells between two ends each as a list in brackets."""
-    text = _joined([cells, repeated(", ", cells.shape[1])])
-    lengths = np.count_nonzero(cells, axis=0) + len(", ")
-    places = np.concatenate([[0], np.cumsum(lengths)])[np.array(ends)].tolist()
-    return as_texts([b"[%b]" % text[start : max(stop - len(", "), start)] for start, stop in pairwise(places)])
+def listed(cells: Cells, ends: Sequence[int]) -> Lists:
+    """Write the cells between two ends each as a list in brackets; none may hold a line end."""
+    between = np.repeat(np.frombuffer(b", ", np.uint8)[:, None], cells.shape[1], axis=1)
+    places = np.asarray(ends)
+    between[:, places[1:][places[1:] > places[:-1]] - 1] = [[ord("\n")], [0]]
+    lists = iter(np.concatenate([cells, between]).T.tobytes().translate(None, b"\0").split(b"\n"))
+    return [b"[%b]" % next(lists) if stop > start else b"[]" for start, stop in pairwise(places.tolist())]
 
 
-def _with_others(
-    cells: Cells, values: Floats, known: NDArray[np.bool_], missing: str, write: Callable[[float], str]
-) -> Cells:
+def _with_others(cells: Cells, values: Floats, known: Flags, missing: str, write: Callable[[float], str]) -> Cells:
     """Put in what is not written together with the rest."""
     if known.all():
         return cells
-    nothing = np.isnan(values)
+    nothing = ~np.isfinite(values)
     single = np.flatnonzero(~known & ~nothing)
     texts = as_texts([write(value) for value in values[single].tolist()] or [""])
     result = np.zeros((max(len(cells), len(texts), len(missing)), len(values)), np.uint8)
@@ -98,20 +121,21 @@ def _with_others(
     return result
 
 
-def _written(negative: NDArray[np.bool_], count: Count, decimals: int, *, short: bool) -> Cells:
+def _written(negative: Flags, count: Count, decimals: int, *, short: bool) -> Cells:
     """Write numbers counted in units of their last decimal; ``short`` leaves out zeros at the end but the first."""
     whole = count // np.uint64(10**decimals)
-    width = len(str(int(whole.max(initial=0))))
-    result = np.empty((1 + width + (decimals > 0) + decimals, len(count)), np.uint8)
-    result[0] = negative * np.uint8(ord("-"))
-    _write_digits(whole, result[1 : 1 + width])
+    sign, width = int(negative.any()), len(str(int(whole.max(initial=0))))
+    point = sign + width
+    result = np.empty((point + (decimals > 0) + decimals, len(count)), np.uint8)
+    result[:sign] = negative * np.uint8(ord("-"))
+    _write_digits(whole, result[sign:point])
     for place in range(1, width):
-        result[width - place] *= whole >= 10**place
+        result[point - 1 - place] *= whole >= 10**place
     if decimals:
-        result[1 + width] = ord(".")
-        _write_digits(count - whole * np.uint64(10**decimals), result[2 + width :])
-        zero = np.full(len(count), short)
-        for place in range(len(result) - 1, 2 + width, -1):
+        result[point] = ord(".")
+        _write_digits(count - whole * np.uint64(10**decimals), result[point + 1 :])
+        zero = np.ones(len(count), bool)
+        for place in range(len(result) - 1, point + 1, -1) if short else ():
             zero &= result[place] == ord("0")
             result[place] *= ~zero
     return result

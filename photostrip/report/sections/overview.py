@@ -120,8 +120,8 @@ def _stages(document: Document) -> Rows:
 
 def _pairs(document: Document) -> Rows:
     summary, models = document["summary"], document["models"]
-    out = sum(model["points_rejected"] for model in models)
-    total = out + sum(model["points_used"] for model in models)
+    out, used = (sum(column_of(models, key)) for key in ("points_rejected", "points_used"))
+    total = out + used
     sigma0 = summary.get("sigma0_pairs_um", summary["sigma0_um"])
     text = (
         f"σ0 {micrometres(sigma0)} µm, stated {micrometres(summary['sigma_given_um'])} µm; {out} of "

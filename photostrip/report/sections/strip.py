@@ -44,7 +44,7 @@ def worst_first(
 
 def column_of(rows: Sequence[Document], key: str) -> list[Any]:
     """Return the values of a key; from records that are kept as columns without making them."""
-    columns = getattr(rows, "columns", None)
+    columns = getattr(rows, "columns", None) if len(rows) else None
     return [row.get(key) for row in rows] if columns is None else list(columns[key])
 
 
@@ -60,12 +60,12 @@ def elsewhere(rest: int, what: str, section: str, block: str) -> str:
 
 def relative_section(document: Document, *, everything: bool) -> Section:
     """Relative orientation: how good the image coordinates are, pair by pair."""
-    summary, models = document["summary"], document["models"]
+    summary, models = document["summary"], list(document["models"])  # gone through many times
     where = ("pairs", "relative", "models")
     shown, note = worst_first(models, lambda m: m["sigma0_um"] or 0.0, where, everything=everything)
     worst = max(models, key=lambda m: m["max_parallax_um"] or 0.0)
-    rejected = sum(m["points_rejected"] for m in models)
-    total = rejected + sum(m["points_used"] for m in models)
+    rejected, used = (sum(column_of(models, key)) for key in ("points_rejected", "points_used"))
+    total = rejected + used
     sigma0 = (
         f"{micrometres(summary['sigma0_um'])} µm for an image coordinate (stated: "
         f"{micrometres(summary['sigma_given_um'])} µm), {counted(summary['redundancy'], 'redundant point')}"
@@ -116,7 +116,7 @@ def _elements(unit: AngleUnit) -> tuple[Shown, ...]:
 
 def junction_section(document: Document, *, everything: bool) -> Section:
     """Scale transfer: how well neighbouring models agree, and how the scale drifts."""
-    junctions = document["junctions"]
+    junctions = list(document["junctions"])
     shown, note = worst_first(
         junctions, lambda j: j["spread_ppm"] or 0.0, ("junctions", "junctions", "junctions"), everything=everything
     )

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.notes import Document
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.result.quantities import records
 from photostrip.result.records import Records
@@ -30,10 +29,10 @@ def discrepancies(strip: StripResult) -> Floats:
     return np.asarray(similarity.scale * gap @ similarity.rotation.T, float)
 
 
-def junctions_of(result: Result) -> list[Document]:
+def junctions_of(result: Result) -> Records:
     """Return the list ``junctions``: the scale transfer at every photo that joins two models."""
     ids = result.refined.observations.point_ids
-    return [junction for strip in result.photo_strips for junction in _junctions(strip, ids)]
+    return Records.joined(_junctions(strip, ids) for strip in result.photo_strips)
 
 
 def _junctions(strip: StripResult, ids: Sequence[str]) -> Records:

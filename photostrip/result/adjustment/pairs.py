@@ -9,10 +9,9 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.notes import Document
 from photostrip.pipeline.results import PhotoStages, Result, StripResult
 from photostrip.result.quantities import grouped, records
-from photostrip.result.records import Records
+from photostrip.result.records import Named, Records
 from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest, residual_sigma
 from photostrip.triangulation.gross_errors.pairs.screening import SEARCHES, tested
 from photostrip.triangulation.gross_errors.pairs.screening import stages as tests_of
@@ -54,10 +53,10 @@ def sigma0(squares: Floats, redundancy: Numbers) -> float:
     return float(np.sqrt(squares.sum() / 2 / total)) if total > 0 else float("nan")
 
 
-def models_of(result: Result) -> list[Document]:
+def models_of(result: Result) -> Records:
     """Return the list ``models``: relative orientation and scale of every pair, in flight order."""
     ids = result.refined.observations.point_ids
-    return [model for strip in result.photo_strips for model in _models(strip, ids, result.settings.relative)]
+    return Records.joined(_models(strip, ids, result.settings.relative) for strip in result.photo_strips)
 
 
 def _models(strip: StripResult, ids: Sequence[str], relative: RelativeSettings) -> Records:
@@ -125,7 +124,7 @@ def parallaxes_of(result: Result, rank: Numbers) -> Records:
         oriented, screened, photos = strip.of_photos.orientation, strip.of_photos.screened, strip.strip.photos
         order = np.lexsort((rank[oriented.point], oriented.pairs.pair))
         columns = {
-            "points": [ids[number] for number in oriented.point[order]],
+            "points": Named(ids, oriented.point[order]),
             "q_um": 1000.0 * oriented.parallax[order],
             "used": oriented.used[order],
             "zone": screened.zone[order],

@@ -9,12 +9,12 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
-from photostrip.pipeline.results import Result
+from photostrip.pipeline.results import ROLES, Result
 from photostrip.result.numbers import RoundedColumn, natural_rank, to_decimals
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns
 from photostrip.result.quantities import coordinate_decimals, records
-from photostrip.result.records import Records
+from photostrip.result.records import Named, Records
 
 
 def coordinates(frame: GroundFrame, enu: Floats) -> Document:
@@ -52,8 +52,8 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> Records:
     for strip in result.strips:
         models[strip.formed.point] += strip.formed.model_count
     columns = {
-        "id": [ids[number] for number in points.number],
-        "role": list(result.roles),
+        "id": Named(ids, points.number),
+        "role": Named(ROLES, result.roles),
         **coordinates(result.output, points.ground),
         **point_columns(result),
         "rays": points.rays,

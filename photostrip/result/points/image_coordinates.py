@@ -7,8 +7,9 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result
-from photostrip.result.numbers import EXACT, natural_rank, significant
+from photostrip.result.numbers import EXACT, RoundedColumn, natural_rank, significant
 from photostrip.result.quantities import grouped
+from photostrip.result.records import Named, Records
 from photostrip.units import MICROMETRES
 
 
@@ -39,10 +40,10 @@ def fiducials_of(result: Result) -> Document:
     return {"fiducials": list(grouped("fiducials", heads, of_marks, ends))}
 
 
-def refined_rows(result: Result) -> Document:
-    """Return the columns of refined.csv, photos in flight order and points in natural order; of models there are none.
+def refined_rows(result: Result) -> Records:
+    """Return the rows of refined.csv, photos in flight order and points in natural order; of models there are none.
 
-    Ids stand once, with the number of each row's. The coordinates are those that the adjustment takes, corrected by a
+    The coordinates are those that the adjustment takes, corrected by a
     calibration where a bundle has found one.
     """
     found = result.refined.observations
@@ -50,11 +51,12 @@ def refined_rows(result: Result) -> Document:
     order = np.array([place.get(photo, len(place)) for photo in found.photo_ids], np.intp)
     rows = np.lexsort((natural_rank(found.point_ids)[found.point], order[found.photo]))
     sigma: Floats = found.sigma[rows] * MICROMETRES
-    return {
-        "photo": (found.photo_ids, found.photo[rows]),
-        "point": (found.point_ids, found.point[rows]),
-        "x_mm": found.xy[rows, 0],
-        "y_mm": found.xy[rows, 1],
-        "sigma_x_um": sigma[:, 0],
-        "sigma_y_um": sigma[:, 1],
+    columns = {
+        "photo": Named(found.photo_ids, found.photo[rows]),
+        "point": Named(found.point_ids, found.point[rows]),
+        "x_mm": RoundedColumn(found.xy[rows, 0]),
+        "y_mm": RoundedColumn(found.xy[rows, 1]),
+        "sigma_x_um": RoundedColumn(sigma[:, 0]),
+        "sigma_y_um": RoundedColumn(sigma[:, 1]),
     }
+    return Records(columns)

@@ -13,11 +13,11 @@ from photostrip.geometry.rotation import angles
 from photostrip.notes import Document
 from photostrip.pipeline.inputs import Strip
 from photostrip.pipeline.results import Result, StripResult
-from photostrip.result.numbers import PER_RADIAN, Plain, rounded
+from photostrip.result.numbers import PER_RADIAN, Plain, RoundedColumn, to_decimals
 from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns
 from photostrip.result.quantities import angle_decimals, grouped, records
-from photostrip.result.records import Records
+from photostrip.result.records import Named, Records
 from photostrip.triangulation.resection.collinearity import project
 
 
@@ -86,7 +86,7 @@ def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> Records:
     observations, found = result.refined.observations, []
     for image in images:
         columns = {
-            "points": [observations.point_ids[number] for number in observations.point[image.rows].tolist()],
+            "points": Named(observations.point_ids, observations.point[image.rows]),
             "vx_um": 1000.0 * image.residuals[:, 0],
             "vy_um": 1000.0 * image.residuals[:, 1],
             "used": image.used,
@@ -112,7 +112,7 @@ def point_rms(result: Result, images: Sequence[ImageResiduals]) -> Floats:
         return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))
 
 
-def photos_of(result: Result, images: Sequence[ImageResiduals]) -> list[Document]:
+def photos_of(result: Result, images: Sequence[ImageResiduals]) -> Records | list[Document]:
     """Return the list ``photos``: exterior orientations in the frame of the result, in flight order.
 
     Of photos whose strip is made of independent models the perspective centre alone is known.
@@ -120,12 +120,8 @@ def photos_of(result: Result, images: Sequence[ImageResiduals]) -> list[Document
     if result.model_strips:
         return [photo for number, strip in enumerate(result.strips) for photo in _centres(result, number, strip)]
     of_strips = zip(result.photo_strips, images, strict=False)
-    found = [
-        photo
-        for number, (strip, image) in enumerate(of_strips)
-        for photo in _photos_of_strip(result, number, strip, image)
-    ]
-    return found + _single_photos(result, images[len(result.photo_strips) :])
+    found = [_photos_of_strip(result, number, strip, image) for number, (strip, image) in enumerate(of_strips)]
+    return Records.joined([*found, *_single_photos(result, images[len(result.photo_strips) :])])
 
 
 def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> Records:
@@ -145,7 +141,7 @@ def _photos_of_strip(result: Result, number: int, strip: StripResult, image: Ima
     return records("photos", head | _turned(result, rotations) | sigmas | columns)
 
 
-def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Document]:
+def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Records]:
     if result.bundle is None or not images:
         return []
     singles = result.bundle.singles
@@ -165,7 +161,7 @@ def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Doc
     }
     head = {"id": photos, "strip": [single.strip.id for single in singles], **coordinates(result.output, ground)}
     sigmas = photo_columns(result, axes, rotations, result.bundle.photo_covariances[rows])
-    return list(records("photos", head | _turned(result, rotations) | sigmas | columns))
+    return [records("photos", head | _turned(result, rotations) | sigmas | columns)]
 
 
 def _turned(result: Result, rotations: Floats) -> Document:
@@ -174,15 +170,14 @@ def _turned(result: Result, rotations: Floats) -> Document:
     return {"rotation": rotations.reshape(-1, 9), "angles": {"system": system, "unit": unit, "values": values}}
 
 
-def _angles(rotations: Floats, system: str, unit: str) -> list[Plain]:
+def _angles(rotations: Floats, system: str, unit: str) -> Sequence[Plain]:
     """Angles in the unit of the output; None for a photo whose outer two angles cannot be separated."""
     try:
-        found: list[Plain] = rounded(angles(rotations, system) * PER_RADIAN[unit], angle_decimals(unit))
+        return RoundedColumn(to_decimals(angles(rotations, system) * PER_RADIAN[unit], angle_decimals(unit)))
     except GeometryError:
         if len(rotations) == 1:
             return [None]
         return [_angles(rotation[None], system, unit)[0] for rotation in rotations]
-    return found
 
 
 def _centres(result: Result, number: int, strip: StripResult) -> list[Document]:

@@ -11,6 +11,7 @@ from photostrip.notes import Document
 from photostrip.pipeline.results import Result
 from photostrip.result.points.given import Differences
 from photostrip.result.quantities import record
+from photostrip.result.records import column_of
 from photostrip.result.statement.figures import figures_of
 from photostrip.result.statement.stating import reason, stated
 from photostrip.result.verdict import FAILED, UNVERIFIED
@@ -22,7 +23,8 @@ def statement_of(result: Result, found: Differences, document: Document) -> Docu
     measured = control.check & (result.control_rows >= 0)
     figures = figures_of(found.parts[measured], _sigma(result, measured))
     ids = [name for name, yes in zip(control.ids, control.check.tolist(), strict=True) if yes]
-    odd = [row["id"] for row in document["control"] if row["role"] == "check" and row["stands_out"]]
+    given = zip(*(column_of(document["control"], key) for key in ("id", "role", "stands_out")), strict=True)
+    odd = [name for name, role, parts in given if role == "check" and parts]
     block = {
         "status": "",
         "not_measured": len(ids) - int(measured.sum()),

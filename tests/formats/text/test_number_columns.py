@@ -22,7 +22,7 @@ NUMBERS = st.lists(
 
 
 def written(cells: Cells) -> list[str]:
-    return number_columns.joined([cells, number_columns.repeated("\n", cells.shape[1])]).split("\n")[:-1]
+    return number_columns.joined([cells], "\n").split("\n")
 
 
 @given(NUMBERS)
@@ -50,6 +50,20 @@ def test_what_is_no_number_is_missing_and_texts_stay() -> None:
     assert written(number_columns.as_whole(np.array([0, -17, 4000]))) == ["0", "-17", "4000"]
     assert written(number_columns.as_texts(["a", "", "Höhe 2"])) == ["a", "", "Höhe 2"]
     cells = number_columns.as_whole(np.array([1, 22, 333]))
-    assert written(number_columns.listed(cells, [0, 2, 2, 3])) == ["[1, 22]", "[]", "[333]"]
+    assert number_columns.listed(cells, [0, 2, 2, 3]) == [b"[1, 22]", b"[]", b"[333]"]
     names = number_columns.as_texts(["é", "b", "Höhe 2", ""])
-    assert written(number_columns.listed(names, [0, 0, 2, 4])) == ["[]", "[é, b]", "[Höhe 2, ]"]
+    assert number_columns.listed(names, [0, 0, 2, 4]) == [b"[]", "[é, b]".encode(), "[Höhe 2, ]".encode()]
+    assert written(number_columns.as_flags(np.array([True, False]), ("no", "yes"))) == ["yes", "no"]
+
+
+def test_lists_stand_between_cells() -> None:
+    cells = number_columns.as_whole(np.array([1, 22, 333]))
+    lists = number_columns.listed(cells, [0, 2, 2, 3])
+    columns: list[number_columns.Column] = [
+        cells,
+        number_columns.repeated(": ", 3),
+        lists,
+        lists,
+        number_columns.repeated(";", 3),
+    ]
+    assert number_columns.joined(columns, ",\n") == "1: [1, 22][1, 22];,\n22: [][];,\n333: [333][333];"
