@@ -22,7 +22,7 @@ from photostrip.geodesy.curvature import Ellipsoid, curvature_correction, meridi
 from photostrip.geodesy.domain import finite_rows, named_rows, require_reached, require_rows
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind
 from photostrip.geodesy.ground_axes import axes_along_north, axes_between, true_axes
-from photostrip.geodesy.local_frame import geocentric_from_geodetic, geodetic_from_geocentric
+from photostrip.geodesy.local_frame import geocentric_columns, geocentric_from_geodetic, geodetic_from_geocentric
 from photostrip.geodesy.proj_operation import DatumShift, ProjOperation, wrapped_longitude
 
 WGS84: Ellipsoid = (6378137.0, 6356752.314245179)
@@ -319,14 +319,15 @@ class GroundFrame:
         weights = np.array([-1.0, 8.0, -8.0, 1.0])
         axes, reached = np.empty((len(geodetic), 3, 3)), np.zeros(len(geodetic), bool)
         for rows in pieces(len(geodetic)):
-            n = len(plan[rows])
-            lonlat = self._plane.apply((plan[rows] + offsets[:, None, :]).reshape(-1, 2)) * self._angle
-            reached[rows] = finite_rows(lonlat.reshape(8, n, 2).transpose(1, 0, 2).reshape(n, 16))
+            ends = plan[rows].T[:, None, :] + offsets.T[:, :, None]
+            lonlat = self._plane.apply(ends.reshape(2, -1).T) * self._angle
+            reached[rows] = finite_rows(lonlat).reshape(8, -1).all(axis=0)
             if reached[rows].all():
                 # On the ellipsoid: with the height of the point, lines that cross at right angles there would not here.
-                on_ellipsoid = np.column_stack([lonlat, np.zeros(len(lonlat))])
-                xyz = geocentric_from_geodetic(on_ellipsoid, self.ellipsoid).reshape(2, 4, n, 3)
-                axes[rows] = axes_between(*np.einsum("k,aknc->anc", weights, xyz))
+                lon, lat = lonlat.T
+                xyz = geocentric_columns(lon, lat, 0.0, self.ellipsoid)
+                east, north = np.einsum("k,cakn->acn", weights, np.reshape(xyz, (3, 2, 4, -1)))
+                axes[rows] = axes_between(east.T, north.T)
         require_reached(reached, f"outside, or at the edge of, the domain of {self.spec.name}", None)
         return axes
 

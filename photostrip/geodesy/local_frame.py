@@ -31,10 +31,17 @@ def geocentric_from_geodetic(geodetic: ArrayLike, ellipsoid: Ellipsoid) -> Float
     Z = (N (1 - e^2) + H) sin B.
     """
     lon, lat, height = np.asarray(geodetic, dtype=np.float64).reshape(-1, 3).T
+    return np.stack(geocentric_columns(lon, lat, height, ellipsoid), axis=-1)
+
+
+def geocentric_columns(
+    lon: Floats, lat: Floats, height: Floats | float, ellipsoid: Ellipsoid
+) -> tuple[Floats, Floats, Floats]:
+    """Return the same column by column: many points have theirs one behind the other."""
     radius = prime_vertical_radius(lat, ellipsoid)
     across = (radius + height) * np.cos(lat)
     along = (radius * (1.0 - eccentricity_squared(ellipsoid)) + height) * np.sin(lat)
-    return np.stack([across * np.cos(lon), across * np.sin(lon), along], axis=-1)
+    return across * np.cos(lon), across * np.sin(lon), along
 
 
 def geodetic_from_geocentric(xyz: ArrayLike, ellipsoid: Ellipsoid) -> Floats:

@@ -86,7 +86,7 @@ class ProjOperation:
     def _run(self, rows: Floats, epoch: float | None, *, inverse: bool) -> Floats:
         """Transform rows with the coordinates of an epoch."""
         dated = rows if epoch is None else np.column_stack([rows, np.full(len(rows), epoch)])
-        return np.stack(_run(self.transformer, dated.T, inverse=inverse), axis=-1)[:, : rows.shape[1]]
+        return np.stack(_run(self.transformer, dated.T, inverse=inverse)).T[:, : rows.shape[1]]
 
     @property
     def area(self) -> str:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
+from photostrip.geometry.rotation import cross_matrix
 from photostrip.points import frozen
 
 SIMILARITY_PARAMETERS = 7  # shift, rotation, logarithm of the scale
@@ -83,7 +84,7 @@ def pair_scales(source: Floats, target: Floats) -> PairScales:
     return PairScales(first=first, second=second, source=in_source, target=in_target)
 
 
-def collinearity(points: ArrayLike, weights: ArrayLike | None = None) -> float:
+def collinearity(points: ArrayLike) -> float:
     """How far points (n, 3) are from a line: second over first singular value of their scatter.
 
     0 for points on a line and for fewer than three, 1 for points spread alike in two directions.
@@ -91,9 +92,8 @@ def collinearity(points: ArrayLike, weights: ArrayLike | None = None) -> float:
     p = np.asarray(points, float)
     if len(p) < 3:
         return 0.0
-    w = np.ones(len(p)) if weights is None else np.asarray(weights, float)
-    d = p - np.average(p, axis=0, weights=w)
-    values = np.linalg.svd((d * w[:, None]).T @ d, compute_uv=False)
+    d = p - p.mean(axis=0)
+    values = np.linalg.svd(d.T @ d, compute_uv=False)
     return float(values[1] / values[0]) if values[0] > 0 else 0.0
 
 
@@ -111,3 +111,30 @@ def similarity_derivatives(xyz: Floats, origin: Floats) -> Floats:
     derivatives[:, 2, 3], derivatives[:, 2, 4] = y, -x
     derivatives[:, :, 6] = arm
     return derivatives
+
+
+class Spread(NamedTuple):
+    """How points lie in the source system of similarities."""
+
+    middle: Floats  # (3,)
+    moments: Floats  # (3, 3): mean products of the coordinates about it
+
+    @classmethod
+    def of(cls, points: Floats) -> Spread:
+        """Sum up points (n, 3)."""
+        arm = points - (middle := points.mean(axis=0))
+        return cls(middle, arm.T @ arm / len(arm))
+
+    def motion(self, similarity: Similarity, center: Floats, unit: float) -> Floats:
+        """Triangular root (7, 7) of the matrix that gives the mean square motion of the points from seven parameters.
+
+        center, unit: of a small similarity after the one given: its centre, and the length in which arms are counted.
+        """
+        middle, turn = (similarity(self.middle) - center) / unit, similarity.scale / unit * similarity.rotation
+        moments = turn @ self.moments @ turn.T + np.outer(middle, middle)
+        square = np.eye(SIMILARITY_PARAMETERS)  # of the derivatives by shift, rotation and scale: 1, -[a], a
+        square[3:6, :3], square[6, :3] = cross_matrix(middle), middle
+        square[3:, 3:] *= np.trace(moments)
+        square[3:6, 3:6] -= moments
+        # takes what lies below the diagonal
+        return np.asarray(np.linalg.cholesky(square + 1e-15 * np.eye(SIMILARITY_PARAMETERS)), float)

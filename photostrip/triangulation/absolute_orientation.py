@@ -22,7 +22,7 @@ from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
-from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.geometry.similarity import Similarity, Spread, collinearity
 from photostrip.notes import listed
 from photostrip.points import ControlPoints
 
@@ -68,10 +68,14 @@ class Targets:
     def of(self, xyz: Floats) -> Floats:
         """Targets of the control points: their present positions, with all given coordinates put in."""
         result = self.of_full.copy()
-        partly = np.flatnonzero(~self.control.use.all(axis=1))
-        if len(partly):
+        if len(partly := self._partly):
             result[partly] = self._put_in(partly, self.intermediate.cartesian_from_intermediate(xyz[partly]))
         return self.intermediate.intermediate_from_cartesian(result)
+
+    @cached_property
+    def _partly(self) -> Numbers:
+        """Points of which some coordinates count only."""
+        return np.flatnonzero(~self.control.use.all(axis=1))
 
     @cached_property
     def of_full(self) -> Floats:
@@ -126,9 +130,9 @@ class Targets:
                 result[rows] = directions(frame, cartesian[rows])
         return result
 
-    def misclosures(self, xyz: Floats) -> Floats:
-        """Present minus given coordinates, along the ground axes; 0 where a coordinate does not count."""
-        return np.where(self.control.use, np.einsum("nij,nj->ni", self.axes(xyz), xyz - self.of(xyz)), 0.0)
+    def misclosures(self, xyz: Floats, axes: Floats) -> Floats:
+        """Present minus given coordinates, along the ``axes`` there; 0 where a coordinate does not count."""
+        return np.where(self.control.use, np.einsum("nij,nj->ni", axes, xyz - self.of(xyz)), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +140,8 @@ class AbsoluteOrientation:
     """The similarity from the strip to the intermediate frame, and how well it fits."""
 
     similarity: Similarity  # strip to intermediate frame
-    # (n, 3): strip minus control along the axes compared (``Targets.axes``) in metres, after the similarity; 0 where a
-    # coordinate does not count
-    misclosures: Floats
+    axes: Floats  # (n, 3, 3): those along which strip and control are compared (``Targets.axes``), after the similarity
+    misclosures: Floats  # (n, 3): strip minus control along them in metres; 0 where a coordinate does not count
     # standard deviation of unit weight, without unit (1 when the strip fits within the sigmas of the control and the
     # a-priori precision of its points); NaN without redundancy
     sigma0: float
@@ -165,7 +168,7 @@ class Laid(NamedTuple):
     """A strip on its control."""
 
     similarity: Similarity  # strip to intermediate frame
-    design: Floats  # (k, 7): of the last step, for motions of unit size
+    values: Floats  # (7,): singular values of the design of the last step, for motions of unit size
     iterations: int
 
 
@@ -176,6 +179,7 @@ def lay(
     reach: Floats | None = None,
     watch: Callable[[Similarity, Floats], None] | None = None,
     known: Floats | None = None,
+    enough: float = CONVERGED,
 ) -> Laid:
     """Similarity of the strip on its control.
 
@@ -187,6 +191,7 @@ def lay(
     watch: called at every step with the similarity before it, and shifts, rotations and scale of the step, metres at
         the end of the strip.
     known: (n, 3, 3), optional, axes along which strip and control are compared (``Targets.axes``).
+    enough: of the strip's half length: the last step is smaller.
     Raises GeometryError when the control does not determine seven parameters; the free motion is named.
     Raises InputError when the strip comes out upside down: the control is left-handed.
 
@@ -194,28 +199,31 @@ def lay(
     """
     _refuse_too_few(targets.control)
     similarity = _start(strip, targets, weight)
-    _refuse_given_on_line(strip, targets.of(similarity(strip)), targets.control)
-    half = max(float(np.ptp(similarity(strip), axis=0).max()) / 2, 1e-6)
-    axes = targets.axes(similarity(strip)) if known is None else known
+    xyz = similarity(strip)
+    _refuse_given_on_line(strip, targets.of(xyz), targets.control)
+    half = max(float(np.ptp(xyz, axis=0).max()) / 2, 1e-6)
+    axes = targets.axes(xyz) if known is None else known
+    spread = None if reach is None else Spread.of(reach)
+    share = np.sqrt(weight[targets.control.use])
     for iteration in range(1, ITERATIONS + 1):
         xyz = similarity(strip)
         if iteration == LAST_AXES_UPDATE and known is None:
             axes = targets.axes(xyz)
         plain, free = design(xyz, targets, axes, half)
-        root = _motion(None if reach is None else similarity(reach), xyz.mean(axis=0), half)
-        _refuse_deficient(plain, root, xyz, targets, half)  # weights do not decide what is free
-        share = np.sqrt(weight[targets.control.use])
+        root = np.eye(PARAMETERS) if spread is None else spread.motion(similarity, xyz.mean(axis=0), half)
+        values = _refuse_deficient(plain, root, xyz, targets, half)  # weights do not decide what is free
         step = np.asarray(np.linalg.lstsq(plain * share[:, None], free * share, rcond=None)[0], float)
         if watch is not None:
             watch(similarity, step)
         similarity = corrected(similarity, step, xyz.mean(axis=0), half)
-        if np.abs(step).max() < CONVERGED * half:
+        if np.abs(step).max() < enough * half:
             break
     if similarity.rotation[2, 2] < 0:
         given = targets.of(similarity(strip))
         if collinearity(given) < WEAK_LIMIT**2:
             raise _on_line(given, targets.control)  # a line fits upside down as well as upright
-        off = median(np.linalg.norm(targets.misclosures(similarity(strip)), axis=1))
+        xyz = similarity(strip)
+        off = median(np.linalg.norm(targets.misclosures(xyz, targets.axes(xyz)), axis=1))
         if off > MOST_OFF * half:
             message = (
                 f"the strip does not fit its control: half of the points are more than {off:.4g} m off, and the strip "
@@ -225,22 +233,24 @@ def lay(
         message = "the strip fits the control only upside down: the control coordinates are left-handed"
         expected = "the axes in the order of the columns, [north, east, up] where X is north"
         raise InputError(Fault(message, code="left-handed-control", key="control.axes", expected=expected))
-    return Laid(similarity, _scaled_design(plain, root), iteration)
+    return Laid(similarity, values, iteration)
 
 
 def orient(strip: Floats, targets: Targets, weight: Floats, reach: Floats | None = None) -> AbsoluteOrientation:
     """Lay the strip on its control, and say how well it fits."""
     laid = lay(strip, targets, weight, reach)
-    misclosures = targets.misclosures(laid.similarity(strip))
-    values = np.linalg.svd(laid.design, compute_uv=False)
+    xyz = laid.similarity(strip)
+    axes = targets.axes(xyz)
+    misclosures = targets.misclosures(xyz, axes)
     redundancy = int(targets.control.use.sum()) - PARAMETERS
     squares = float((weight * misclosures**2).sum())
     return AbsoluteOrientation(
         similarity=laid.similarity,
+        axes=axes,
         misclosures=misclosures,
         sigma0=float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan"),
         redundancy=redundancy,
-        condition=float(values[0] / values[-1]),
+        condition=float(laid.values[0] / laid.values[-1]),
         iterations=laid.iterations,
     )
 
@@ -344,32 +354,17 @@ def corrected(similarity: Similarity, step: Floats, center: Floats, half: float)
     return Similarity(similarity.scale * growth, u @ vt, shift)
 
 
-def _motion(reach: Floats | None, center: Floats, half: float) -> Floats:
-    """Triangular root of the matrix that gives the mean square motion of the strip's points from seven parameters."""
-    if reach is None:
-        return np.eye(PARAMETERS)
-    arm = (reach - center) / half
-    middle, moments = arm.mean(axis=0), arm.T @ arm / len(arm)
-    square = np.eye(PARAMETERS)  # of the derivatives by shift, rotation and scale: 1, -[a], a
-    square[3:6, :3], square[6, :3] = cross_matrix(middle), middle
-    square[3:, 3:] *= np.trace(moments)
-    square[3:6, 3:6] -= moments
-    # takes what lies below the diagonal
-    return np.asarray(np.linalg.cholesky(square + 1e-15 * np.eye(PARAMETERS)), float)
+def _refuse_deficient(design: Floats, root: Floats, xyz: Floats, targets: Targets, half: float) -> Floats:
+    """Raise when the control leaves a motion free, and name that motion.
 
-
-def _scaled_design(design: Floats, root: Floats) -> Floats:
-    """Design for motions of unit size, so that its singular values say how much of each the control sees."""
-    return np.asarray(np.linalg.solve(root, design.T).T, float)
-
-
-def _refuse_deficient(design: Floats, root: Floats, xyz: Floats, targets: Targets, half: float) -> None:
-    """Raise when the control leaves a motion free, and name that motion."""
-    scaled = _scaled_design(design, root)
-    # the triangular factor has the same singular values and directions, however many control points there are
-    _, values, vt = np.linalg.svd(np.linalg.qr(scaled, mode="r") if len(scaled) > PARAMETERS else scaled)
+    Returns the singular values (7,) of the design for motions of unit size: how much of each the control sees.
+    """
+    scaled = np.linalg.solve(root, design.T).T
+    values = np.linalg.svd(scaled, compute_uv=False)
     if len(values) == PARAMETERS and values[-1] > LEAST_MOTION * values[0]:
-        return
+        return np.asarray(values, float)
+    # the triangular factor has the same directions, however many control points there are
+    _, _, vt = np.linalg.svd(np.linalg.qr(scaled, mode="r") if len(scaled) > PARAMETERS else scaled)
     free = free_motion(np.linalg.solve(root.T, vt[-1]), xyz, targets.control, half)
     msg = f"absolute orientation: the control does not determine {free}"
     raise GeometryError(msg, points=targets.control.ids, code="control-deficient")

@@ -301,10 +301,10 @@ def test_a_target_is_the_point_with_the_given_coordinates_put_in(seed: int) -> N
     before, after = (frame.cartesian_from_intermediate(p) for p in (present, one.targets.of(present)))
     given_ = np.array([GROUND[name] for name in use])
     assert np.allclose(after, np.where(one.control.use, given_, before), rtol=0, atol=1e-9)
-    assert np.allclose(
-        one.targets.misclosures(present), np.where(one.control.use, before - given_, 0), rtol=0, atol=1e-9
-    )
     axes = one.targets.axes(present)
+    assert np.allclose(
+        one.targets.misclosures(present, axes), np.where(one.control.use, before - given_, 0), rtol=0, atol=1e-9
+    )
     assert np.allclose(axes @ axes.transpose(0, 2, 1), np.eye(3), rtol=0, atol=1e-12)
     assert np.allclose(axes @ (np.array([0.0, 0, 1]) @ frame.axes), [[0, 0, 1]] * 3, rtol=0, atol=1e-12)
 

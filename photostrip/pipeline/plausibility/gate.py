@@ -79,7 +79,7 @@ def of_result(result: Result, directory: Path | None = None, made: Stages | None
     formed = [
         evidence.EvidenceStrip(each.strip, each.orientation, each.formed) for each in (s.of_photos for s in stages)
     ]
-    predicted = slips.predict(result)
+    predicted = slips.Predicted(result)
     doubtful = [each for each in formed if slips.is_doubtful(each, result, predicted)]
     strips = tuple(each.strip for each in doubtful)  # a photo that is a strip of its own forms nothing
     doubts = [note for note in result.notes if note.code in slips.OF_DOUBTED_CONTROL]
@@ -225,7 +225,7 @@ def _of_adjusted_models(result: Result, models: MeasuredModels, directory: Path 
     findings = _of_models(strips, models, control)
     if result.precision is not None:
         findings = [each for each in findings if each.code != OF_SLIPS]
-        findings += slips.of_models(result, models, slips.predict(result), control)
+        findings += slips.of_models(result, models, slips.Predicted(result), control)
         if not any(each.is_error for each in findings):
             findings += shared_control.find_shifted_checks(result)
     return accepted(findings, result.settings.accept)

@@ -8,6 +8,7 @@ nothing wrong with the given points of a strip has compared them better than the
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -32,11 +33,47 @@ LIMIT = normal_quantile(1 - ODD_PROBABILITY / 2)
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Given coordinates as an adjustment in which they took no part predicts them."""
+    """Given coordinates as an adjustment in which they took no part predicts them, worked out when it is asked for.
 
-    off: Floats  # (c, 3): given minus predicted, metres along the axes of each point's frame; NaN where not known
-    sigma: Floats  # (c, 3): standard deviation of that difference
-    sound: Flags  # (c, 3): control coordinates that took part: the run tested them and found them right
+    Check points and rejected control are predicted.
+    """
+
+    result: Result
+
+    @cached_property
+    def _used(self) -> Flags:
+        """Control coordinates (c, 3) that took part."""
+        result, control = self.result, self.result.inputs.control
+        rejected = rejected_control(result)
+        for strip in result.model_strips:
+            rows = locate(strip.control.ids, control.ids)
+            rejected[rows] |= control.use[rows] & ~strip.control.use
+        used = control.use & ~control.check[:, None] & ~rejected & (result.control_rows >= 0)[:, None]
+        return np.asarray(used, bool)
+
+    @cached_property
+    def off(self) -> Floats:
+        """Given minus predicted (c, 3), metres along the axes of each point's frame; NaN where not known."""
+        return np.where(self._used, np.nan, -self.result.control_differences)
+
+    @cached_property
+    def sigma(self) -> Floats:
+        """Standard deviations (c, 3) of these differences; NaN without a precision."""
+        result, control, precision = self.result, self.result.inputs.control, self.result.precision
+        sigma = np.full(control.use.shape, np.nan)
+        for number, frame in enumerate(result.frames):
+            rows = np.flatnonzero((control.frame == number) & (result.control_rows >= 0))
+            if len(rows) and precision is not None:
+                at = result.control_rows[rows]
+                axes = frame.axes_at(result.points.cartesian[at])
+                with np.errstate(invalid="ignore"):  # a variance lost to rounding is not known
+                    sigma[rows] = np.sqrt(np.einsum("nai,nij,naj->na", axes, precision.points[at], axes))
+        return np.asarray(np.hypot(sigma, np.where(control.sigma > 0, control.sigma, 0.0)), float)
+
+    @cached_property
+    def sound(self) -> Flags:
+        """Control coordinates (c, 3) that took part: the run tested them and found them right."""
+        return self._used & _tested(self.result)
 
     def agree(self, use: Flags) -> Flags:
         """Given points (c,) whose coordinates `use` (c, 3) the adjustment predicts, or tested and kept."""
@@ -83,27 +120,6 @@ def confirmed(findings: Sequence[Finding], predicted: Predicted, control: GivenC
             yield from _confirmed(each, ids.index(each.points[0]), predicted, control)
         else:
             yield each
-
-
-def predict(result: Result) -> Predicted:
-    """Compare check points and rejected control with what was adjusted; nothing is predicted without a precision."""
-    control, precision = result.inputs.control, result.precision
-    rejected = rejected_control(result)
-    for strip in result.model_strips:
-        rows = locate(strip.control.ids, control.ids)
-        rejected[rows] |= control.use[rows] & ~strip.control.use
-    used = control.use & ~control.check[:, None] & ~rejected & (result.control_rows >= 0)[:, None]
-    off = np.where(used, np.nan, -result.control_differences)
-    sigma = np.full(off.shape, np.nan)
-    for number, frame in enumerate(result.frames):
-        rows = np.flatnonzero((control.frame == number) & (result.control_rows >= 0))
-        if len(rows) and precision is not None:
-            at = result.control_rows[rows]
-            axes = frame.axes_at(result.points.cartesian[at])
-            with np.errstate(invalid="ignore"):  # a variance lost to rounding is not known
-                sigma[rows] = np.sqrt(np.einsum("nai,nij,naj->na", axes, precision.points[at], axes))
-    sigma = np.hypot(sigma, np.where(control.sigma > 0, control.sigma, 0.0))
-    return Predicted(off=off, sigma=sigma, sound=used & _tested(result))
 
 
 def _tested(result: Result) -> Flags:

@@ -91,8 +91,9 @@ def compare_with_checks(
         return None
     xyz = strip.xyz[checks.rows]
     targets = absolute_orientation.Targets(checks.points, frames, strip.intermediate)
-    found = control_errors.misclosures(errors.points, targets.turned(xyz), checks.rows, targets.axes(xyz))
-    return CheckDifferences(checks, found, targets.misclosures(xyz)[found.point, found.axis])
+    axes = targets.axes(xyz)
+    found = control_errors.misclosures(errors.points, targets.turned(xyz), checks.rows, axes)
+    return CheckDifferences(checks, found, targets.misclosures(xyz, axes)[found.point, found.axis])
 
 
 def by_fit(

@@ -118,8 +118,9 @@ def _check(
         return None
     xyz = strip.xyz[checks.rows]
     targets = absolute_orientation.Targets(checks.points, oriented.frames, strip.intermediate)
-    at = model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, found.origin)
-    difference = targets.misclosures(xyz)[at.point, at.axis]
+    axes = targets.axes(xyz)
+    at = model_misclosures.misclosures(targets.turned(xyz), axes, xyz, found.origin)
+    difference = targets.misclosures(xyz, axes)[at.point, at.axis]
     by_control = np.einsum("wi,wit->wt", at.direction, influence[checks.rows][at.point]) @ fit.operator
     sums = model_errors.sums(found, *model_misclosures.weights(at, checks.rows))
     sums = sums - model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, by_control))

@@ -75,8 +75,9 @@ class LinkedModels:
         return model_errors.differentiate_models(self.formed, similarity)
 
     def misclosures(self, oriented: Oriented) -> Misclosures:
-        targets, xyz = oriented.targets, oriented.at_control
-        return model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, oriented.errors.origin)
+        xyz = oriented.at_control
+        turned = oriented.targets.turned(xyz)
+        return model_misclosures.misclosures(turned, oriented.absolute.axes, xyz, oriented.errors.origin)
 
     def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
         rows, factor = oriented.control_rows, self.formed.links.factor

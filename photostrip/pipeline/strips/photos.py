@@ -92,9 +92,8 @@ class FormedPhotos:
         )
 
     def misclosures(self, oriented: Oriented) -> control_errors.Misclosures:
-        targets, xyz = oriented.targets, oriented.at_control
-        rows = oriented.control_rows
-        return control_errors.misclosures(oriented.errors.points, targets.turned(xyz), rows, targets.axes(xyz))
+        turned = oriented.targets.turned(oriented.at_control)
+        return control_errors.misclosures(oriented.errors.points, turned, oriented.control_rows, oriented.absolute.axes)
 
     def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
         # image coordinates are taken as good as stated, or as bad as the pairs have proved

@@ -93,7 +93,8 @@ def _of_model(
     if not determines_paraboloid(xy):
         return None
     given = strip.control.take(control)
-    residual = Targets(given, frames, strip.intermediate).misclosures(xyz)[:, 2]
+    targets = Targets(given, frames, strip.intermediate)
+    residual = targets.misclosures(xyz, targets.axes(xyz))[:, 2]
     sigma = np.hypot(strip.precision[1], given.sigma[:, 2])
     width = float(np.abs(xy[:, 1]).max())
     surface = fit_paraboloid(xy, residual, sigma)

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.pipeline.given_points import axes_of
-from photostrip.pipeline.results import Result
+from photostrip.pipeline.results import Precision, Result
 
 
 def turned(covariances: Floats, axes: Floats) -> Floats:
@@ -26,14 +26,13 @@ def normalised(result: Result) -> tuple[Numbers, Floats]:
     values = np.full((len(rows), 2), np.nan)
     if result.precision is None or not result.frames:  # a free network has nothing to be compared with
         return rows, values
-    numbers, place = control.frame[rows], result.points.cartesian[result.control_rows[rows]]
-    axes = axes_of(numbers, result.frames, place)
-    covariances = turned(result.precision.points[result.control_rows[rows]], axes)
+    numbers, at = control.frame[rows], result.control_rows[rows]
+    covariances = _along_given_axes(result, result.precision, numbers, at)
     covariances += np.nan_to_num(control.sigma[rows] ** 2)[:, :, None] * np.eye(3)
     differences = result.control_differences[rows]
     turn = np.flatnonzero([result.frames[number].kind == "geocentric" for number in numbers])
     if len(turn):
-        level = axes_of(numbers[turn], result.frames, place[turn], level=True) @ axes[turn].transpose(0, 2, 1)
+        level = axes_of(numbers[turn], result.frames, result.points.cartesian[at[turn]], level=True)
         differences[turn] = (level @ differences[turn, :, None])[:, :, 0]
         covariances[turn] = turned(covariances[turn], level)
     known = np.flatnonzero(~np.isnan(differences[:, :2]).any(axis=1))
@@ -43,6 +42,19 @@ def normalised(result: Result) -> tuple[Numbers, Floats]:
     )
     values[:, 1] = differences[:, 2] / np.sqrt(covariances[:, 2, 2])
     return rows, values
+
+
+def _along_given_axes(result: Result, precision: Precision, numbers: Numbers, at: Numbers) -> Floats:
+    """Covariances (n, 3, 3) of the points in rows `at` along the axes of the frames of these numbers."""
+    found, level = np.empty((len(at), 3, 3)), result.level_covariances
+    for number, frame in enumerate(result.frames):
+        inside = numbers == number
+        rows = at[inside]
+        if frame is result.output and frame.kind != "geocentric" and level is not None:  # all points have these
+            found[inside] = level[rows]
+        elif len(rows):
+            found[inside] = turned(precision.points[rows], frame.axes_at(result.points.cartesian[rows]))
+    return found
 
 
 def chances(normalised: Floats) -> dict[str, Floats]:

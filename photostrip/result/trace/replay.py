@@ -104,7 +104,8 @@ def similarity_steps(result: Result, strip: StripResult) -> list[SimilarityStep]
     steps: list[SimilarityStep] = []
 
     def watch(similarity: Similarity, step: Floats) -> None:
-        squares = float((weight * targets.misclosures(similarity(points)) ** 2).sum())
+        xyz = similarity(points)
+        squares = float((weight * targets.misclosures(xyz, targets.axes(xyz)) ** 2).sum())
         steps.append(SimilarityStep(replace(similarity), squares, step.copy()))
 
     absolute_orientation.lay(points, targets, weight, strip.formed.xyz, watch)

@@ -227,7 +227,7 @@ def _formed_again(
             orientation, kept, oriented.similarity, strip.position, strip.observations.sigma
         )
         at_control = oriented.similarity(formed.xyz)[rows]
-        found = control_errors.misclosures(errors.points, targets.turned(at_control), rows, targets.axes(at_control))
+        found = control_errors.misclosures(errors.points, targets.turned(at_control), rows, oriented.axes)
         return _solved(replace(again, errors=errors, misclosures=found), images, settings, factor)
     found, wanted = strip.misclosures, before.system.conditions
     control = oriented.misclosures[found.point, found.axis]

@@ -15,6 +15,7 @@ from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.absolute_orientation import Targets
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 
+ENOUGH = 1e-5  # of half the strip: the adjustment of the misclosures takes out what is left, but for its square
 LARGEST_SECTION = 100  # control coordinates of a section: what one adjustment takes
 
 
@@ -92,7 +93,7 @@ class StripAtControl:
         targets = self.targets
         if kept is not self.control.use:
             targets = replace(targets, control=replace(self.control, use=kept), known=None)
-        laid = absolute_orientation.lay(self.xyz, targets, np.where(kept, self.weight, 0.0), known=axes)
+        laid = absolute_orientation.lay(self.xyz, targets, np.where(kept, self.weight, 0.0), known=axes, enough=ENOUGH)
         return replace(self, similarity=laid.similarity)
 
     def misclosures(self, control: ControlPoints | None = None) -> Floats:

@@ -10,12 +10,15 @@ from io import StringIO
 import numpy as np
 import pytest
 
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import SYSTEMS, angle_rates, angles, from_angles, from_vector
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Precision
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import sections_of, title_of
 from photostrip.result.document import document_of
+from photostrip.result.points.own_precision import normalised
 from photostrip.result.points.precision import ellipses
 from tests.loops import nonempty
 from tests.results import FRAMES, Case, case, result_files, solved
@@ -154,6 +157,18 @@ def test_the_report_names_the_least_precise_points() -> None:
     assert f"m at point {worst}" in text
     assert "least precise points" in text
     assert "at photo" in text
+
+
+def test_check_points_are_measured_along_the_axes_in_which_they_are_given() -> None:
+    """The frame in which the result is wanted does not matter, its east being another one."""
+    known = precise("projected")
+    elsewhere = FrameSpec("EPSG:4326", ("east", "north", "up"), height="ellipsoidal")
+    _, output = tie_frames(known.inputs.frames, elsewhere)
+    rows, values = normalised(known.result)
+    again, found = normalised(replace(known.result, output=output))
+    assert len(rows)
+    assert rows.tolist() == again.tolist()
+    np.testing.assert_allclose(found, values, rtol=1e-6)
 
 
 def test_nothing_is_said_where_nothing_is_known() -> None:
