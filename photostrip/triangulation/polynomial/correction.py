@@ -84,8 +84,10 @@ def fit(problem: FitProblem, settings: PolynomialSettings) -> Polynomial:
     chosen: list[tuple[str, ...]] = []
     evidence: list[Evidence] = []
     fits_of: Fits = cache(partial(fit_axes, problem))  # plan and height often weigh the same candidates
+    by_degree = _by_degree(problem, settings.degree)
     for group, axes in GROUPS:
-        terms, weighed = decide(problem, (group, axes), settings.degree, fits_of)
+        every = _candidates(by_degree, axes[0])
+        terms, weighed = decide(problem, (group, axes), every, fits_of, forced=settings.degree != "auto")
         chosen += [terms] * len(axes)
         evidence += weighed
     fits = fits_of(tuple(chosen))
@@ -100,32 +102,36 @@ def fit(problem: FitProblem, settings: PolynomialSettings) -> Polynomial:
     )
 
 
-def _candidates(problem: FitProblem, axis: int, asked: str) -> list[Terms]:
-    """Terms of all axes for the similarity alone and for every degree that adds something to one axis.
-
-    The other axes get the terms of the same degree as far as their own control carries them.
-    """
+def _by_degree(problem: FitProblem, asked: str) -> list[Terms]:
+    """Terms of all axes for every degree, as far as the control of each carries them."""
     forced = asked != "auto"
-    points = [problem.xyz[_counted(problem, k)] for k in range(3)]
-    found: list[Terms] = [((), (), ())]
+    plan, height = (problem.xyz[_counted(problem, k)] for k in (0, 2))
+    found: list[Terms] = []
     for degree in range(1, (int(asked) if forced else 3) + 1):
-        terms = tuple(polynomial_terms.choose_terms(xyz, degree, problem.sizes, forced=forced) for xyz in points)
+        x, z = (polynomial_terms.choose_terms(xyz, degree, problem.sizes, forced=forced) for xyz in (plan, height))
+        found.append((x, x, z))  # X and Y count together
+    return found
+
+
+def _candidates(by_degree: Sequence[Terms], axis: int) -> list[Terms]:
+    """Terms for the similarity alone and for every degree that adds something to one axis; others get the same."""
+    found: list[Terms] = [((), (), ())]
+    for terms in by_degree:
         if terms[axis] != found[-1][axis]:
             found.append(terms)
     return found
 
 
 def decide(
-    problem: FitProblem, part: tuple[str, tuple[int, ...]], asked: str, fits_of: Fits
+    problem: FitProblem, part: tuple[str, tuple[int, ...]], every: Sequence[Terms], fits_of: Fits, *, forced: bool
 ) -> tuple[tuple[str, ...], list[Evidence]]:
     """Go up the degrees of plan or height: each step must be asked for by its F test and not spoil left-out points.
 
     part: name and axes of the part, one of ``GROUPS``.
+    every: terms of all axes, ascending; the last are taken where that is forced.
     Returns the terms, and every degree that was weighed, ascending.
     """
     group, axes = part
-    every = _candidates(problem, axes[0], asked)
-    forced = asked != "auto"
     fits = [fits_of(terms) for terms in every]
     candidates = [terms[axes[0]] for terms in every]
     left_out, by = _left_out_errors(problem, candidates, fits, axes)
@@ -215,7 +221,8 @@ def _left_out_errors(
     """
     counted = np.flatnonzero(_counted(problem, axes[0]))
     group = polynomial_terms.bands(problem.xyz[counted, 0], problem.spacing)
-    inner = [counted[group == band] for band in range(1, int(group.max(initial=0)))]
+    order = np.argsort(group, kind="stable")
+    inner = np.split(counted[order], np.flatnonzero(np.diff(group[order])) + 1)[1:-1]
     if inner and _carried_without(problem, counted, inner, candidates[-1]):
         return [_left_out(problem, all_axes, axes, inner) for all_axes in fits], "band"
     single = [np.array([row]) for row in counted]
@@ -261,17 +268,14 @@ def _left_out(problem: FitProblem, fits: Sequence[AxisFit], axes: tuple[int, ...
     errors: list[Floats] = []
     for size in sorted({len(rows) for rows in groups}):
         rows = np.array([each for each in groups if len(each) == size])
-        if not any(fits[axis].terms for axis in axes):
-            basis, residuals = problem.similarity
-            found = _from_the_others(
-                basis[rows].reshape(len(rows), 3 * size, -1), residuals[rows].reshape(len(rows), -1)
-            )
-            root = np.sqrt(problem.by_axis)[rows][:, :, list(axes)]
-            errors.append((found.reshape(len(rows), size, 3)[:, :, list(axes)] / root).ravel())
-            continue
-        for axis in axes:
-            root = np.sqrt(problem.by_axis[:, axis])[rows]
-            errors.append((_from_the_others(fits[axis].basis[rows], fits[axis].residuals[rows] * root) / root).ravel())
+        root = np.sqrt(problem.by_axis)[rows][:, :, list(axes)]
+        if any(fits[axis].terms for axis in axes):  # axes that are decided together weigh alike and have one basis
+            residuals = np.stack([fits[axis].residuals for axis in axes], axis=-1)[rows] * root
+            found = _from_the_others(fits[axes[0]].basis[rows], residuals)
+        else:
+            basis, residuals = (each[rows].reshape(len(rows), 3 * size, -1) for each in problem.similarity)
+            found = _from_the_others(basis, residuals).reshape(len(rows), size, 3)[:, :, list(axes)]
+        errors.append((found / root).ravel())
     return _rms(np.concatenate(errors))
 
 
@@ -280,10 +284,11 @@ def _from_the_others(basis: Floats, residuals: Floats) -> Floats:
 
     basis: (g, k, t), rows of the orthonormal basis of the design. A group that alone determines part of the fit cannot
         be predicted: its errors are infinite.
+    residuals: (g, k, a), of one or more fits.
     """
     rest = np.eye(residuals.shape[1]) - basis @ basis.transpose(0, 2, 1)
     free = np.linalg.eigvalsh(rest)[:, 0] >= SMALLEST_REST
     errors = np.full(residuals.shape, np.inf)
     if free.any():
-        errors[free] = np.linalg.solve(rest[free], residuals[free][:, :, None])[:, :, 0]
+        errors[free] = np.linalg.solve(rest[free], residuals[free])
     return errors

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -150,7 +150,8 @@ def fit_axes(problem: FitProblem, terms: Terms) -> list[AxisFit]:
 
     Source: [001] eq. 151.
     """
-    designs = [Design.of(problem, problem.by_axis[:, axis], terms[axis]) for axis in range(3)]
+    of = cache(lambda weights, terms: Design.of(problem, problem.by_axis[:, weights], terms))
+    designs = [of(weights, terms[axis]) for axis, weights in enumerate((0, 0, 2))]  # X and Y weigh alike
     misclosure = problem.misclosures
     if not problem.targets.control.use.all():
         for _ in range(ITERATIONS):

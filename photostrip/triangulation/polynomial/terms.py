@@ -55,12 +55,12 @@ def bands(x: Floats, spacing: float) -> Numbers:
 
     A point farther than the spacing from the first of its band opens the next.
     """
-    number = np.zeros(len(x), np.intp)
-    current, first = -1, -np.inf
-    for row in np.argsort(x, kind="stable"):
-        if x[row] - first >= spacing:
-            current, first = current + 1, x[row]
-        number[row] = current
+    order, opening, first = np.argsort(x, kind="stable"), [], -np.inf
+    for each in x[order].tolist():
+        opening.append(each - first >= spacing)
+        first = each if opening[-1] else first
+    number = np.empty(len(x), np.intp)
+    number[order] = np.cumsum(opening) - 1
     return number
 
 

@@ -13,6 +13,7 @@ Source: derived; data snooping with correlated observations.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -183,7 +184,7 @@ class JointAdjustment:
 
     def shrunk(self, out: Columns) -> Columns:
         """Take back what the others predict after all, the least significant part first."""
-        best = max(self.tests(out), key=lambda each: each.probability, default=None)
+        best = max(self.tests(out), key=lambda each: each.probability, default=None) if out else None
         if best is None or best.probability < self.level:
             return out
         return self.shrunk(tuple(column for column in out if column not in best.columns))
@@ -245,42 +246,50 @@ def adjust(strip: StripAtControl, w: Floats, covariance: Floats, *, bends: bool 
     columns = terms.columns(position / np.maximum(np.abs(position).max(axis=0), 1e-9), BENDS if bends else ())
     bent = (columns[found.point][:, :, None] * found.direction[:, None, :]).reshape(count, -1)
     rays = [(found.point == ray.point) * (found.direction @ turn @ ray.direction) for ray in strip.rays]
-    errors = np.column_stack([np.eye(count), bent, *rays])
+    others = np.column_stack([bent, *rays])  # errors beside those of the coordinates themselves
     try:
         free = independent(covariance)
     except np.linalg.LinAlgError:
         message = "the strip is too badly determined at its control to be tested against it"
         raise GeometryError(message) from None
-    size = np.linalg.norm(free @ errors, axis=0)
-    scaled = errors / size
+    size = np.linalg.norm(np.column_stack([free, free @ others]), axis=0)
     projector = projected(free, strip.design)
-    order = np.argsort(found.point, kind="stable")
-    points = np.split(order, np.flatnonzero(np.diff(found.point[order])) + 1)
+    half = np.concatenate([projector, others.T @ projector])  # H^T M
+    points, parts = defaultdict(list), defaultdict(list)
     height = found.axis == HEIGHT
-    parts = [rows[height[rows] == which] for rows in points for which in (False, True)]
-    parts += [np.array([count + number]) for number in range(bent.shape[1])]
-    pull = projector @ w
+    for column, (point, is_height) in enumerate(zip(found.point.tolist(), height.tolist(), strict=True)):
+        points[point].append(column)
+        parts[point, is_height].append(column)
+    pull = half @ w
     return JointAdjustment(
         w=w,
         covariance=covariance,
         design=strip.design,
-        errors=errors,
+        errors=np.column_stack([np.eye(count), others]),
         size=size,
-        matrix=scaled.T @ projector @ scaled,
-        pull=scaled.T @ pull,
-        squares=float(w @ pull),
+        matrix=np.column_stack([half, half @ others]) / size[:, None] / size,
+        pull=pull / size,
+        squares=float(w @ pull[:count]),
         freedom=count - strip.design.shape[1],
         alpha=ALPHA * strip.share,
-        points=tuple(tuple(rows.tolist()) for rows in points),
-        parts=tuple(tuple(rows.tolist()) for rows in parts if len(rows)),
+        points=tuple(tuple(points[each]) for each in sorted(points)),
+        parts=(*(tuple(parts[each]) for each in sorted(parts)), *((count + bend,) for bend in range(bent.shape[1]))),
         height=height,
         first_ray=count + bent.shape[1],
     )
 
 
 def independent(covariance: Floats) -> Floats:
-    """Give the inverse of the triangular root of a covariance (w, w), which makes misclosures independent."""
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), float)
+    """Give the inverse of the triangular root of a covariance (w, w), which makes misclosures independent.
+
+    It is put together from those of the root's halves: numpy inverts a triangle no faster than any other matrix.
+    """
+    root, free = np.linalg.cholesky(covariance), np.zeros(covariance.shape)
+    low, high = slice(len(root) // 2), slice(len(root) // 2, None)
+    for half in (low, high):
+        free[half, half] = np.linalg.inv(root[half, half])
+    free[high, low] = -free[high, high] @ root[high, low] @ free[low, low]
+    return free
 
 
 def projected(free: Floats, design: Floats) -> Floats:
