@@ -41,14 +41,16 @@ class Columns:
 
     @classmethod
     def of(cls, found: system.System, rows: ErrorRows) -> Self:
-        shared = system.same_images(rows, found.conditions.rows)
-        order = np.argsort(shared.first, kind="stable")
+        conditions, reach = found.conditions.rows, 2 * found.layout.width  # at most to the blocks beside
+        near = rows.first[[0, -1]] + [-reach, reach] if len(rows.first) else [0, 0]
+        begin, end = np.searchsorted(conditions.first, near).tolist()
+        shared = system.same_images(rows, conditions.part(begin, end))
         return cls(
             found=found,
             rows=rows,
             near=NearImages.of(found.errors, rows),
             by_unknowns=rows.by_similarity @ found.conditions.local.to_common[rows.first],
-            shared=system.SameImages(shared.first[order], shared.second[order], shared.value[order, :, 0]),
+            shared=system.SameImages(shared.first, shared.second + begin, shared.value[:, :, 0]),
         )
 
     @property
@@ -56,6 +58,12 @@ class Columns:
         """Blocks from the first to the last with rows."""
         first, last = self.rows.first[[0, -1]].tolist() if len(self.rows.first) else (0, -1)
         return range(first // self.found.layout.width, last // self.found.layout.width + 1)
+
+    @property
+    def models(self) -> range:
+        """Models of these blocks."""
+        width, models = self.found.layout.width, len(self.found.layout.start)
+        return range(self.held.start * width, min(self.held.stop * width, models))
 
     def blocks(self, numbers: range) -> Iterator[BlockColumns]:
         """Go through consecutive blocks; a few are made together."""

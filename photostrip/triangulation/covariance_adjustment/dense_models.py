@@ -34,7 +34,7 @@ def are_dense(columns: Columns) -> bool:
 def explained(columns: Columns) -> Floats:
     """Give what the conditions explain of the covariances of rows, b^T K^-1 b, shape (n, d, d)."""
     found, rows, sparse = columns.found, columns.rows, _Sparse.of(columns)
-    ends = np.searchsorted(rows.first, np.arange(found.errors.models + 1)).tolist()
+    ends = [*np.searchsorted(rows.first, columns.models).tolist(), len(rows.first)]
     result = np.empty((*rows.by_similarity.shape[:2], rows.by_similarity.shape[1]))
     for number, some, values in _shared_columns(columns).blocks(columns.held):
         through = found.factors.solve_near(number, values)
@@ -65,8 +65,8 @@ def _coefficients(columns: Columns, part: slice) -> Floats:
 
 
 def _shared_columns(columns: Columns) -> Columns:
-    """Make the columns B of every model: one row of r coordinates, in the order of ``_coefficients``."""
-    models, slots = columns.found.errors.models, columns.rows.by_component.shape[1]
+    """Make the columns B of the models of all blocks with rows: one row of r coordinates, in the order of ``_coefficients``."""
+    models, slots = len(columns.models), columns.rows.by_component.shape[1]
     ends = np.cumsum([slots * COMPONENTS, np.prod(columns.near.with_components.shape[2:]), SIMILARITY_PARAMETERS])
     count = int(ends[-1])
     first, second, third = np.split(np.broadcast_to(np.eye(count), (models, count, count)), ends[:-1], axis=2)
@@ -74,7 +74,7 @@ def _shared_columns(columns: Columns) -> Columns:
     by_similarity, none = np.zeros((models, count, SIMILARITY_PARAMETERS)), np.zeros(0, np.intp)
     return Columns(
         found=columns.found,
-        rows=ErrorRows.without_images(np.arange(models), by_similarity, by_component),
+        rows=ErrorRows.without_images(np.array(columns.models), by_similarity, by_component),
         near=NearImages(np.zeros((models, count, 0)), second.reshape(models, count, -1, COMPONENTS)),
         by_unknowns=third,
         shared=SameImages(none, none, np.zeros((0, count))),

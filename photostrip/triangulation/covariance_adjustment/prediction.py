@@ -12,7 +12,7 @@ from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import gamma_cdf, normal_quantile
 from photostrip.triangulation.covariance_adjustment import dense_models, relinearisation, system
-from photostrip.triangulation.covariance_adjustment.columns import Columns
+from photostrip.triangulation.covariance_adjustment.columns import AT_A_TIME, Columns
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of
 from photostrip.triangulation.error_propagation import joint_covariances
 from photostrip.triangulation.error_propagation.covariances import along_strip, local_covariances
@@ -73,10 +73,14 @@ def covariances(found: system.System, rows: ErrorRows) -> Floats:
     inverse on the diagonal says what all later ones add.
     """
     order = np.argsort(rows.first, kind="stable")
-    columns = Columns.of(found, rows.take(order))
-    explained = dense_models.explained if dense_models.are_dense(columns) else _explained
-    left = local_covariances(found.errors, columns.rows, columns.near) - explained(columns)
-    return np.asarray(left[np.argsort(order, kind="stable")], float)
+    section = rows.first[order] // (found.layout.width * AT_A_TIME)
+    size = rows.by_similarity.shape[1]
+    result = np.empty((len(order), size, size))
+    for some in np.split(order, np.flatnonzero(np.diff(section)) + 1):
+        columns = Columns.of(found, rows.take(some))
+        explained = dense_models.explained if dense_models.are_dense(columns) else _explained
+        result[some] = local_covariances(found.errors, columns.rows, columns.near) - explained(columns)
+    return result
 
 
 def photo_covariances(found: system.System) -> Floats:
