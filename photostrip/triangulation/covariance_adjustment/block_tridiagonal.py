@@ -21,10 +21,20 @@ LARGE = 100
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """An eliminated system of n blocks of b rows."""
+    """An eliminated system of n blocks with places for b rows, of which each takes its own number."""
 
     inverses: Floats  # (n, b, b): P_i^-1, inverses of the pivot blocks P_i = D_i - B_(i-1)^T P_(i-1)^-1 B_(i-1)
     shares: Floats  # (n, b, b): P_i^-1 B_i, B_i the blocks beside the diagonal; the last is 0
+    heights: Sequence[int]  # rows of each block; what stands in the places beyond them has to do with nothing else
+
+    def inverse(self, number: int) -> Floats:
+        """Inverse (b_i, b_i) of the pivot block of the rows of a block."""
+        return self.inverses[number, : self.heights[number], : self.heights[number]]
+
+    def share(self, number: int) -> Floats:
+        """Give P_i^-1 B_i of the rows of a block and those of the next, (b_i, b_(i+1)); of the last without columns."""
+        following = self.heights[number + 1] if number + 1 < len(self.heights) else 0
+        return self.shares[number, : self.heights[number], :following]
 
     def solve(self, right: Floats) -> Floats:
         """Solve for right sides (n, b, k) by blocks."""
@@ -36,28 +46,44 @@ class Factors:
             result[number] -= self.shares[number] @ result[number + 1]
         return result
 
-    def solve_near(self, number: int, right: Floats) -> Floats:
-        """Solve for right sides (3, b, k) that are 0 but in a block and those before and after it: rows there.
+    def near(self, number: int) -> range:
+        """Give a block with those before and after it."""
+        return range(max(number - 1, 0), min(number + 2, len(self.heights)))
 
-        Beyond the first and the last block they are 0, too.
+    def reduced_near(self, number: int, right: Floats) -> list[Floats]:
+        """Eliminate from right sides (3, b, k) that are 0 but in a block and those before and after it: rows of each.
+
+        Beyond the first and the last block there are none.
         """
-        before, after = max(number - 1, 0), min(number + 1, len(self.shares) - 1)
-        own = right[1] - self.shares[before].T @ right[0]
-        last = self.diagonal_of_inverse[after] @ (right[2] - self.shares[number].T @ own)
-        own = self.inverses[number] @ own - self.shares[number] @ last
-        return np.stack([self.inverses[before] @ right[0] - self.shares[before] @ own, own, last])
+        result: list[Floats] = []
+        for each in self.near(number):
+            own = right[each - number + 1, : self.heights[each]]
+            result.append(own - self.share(each - 1).T @ result[-1] if result else own)
+        return result
+
+    def solve_near(self, number: int, right: Floats) -> Floats:
+        """Solve for such right sides: rows there; beyond the first and the last block they are 0."""
+        near, reduced, result = self.near(number), self.reduced_near(number, right), np.zeros_like(right)
+        later = self.diagonal_of_inverse[near[-1]] @ reduced[-1]
+        result[near[-1] - number + 1, : len(later)] = later
+        for each, own in zip(near[-2::-1], reduced[-2::-1], strict=True):
+            later = self.inverse(each) @ own - self.share(each) @ later
+            result[each - number + 1, : len(later)] = later
+        return result
 
     def entries_of_inverse(self, block: Numbers, position: Numbers) -> Floats:
         """Entries (n, q, q) of the inverse between the places of each row (n, q), in one or two consecutive blocks."""
-        result = self.diagonal_of_inverse[block[:, :, None], position[:, :, None], position[:, None]]
-        row, one, other = np.nonzero(block[:, None] == block[:, :, None] + 1)
-        for number in np.unique(block[row, one]).tolist():
-            some = np.flatnonzero(block[row, one] == number)
-            at = row[some], one[some], other[some]
-            above, of_above = np.unique(position[at[0], at[1]], return_inverse=True)
-            below, of_below = np.unique(position[at[0], at[2]], return_inverse=True)
-            beside = -self.shares[number][above] @ self.diagonal_of_inverse[number + 1][:, below]
-            result[at] = result[at[0], at[2], at[1]] = beside[of_above, of_below]
+        result = np.empty((*block.shape, block.shape[1]))
+        for number in np.unique(block).tolist():
+            row, one, other = np.nonzero((block[:, :, None] == number) & (block[:, None] == number))
+            result[row, one, other] = self.diagonal_of_inverse[number][position[row, one], position[row, other]]
+            row, one, other = np.nonzero((block[:, :, None] == number) & (block[:, None] == number + 1))
+            if not len(row):
+                continue
+            above, of_above = np.unique(position[row, one], return_inverse=True)
+            below, of_below = np.unique(position[row, other], return_inverse=True)
+            beside = -self.share(number)[above] @ self.diagonal_of_inverse[number + 1][:, below]
+            result[row, one, other] = result[row, other, one] = beside[of_above, of_below]
         return result
 
     def part_of_inverse(self, block: Numbers, position: Numbers) -> Floats:
@@ -65,34 +91,37 @@ class Factors:
 
         A solution for c columns takes eight times as long.
         """
-        count, height = len(block), self.shares.shape[1]
-        result, earlier, rows = np.empty((count, count)), np.zeros(0, np.intp), np.zeros((0, height))
-        for number in range(int(block.min()), int(block.max()) + 1):
+        count, first = len(block), int(block.min())
+        result, earlier = np.empty((count, count)), np.zeros(0, np.intp)
+        rows = np.zeros((0, self.heights[first]))
+        for number in range(first, int(block.max()) + 1):
             own = np.flatnonzero(block == number)
             columns = self.diagonal_of_inverse[number][:, position[own]]
             result[np.ix_(own, own)] = columns[position[own]]
             beside = rows @ columns
             result[np.ix_(earlier, own)], result[np.ix_(own, earlier)] = beside, beside.T
-            rows = -np.concatenate([rows @ self.shares[number], self.shares[number][position[own]]])
+            rows = -np.concatenate([rows @ self.share(number), self.share(number)[position[own]]])
             earlier = np.append(earlier, own)
         return result
 
     @cached_property
-    def diagonal_of_inverse(self) -> Floats:
-        """Blocks (n, b, b) on the diagonal of the inverse: Z_i = P_i^-1 + P_i^-1 B_i Z_(i+1) (P_i^-1 B_i)^T."""
-        result = self.inverses.copy()
-        for number in range(len(result) - 2, -1, -1):
-            share = self.shares[number].T
-            result[number] += _symmetric(share, result[number + 1] @ share)
-        return result
+    def diagonal_of_inverse(self) -> Sequence[Floats]:
+        """Blocks (b_i, b_i) on the diagonal of the inverse: Z_i = P_i^-1 + P_i^-1 B_i Z_(i+1) (P_i^-1 B_i)^T."""
+        last = len(self.heights) - 1
+        result = [self.inverse(last)]
+        for number in range(last - 1, -1, -1):
+            share = self.share(number).T
+            result.append(self.inverse(number) + _symmetric(share, result[-1] @ share))
+        return result[::-1]
 
 
-def eliminate(diagonal: Floats, beside: Floats, cuts: Sequence[Sequence[int]]) -> Factors:
+def eliminate(diagonal: Floats, beside: Floats, cuts: Sequence[Sequence[int]], heights: Sequence[int]) -> Factors:
     """Eliminate block after block; the factors take the place of the blocks.
 
     diagonal: (n, b, b), blocks D on the diagonal, symmetric.
     beside: (n, b, b), blocks B to the right of them; the last does not count.
     cuts: for each block, places where it may be cut: what stands before them can be eliminated first.
+    heights: rows of each block; in the places beyond them stands a unit matrix.
     Raises numpy.linalg.LinAlgError when a pivot block is singular.
     """
     beside[-1] = 0.0
@@ -102,7 +131,7 @@ def eliminate(diagonal: Floats, beside: Floats, cuts: Sequence[Sequence[int]]) -
             share = diagonal[number] @ beside[number]
             diagonal[number + 1] -= _symmetric(beside[number], share)
             beside[number] = share
-    return Factors(diagonal, beside)
+    return Factors(diagonal, beside, heights)
 
 
 def _inverse(matrix: Floats, cuts: Sequence[int]) -> Floats:

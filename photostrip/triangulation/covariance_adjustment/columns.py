@@ -72,55 +72,33 @@ class Columns:
 
     def _made(self, low: int, high: int) -> list[BlockColumns]:
         """Make the columns of blocks: covariances with conditions around, coefficients of unknowns, common images."""
-        layout, size = self.found.layout, self.rows.by_similarity.shape[1]
-        models = len(layout.start)
-        some = range(low * layout.width, min(high * layout.width, models))
-        ends = np.searchsorted(self.rows.first, [*some, some.stop])
-        bounds = ends[np.minimum(np.arange(high - low + 1) * layout.width, len(some))]
-        counts = np.diff(bounds)
-        offsets = np.concatenate([[0], np.cumsum(3 * layout.height * counts * size)])
-        whole = np.zeros(offsets[-1])
-        columns = [
-            whole[start:stop].reshape(3, layout.height, count * size)
-            for (start, stop), count in zip(pairwise(offsets.tolist()), counts.tolist(), strict=True)
-        ]
-        begin, end = ends[[0, -1]].tolist()
-        part, near = self.rows.part(begin, end), self.near.with_components[begin:end]
-        slots = self.found.padded.by_component.shape[1]
-        padded = system.PaddedRows.of(self.found.errors, part, near, slots, some)
-        starts, unknowns, reached = layout.start.tolist(), layout.unknown.tolist(), ends.tolist()
-        # the place of each model's rows: its block, and its columns there
-        places = {
-            place: (place // layout.width, slice((start - first) * size, (stop - first) * size))
-            for place, (start, stop) in enumerate(pairwise(reached))
-            for first in [int(bounds[place // layout.width])]
-            if stop > start
-        }
-        for apart in range(-layout.width, layout.width + 1):
-            others = range(max(some.start + apart, 0), min(some.stop + apart, models))
-            if not others:
-                continue
-            values = system.products(self.found.padded, padded, others, -apart)
-            for number, (block, across) in places.items():
-                other = some.start + number + apart
-                if other not in others:
-                    continue
-                beside = other // layout.width - (low + block) + 1
-                top, height = starts[other], unknowns[other]
-                value = values[other - others.start]
-                columns[block][beside, top:height, across] = value[: height - top, : across.stop - across.start]
-        for number, (block, across) in places.items():
-            unknown = unknowns[number + some.start]
-            by_unknowns = self.by_unknowns[reached[number] : reached[number + 1]].reshape(-1, SIMILARITY_PARAMETERS)
-            columns[block][1, unknown : unknown + SIMILARITY_PARAMETERS, across] = by_unknowns.T
+        found, layout, size = self.found, self.found.layout, self.rows.by_similarity.shape[1]
+        bounds = np.searchsorted(self.rows.first, np.arange(low, high + 1) * layout.width)
+        begin, end = bounds[[0, -1]].tolist()
+        part = self.rows.part(begin, end)
+        own = part.first // layout.width - low
+        rank = np.arange(begin, end) - bounds[own]
+        place = rank[:, None] * size + np.arange(size)
+        most, near = int(np.diff(bounds).max()) * size, self.near.with_components[begin:end]
+        padded = system.PaddedRows.of(layout, part, near, place, range(low, high), most)
+        columns = np.empty((3, high - low, layout.height, most))
+        for beside in range(3):
+            others = range(max(low + beside - 1, 0), min(high + beside - 1, layout.blocks))
+            inside = slice(others.start - beside + 1 - low, others.stop - beside + 1 - low)
+            system.products(found.padded, padded, others, 1 - beside, columns[beside, inside])
+            columns[beside, : inside.start] = columns[beside, inside.stop :] = 0.0  # beyond the ends
+        unknown = layout.unknown[part.first][:, None] + np.arange(SIMILARITY_PARAMETERS)
+        columns[1, own[:, None, None], unknown[:, None], place[:, :, None]] = self.by_unknowns[begin:end]
         # products of image points that rows have in common with conditions
         inside = slice(*np.searchsorted(self.shared.first, [begin, end]).tolist())
-        row, condition, value = self.shared.first[inside], self.shared.second[inside], self.shared.value[inside]
-        own = self.rows.first[row] // layout.width - low
-        place = (layout.block[condition] - (low + own) + 1) * layout.height + layout.position[condition]
-        first = offsets[own] + (place * counts[own] + row - bounds[own]) * size
-        np.add.at(whole, first[:, None] + np.arange(size), value)  # flat: three indices take ten times as long
+        row, condition, value = self.shared.first[inside] - begin, self.shared.second[inside], self.shared.value[inside]
+        beside = layout.block[condition] - own[row] - low + 1
+        at = beside, own[row], layout.position[condition], rank[row] * size
+        first = np.ravel_multi_index(at, columns.shape)
+        np.add.at(
+            columns.reshape(-1), first[:, None] + np.arange(size), value
+        )  # flat: three indices take ten times as long
         return [
-            BlockColumns(number, slice(start, stop), values)
-            for number, (start, stop), values in zip(range(low, high), pairwise(bounds.tolist()), columns, strict=True)
+            BlockColumns(low + number, slice(start, stop), columns[:, number, :, : (stop - start) * size])
+            for number, (start, stop) in enumerate(pairwise(bounds.tolist()))
         ]

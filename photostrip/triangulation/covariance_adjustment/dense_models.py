@@ -65,7 +65,7 @@ def _coefficients(columns: Columns, part: slice) -> Floats:
 
 
 def _shared_columns(columns: Columns) -> Columns:
-    """Make the columns B of the models of all blocks with rows: one row of r coordinates, in the order of ``_coefficients``."""
+    """Make the columns B of models of blocks with rows: one row of r coordinates, in the order of ``_coefficients``."""
     models, slots = len(columns.models), columns.rows.by_component.shape[1]
     ends = np.cumsum([slots * COMPONENTS, np.prod(columns.near.with_components.shape[2:]), SIMILARITY_PARAMETERS])
     count = int(ends[-1])

@@ -90,32 +90,25 @@ def photo_covariances(found: system.System) -> Floats:
     """
     rows, layout, models = photo_rows(found.errors), found.layout, np.arange(found.errors.models)
     by_unknowns = rows.by_similarity[:-1] @ found.conditions.local.to_common
-    unknown = layout.unknown[:, None] + np.arange(SIMILARITY_PARAMETERS)
-    block = (models // layout.width)[:, None, None]
-    cofactors = found.factors.diagonal_of_inverse[block, unknown[:, :, None], unknown[:, None]]
+    inverse, count = found.factors.diagonal_of_inverse, SIMILARITY_PARAMETERS
+    places = zip((models // layout.width).tolist(), layout.unknown.tolist(), strict=True)
+    cofactors = np.stack([inverse[block][first : first + count, first : first + count] for block, first in places])
     of_models = -by_unknowns @ cofactors @ by_unknowns.transpose(0, 2, 1)
     return np.concatenate([of_models, covariances(found, rows.take(models[-1:] + 1))])
 
 
 def _explained(of_rows: Columns) -> Floats:
     """Give what the conditions explain of the covariances of rows (n, d, d), b^T K^-1 b."""
-    found, (n, size) = of_rows.found, of_rows.rows.by_similarity.shape[:2]
+    factors, (n, size) = of_rows.found.factors, of_rows.rows.by_similarity.shape[:2]
     known = np.zeros((n, size, size))
     for number, rows, columns in of_rows.blocks(of_rows.held):
-        count = rows.stop - rows.start
-        if not count:
-            continue
-        before, after = max(number - 1, 0), min(number + 1, found.layout.blocks - 1)
-        # beyond the ends columns are 0; made for this loop, they give room to what they become
-        columns[1] -= found.factors.shares[before].T @ columns[0]
-        columns[2] -= found.factors.shares[number].T @ columns[1]
-        inverses, later = found.factors.inverses, found.factors.diagonal_of_inverse
-        weighted = np.empty_like(columns)
-        for weight, one, result in zip(
-            (inverses[before], inverses[number], later[after]), columns, weighted, strict=True
-        ):
-            np.matmul(weight, one, out=result)
-        left, right = (each.reshape(-1, count, size) for each in (columns, weighted))
+        reduced, last = factors.reduced_near(number, columns), number + 1
+        weighted = [
+            (factors.diagonal_of_inverse[each] if each == last else factors.inverse(each)) @ own
+            for each, own in zip(factors.near(number), reduced, strict=True)
+        ]
+        left, right = (np.concatenate(each) for each in (reduced, weighted))
+        left, right = (each.reshape(len(left), -1, size) for each in (left, right))
         known[rows] = left.transpose(1, 2, 0) @ right.transpose(1, 0, 2)
     return known
 
@@ -175,17 +168,17 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     own = rows.without_similarity()  # the similarities of the models are unknowns, not errors
     covariance = joint_covariances.joint_covariance(found.errors, own, along_strip(found.errors))
     blocks = list(columns.blocks(range(layout.blocks)))
-    reduced = np.zeros((layout.height, 0))
-    for number in range(layout.blocks):
-        near = blocks[max(number - 1, 0) : number + 2]
-        right = np.zeros((layout.height, near[-1].rows.stop))  # later columns begin in later blocks
+    reduced = np.zeros((0, 0))
+    for number, height in enumerate(factors.heights):
+        near = [blocks[each] for each in factors.near(number)]
+        right = np.zeros((height, near[-1].rows.stop))  # later columns begin in later blocks
         for block, at, values in near:
-            right[:, at] = values[1 + number - block]
+            right[:, at] = values[1 + number - block, :height]
         if number:
-            right[:, : reduced.shape[1]] -= factors.shares[number - 1].T @ reduced
+            right[:, : reduced.shape[1]] -= factors.share(number - 1).T @ reduced
         reduced = right
         for block, at, _ in near:
-            weight = factors.diagonal_of_inverse[number] if block < number else factors.inverses[number]
+            weight = factors.diagonal_of_inverse[number] if block < number else factors.inverse(number)
             covariance[: at.stop, at] -= reduced[:, : at.stop].T @ (weight @ reduced[:, at])
     upper = np.triu(covariance)
     result = np.empty_like(covariance)

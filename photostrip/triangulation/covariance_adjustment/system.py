@@ -17,76 +17,86 @@ from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
 from photostrip.triangulation.covariance_adjustment.conditions import Conditions
-from photostrip.triangulation.error_propagation.covariances import NearImages
+from photostrip.triangulation.error_propagation.covariances import NearImages, around_models
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, ErrorRows, ranges
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+
+AT_A_TIME = 32  # blocks that are made together
 
 
 @dataclass(frozen=True, eq=False)
 class PaddedRows:
-    """Rows with d = 1 of p consecutive models, model by model, r places for each model, empty places 0.
+    """Rows with d = 1 of g consecutive blocks of w models, r places for each block, empty places 0."""
 
-    The places come last, so that products of many models need no copies.
-    """
-
-    begin: int  # the first of the models
-    by_component: Floats  # (p, s, 6, r)
-    images: Floats  # (p, s + 4, 6, r): covariances of their image coordinates with components
-    whole: Floats  # (p, s + 4, 6, r): covariances of the whole rows, without similarities, with components
+    width: int  # w
+    begin: int  # the first of the blocks
+    by_component: Floats  # (g, 6 t, r): by the components of t models from the first of the block on
+    # (g, 6 (t + 4), r): covariances of their image coordinates, or of the whole rows without similarities, with
+    # components of the models from two before the first of the block to two after the last of these
+    covariances: Floats
 
     @classmethod
-    def of(cls, errors: StripErrors, rows: ErrorRows, with_components: Floats, slots: int, models: range) -> Self:
-        """Put rows that are ordered by their first models into places of these; one of d coordinates takes d places.
+    def of(
+        cls, layout: SystemLayout, rows: ErrorRows, images: Floats, place: Numbers, blocks: range, places: int
+    ) -> Self:
+        """Put rows into places of their blocks.
 
-        with_components: covariances of their image points with components, as ``NearImages`` has them.
-        slots: number of models over which any row reaches.
+        images: covariances of their image points with components, as ``NearImages`` has them.
+        place: (n, d), of each coordinate in its block.
         """
-        first, size, have = rows.first - models.start, rows.by_similarity.shape[1], rows.by_component.shape[1]
-        rank = rank_in_model(first, len(models))
-        places = max(int(rank.max(initial=0)) + 1, 1) * size
-        by_component = np.zeros((len(models), slots, COMPONENTS, places))
-        images = np.zeros((len(models), slots + 2 * SHARING, COMPONENTS, places))
-        at = rank[:, None] * size + np.arange(size)
-        by_component[first[:, None], :have, :, at] = rows.by_component.transpose(0, 2, 1, 3)
-        images[first[:, None], : have + 2 * SHARING, :, at] = with_components
-        whole = images + _with_components(errors.component_covariances, by_component, models)
-        return cls(begin=models.start, by_component=by_component, images=images, whole=whole)
+        have, slots, count = rows.by_component.shape[1], layout.slots + layout.width - 1, len(blocks)
+        by_component = np.zeros((count, slots, COMPONENTS, places))
+        covariances = np.zeros((count, slots + 2 * SHARING, COMPONENTS, places))
+        block, shift = np.divmod(rows.first, layout.width)
+        for number in range(layout.width):
+            some = np.flatnonzero(shift == number)
+            own, at = block[some, None] - blocks.start, place[some]
+            by_component[own, number : number + have, :, at] = rows.by_component[some].transpose(0, 2, 1, 3)
+            covariances[own, number : number + images.shape[2], :, at] = images[some]
+        return cls(
+            width=layout.width,
+            begin=blocks.start,
+            by_component=by_component.reshape(count, slots * COMPONENTS, places),
+            covariances=covariances.reshape(count, (slots + 2 * SHARING) * COMPONENTS, places),
+        )
+
+    def whole(self, errors: StripErrors) -> Self:
+        """Add covariances of the components, so that they are those of the whole rows."""
+        blocks, slots = len(self.by_component), self.by_component.shape[1] // COMPONENTS
+        first = (self.begin + np.arange(blocks)) * self.width
+        around = around_models(errors.component_covariances, first, SHARING, slots + SHARING)
+        result = np.zeros_like(self.covariances)
+        for slot in range(slots):
+            by_component = self.by_component[:, slot * COMPONENTS : (slot + 1) * COMPONENTS]
+            for apart in range(-SHARING, SHARING + 1):
+                mixed = around[:, slot + SHARING + min(apart, 0), abs(apart)]
+                mixed = mixed.transpose(0, 2, 1) if apart >= 0 else mixed
+                start = (slot + apart + SHARING) * COMPONENTS
+                result[:, start : start + COMPONENTS] += mixed @ by_component
+        result += self.covariances
+        return replace(self, covariances=result)
 
 
-def _with_components(covariances: Floats, by_component: Floats, models: range) -> Floats:
-    """Covariances of sums of components with the components from two models before to two after."""
-    _, slots, _, places = by_component.shape
-    result = np.zeros((len(models), slots + 2 * SHARING, COMPONENTS, places))
-    for slot in range(slots):
-        for apart in range(-SHARING, SHARING + 1):
-            low = max(models.start, -apart - slot)
-            high = max(min(models.stop, len(covariances) - slot - max(apart, 0)), low)
-            mixed = covariances[low + slot + min(apart, 0) : high + slot + min(apart, 0), abs(apart)]
-            mixed = mixed.transpose(0, 2, 1) if apart >= 0 else mixed
-            row = slice(low - models.start, high - models.start)
-            result[row, slot + apart + SHARING] += mixed @ by_component[row, slot]
-    return result
-
-
-def products(a: PaddedRows, b: PaddedRows, models: range, apart: int) -> Floats:
-    """Covariances (m, r_a, r_b) of rows of models with rows of models apart.
+def products(whole: PaddedRows, images: PaddedRows, blocks: range, apart: int, out: Floats) -> None:
+    """Find covariances (m, r, r') of rows of blocks with rows of blocks apart.
 
     Products of image coordinates that both use directly are left out; ``same_images`` gives them.
+
+    whole, images: the ones with covariances of whole rows, the others with those of image coordinates.
     """
-    of_a = slice(models.start - a.begin, models.stop - a.begin)
-    of_b = slice(models.start + apart - b.begin, models.stop + apart - b.begin)
-    total = np.zeros((len(models), a.by_component.shape[3], b.by_component.shape[3]))
-    for first, second, low in (
-        (a.whole[of_a], b.by_component[of_b], apart + SHARING),
-        (a.by_component[of_a], b.images[of_b], apart - SHARING),
-    ):
-        skip_first, skip_second = max(low, 0), max(-low, 0)
-        length = min(first.shape[1] - skip_first, second.shape[1] - skip_second)
-        if length > 0:
-            left = first[:, skip_first : skip_first + length].reshape(len(total), -1, total.shape[1])
-            right = second[:, skip_second : skip_second + length].reshape(len(total), -1, total.shape[2])
-            total += left.transpose(0, 2, 1) @ right
-    return total
+    own = slice(blocks.start - whole.begin, blocks.stop - whole.begin)
+    other = slice(blocks.start + apart - images.begin, blocks.stop + apart - images.begin)
+    models = apart * whole.width
+    np.matmul(*_over_same_models(whole.covariances[own], images.by_component[other], models + SHARING), out=out)
+    out += np.matmul(*_over_same_models(whole.by_component[own], images.covariances[other], models - SHARING))
+
+
+def _over_same_models(first: Floats, second: Floats, later: int) -> tuple[Floats, Floats]:
+    """Cut (m, 6 t, r), transposed, and (m, 6 t', r'), whose models begin so much later, to the models of both."""
+    skip_first, skip_second = COMPONENTS * max(later, 0), COMPONENTS * max(-later, 0)
+    length = max(min(first.shape[1] - skip_first, second.shape[1] - skip_second), 0)
+    left, right = first[:, skip_first : skip_first + length], second[:, skip_second : skip_second + length]
+    return left.transpose(0, 2, 1), right
 
 
 class SameImages(NamedTuple):
@@ -111,10 +121,8 @@ class SystemLayout:
     """Where conditions and unknowns stand."""
 
     width: int  # models in a block
-    # blocks, height: number of blocks, and rows of each
-    blocks: int
-    height: int
-    rank: Numbers  # (n,): place of each condition among those of its model
+    slots: int  # models over which any row reaches
+    heights: Numbers  # (g,): places that the conditions and unknowns of each block take
     # block, position: (n,): block of each condition, and its place there
     block: Numbers
     position: Numbers
@@ -123,59 +131,37 @@ class SystemLayout:
     unknown: Numbers
 
     @classmethod
-    def of(cls, first: Numbers, models: int, width: int) -> Self:
+    def of(cls, first: Numbers, models: int, slots: int) -> Self:
         """Lay out conditions that are ordered by their first models."""
+        width = min(slots, models)
         counts = np.bincount(first, minlength=models)
-        rank = rank_in_model(first, models)
         begins = np.cumsum(counts + SIMILARITY_PARAMETERS) - counts - SIMILARITY_PARAMETERS
         numbers = np.arange(models)
         start = begins - begins[numbers // width * width]
         unknown = start + counts
         return cls(
             width=width,
-            blocks=(models - 1) // width + 1,
-            height=int(unknown.max()) + SIMILARITY_PARAMETERS,
-            rank=rank,
+            slots=slots,
+            heights=np.append(unknown[width - 1 : -1 : width], unknown[-1]) + SIMILARITY_PARAMETERS,
             block=first // width,
-            position=start[first] + rank,
+            position=start[first] + np.arange(len(first)) - (np.cumsum(counts) - counts)[first],
             start=start,
             unknown=unknown,
         )
 
-    def empty(self) -> tuple[Numbers, Numbers]:
-        """Places that nothing takes."""
-        used = np.zeros((self.blocks, self.height), bool)
-        used[self.block, self.position] = True
-        models = np.arange(len(self.start))
-        used[(models // self.width)[:, None], self.unknown[:, None] + np.arange(SIMILARITY_PARAMETERS)] = True
-        blocks, places = np.nonzero(~used)
-        return blocks, places
+    @property
+    def blocks(self) -> int:
+        return len(self.heights)
 
+    @property
+    def height(self) -> int:
+        """Places in a block: those that the largest takes."""
+        return int(self.heights.max())
 
-def rank_in_model(first: Numbers, models: int) -> Numbers:
-    """Place of each row among those of its model, for rows that are ordered by their models."""
-    counts = np.bincount(first, minlength=models)
-    return np.asarray(np.arange(len(first)) - (np.cumsum(counts) - counts)[first], np.intp)
-
-
-@dataclass(frozen=True, eq=False)
-class BlockMatrix:
-    """A symmetric matrix of blocks on and beside the diagonal."""
-
-    layout: SystemLayout
-    # diagonal, beside: (g, b, b): blocks on the diagonal and to the right of them
-    diagonal: Floats
-    beside: Floats
-
-    def put(self, model: int, rows: slice, other: int, columns: slice, values: Floats) -> None:
-        """Put values at rows of a model's block, columns of that of the same or a later model, and mirrored."""
-        block = model // self.layout.width
-        if other // self.layout.width > block:
-            self.beside[block, rows, columns] = values
-        else:
-            self.diagonal[block, rows, columns] = values
-            if other != model:  # or the values have both sides
-                self.diagonal[block, columns, rows] = values.T
+    @property
+    def cuts(self) -> list[list[int]]:
+        """Places in each block where its models begin, but for the first."""
+        return [self.start[low + 1 : low + self.width].tolist() for low in range(0, len(self.start), self.width)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +169,7 @@ class System:
     errors: StripErrors
     conditions: Conditions
     layout: SystemLayout
-    padded: PaddedRows  # the conditions
+    padded: PaddedRows  # the conditions, with covariances of the whole rows
     factors: block_tridiagonal.Factors
     solution: Floats  # (g, b): correlates of the conditions, and unknowns
 
@@ -195,8 +181,9 @@ class System:
     @property
     def cofactors(self) -> Floats:
         """Cofactors of the correlates, shape (n,)."""
-        place = self.layout.position
-        return np.asarray(self.factors.diagonal_of_inverse[self.layout.block, place, place], float)
+        squares = np.concatenate([np.diagonal(block) for block in self.factors.diagonal_of_inverse])
+        begin = np.cumsum(self.layout.heights) - self.layout.heights
+        return np.asarray(squares[begin[self.layout.block] + self.layout.position], float)
 
     def columns_of_inverse(self, rows: Numbers) -> Floats:
         """Columns K^-1 e of conditions (c,), by blocks: shape (g, b, c)."""
@@ -223,22 +210,21 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     """
     rows = wanted.rows
     slots = max(rows.by_component.shape[1], errors.points.by_component.shape[1], SHARING)
-    layout = SystemLayout.of(rows.first, errors.models, min(slots, errors.models))
-    padded = PaddedRows.of(errors, rows, NearImages.of(errors, rows).with_components, slots, range(errors.models))
-    shape = (layout.blocks, layout.height, layout.height)
-    matrix = BlockMatrix(layout, np.zeros(shape), np.zeros(shape))
-    _put_covariances(matrix, padded, rows)
-    _add_design(matrix, wanted)
-    matrix.diagonal[layout.block, layout.position, layout.position] += wanted.noise / factor
-    blocks, places = layout.empty()
-    matrix.diagonal[blocks, places, places] = 1.0
-    cuts = [layout.start[low + 1 : low + layout.width].tolist() for low in range(0, errors.models, layout.width)]
-    factors = block_tridiagonal.eliminate(matrix.diagonal, matrix.beside, cuts)
+    layout = SystemLayout.of(rows.first, errors.models, slots)
+    near = NearImages.of(errors, rows).with_components
+    images = PaddedRows.of(layout, rows, near, layout.position[:, None], range(layout.blocks), layout.height)
+    whole = images.whole(errors)
+    diagonal, beside = _covariances(layout, rows, whole, images)
+    _add_design(layout, wanted, diagonal, beside)
+    diagonal[layout.block, layout.position, layout.position] += wanted.noise / factor
+    block, empty = np.nonzero(np.arange(layout.height) >= layout.heights[:, None])
+    diagonal[block, empty, empty] = 1.0
+    factors = block_tridiagonal.eliminate(diagonal, beside, layout.cuts, layout.heights.tolist())
     return System(
         errors=errors,
         conditions=wanted,
         layout=layout,
-        padded=padded,
+        padded=whole,
         factors=factors,
         solution=_solution(layout, factors, wanted.value),
     )
@@ -256,31 +242,33 @@ def _solution(layout: SystemLayout, factors: block_tridiagonal.Factors, value: F
     return np.asarray(factors.solve(right)[:, :, 0], float)
 
 
-def _put_covariances(matrix: BlockMatrix, padded: PaddedRows, rows: ErrorRows) -> None:
-    """Put Q, the covariances of the conditions, into an empty matrix."""
-    layout = matrix.layout
-    inside = [slice(*bounds) for bounds in zip(layout.start.tolist(), layout.unknown.tolist(), strict=True)]
-    for apart in range(min(layout.width, len(inside) - 1) + 1):
-        values = products(padded, padded, range(len(inside) - apart), apart)
-        for model, (one, other, value) in enumerate(zip(inside, inside[apart:], values, strict=False)):
-            part = value[: one.stop - one.start, : other.stop - other.start]
-            matrix.put(model, one, model + apart, other, part)
+def _covariances(layout: SystemLayout, rows: ErrorRows, whole: PaddedRows, images: PaddedRows) -> tuple[Floats, Floats]:
+    """Make Q, the covariances of the conditions: blocks (g, b, b) on the diagonal and to the right of them."""
+    diagonal, beside = np.zeros((2, layout.blocks, layout.height, layout.height))
+    for low in range(0, layout.blocks, AT_A_TIME):
+        for apart, blocks in enumerate((diagonal, beside)):
+            some = range(low, min(low + AT_A_TIME, layout.blocks - apart))
+            products(whole, images, some, apart, blocks[some.start : some.stop])
+    for block, cuts in zip(diagonal, layout.cuts, strict=True):
+        for cut in cuts:
+            block[cut:, :cut] = block[:cut, cut:].T  # rounding makes it different
     shared = same_images(rows, rows)  # every pair in both orders
     block, position = ((each[shared.first], each[shared.second]) for each in (layout.block, layout.position))
-    place = (block[0] * layout.height + position[0]) * layout.height + position[1]
-    for apart, blocks in enumerate((matrix.diagonal, matrix.beside)):
+    place = np.ravel_multi_index((block[0], *position), diagonal.shape)
+    for apart, blocks in enumerate((diagonal, beside)):
         there = np.flatnonzero(block[1] == block[0] + apart)
         np.add.at(blocks.reshape(-1), place[there], shared.value[there, 0, 0])
+    return diagonal, beside
 
 
-def _add_design(matrix: BlockMatrix, wanted: Conditions) -> None:
+def _add_design(layout: SystemLayout, wanted: Conditions, diagonal: Floats, beside: Floats) -> None:
     """Add A: the unknowns of each condition's own model, and of the next one."""
-    layout, rows = matrix.layout, wanted.rows
+    rows = wanted.rows
     for model, values in ((rows.first, rows.by_similarity[:, 0]), (rows.first + 1, wanted.following)):
         known = model < len(layout.unknown)  # none follows the last
         columns = layout.unknown[model[known]][:, None] + np.arange(SIMILARITY_PARAMETERS)
         apart = model[known] // layout.width > layout.block[known]
         block, position = layout.block[known, None], layout.position[known, None]
-        matrix.beside[block[apart], position[apart], columns[apart]] = values[known][apart]
+        beside[block[apart], position[apart], columns[apart]] = values[known][apart]
         own = block[~apart], position[~apart], columns[~apart]
-        matrix.diagonal[own] = matrix.diagonal[own[0], own[2], own[1]] = values[known][~apart]
+        diagonal[own] = diagonal[own[0], own[2], own[1]] = values[known][~apart]

@@ -124,12 +124,17 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
 
 @pytest.mark.parametrize("large", [1, 100])
 def test_blocks_are_eliminated_like_any_system(large: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Indefinite blocks of random numbers, inverted by parts and at once, against the dense inverse."""
+    """Indefinite blocks of random numbers, some with places left, inverted by parts and at once: as the dense one."""
     monkeypatch.setattr(block_tridiagonal, "LARGE", large)
     rng, count, height = np.random.default_rng(8), 5, 6
     diagonal, beside = rng.normal(size=(count, height, height)), rng.normal(size=(count, height, height))
     diagonal = diagonal + diagonal.transpose(0, 2, 1) + np.diag([9.0, 9.0, -9.0, 9.0, -9.0, -9.0])
     beside[-1] = 0.0
+    heights = [6, 5, 6, 6, 4]
+    for number in nonempty((1, 4)):
+        diagonal[number, heights[number] :], diagonal[number, :, heights[number] :] = 0.0, 0.0
+        diagonal[number, range(heights[number], height), range(heights[number], height)] = 1.0
+        beside[number, heights[number] :], beside[number - 1, :, heights[number] :] = 0.0, 0.0
     dense = np.zeros((count, height, count, height))
     for number in range(count):
         dense[number, :, number] = diagonal[number]
@@ -137,18 +142,21 @@ def test_blocks_are_eliminated_like_any_system(large: int, monkeypatch: pytest.M
             dense[number, :, number + 1], dense[number + 1, :, number] = beside[number], beside[number].T
     whole = dense.reshape(count * height, count * height)
     inverse = np.linalg.inv(whole).reshape(dense.shape)
-    factors = block_tridiagonal.eliminate(diagonal, beside, [[], [1], [2, 3], [1, 2, 5], [3]])
+    factors = block_tridiagonal.eliminate(diagonal, beside, [[], [1], [2, 3], [1, 2, 5], [3]], heights)
 
     right = rng.normal(size=(count, height, 3))
+    for number, rows in enumerate(heights):
+        right[number, rows:] = 0.0
     expected = np.linalg.solve(whole, right.reshape(-1, 3)).reshape(right.shape)
     assert factors.solve(right) == pytest.approx(expected, rel=1e-9)
     for number, block in nonempty(enumerate(factors.diagonal_of_inverse)):
-        assert block == pytest.approx(inverse[number, :, number], abs=1e-9)
+        rows = heights[number]
+        assert block == pytest.approx(inverse[number, :rows, number, :rows], abs=1e-9)
     for number in nonempty(range(1, count - 1)):
         near = slice(number - 1, number + 2)
         expected = np.einsum("iajb,jbk->iak", inverse[near, :, near], right[near])
         assert factors.solve_near(number, right[near]) == pytest.approx(expected, abs=1e-9)
-    block, position = np.array([[0, 1, 0], [4, 4, 4], [3, 2, 2]]), np.array([[3, 0, 1], [5, 5, 0], [2, 2, 4]])
+    block, position = np.array([[0, 1, 0], [4, 4, 4], [3, 2, 2]]), np.array([[3, 0, 1], [3, 3, 0], [2, 2, 4]])
     entries = inverse[block[:, :, None], position[:, :, None], block[:, None], position[:, None]]
     assert factors.entries_of_inverse(block, position) == pytest.approx(entries, abs=1e-9)
 

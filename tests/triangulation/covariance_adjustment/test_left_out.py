@@ -114,5 +114,5 @@ def test_a_part_of_the_inverse_is_that_of_the_whole_inverse(blocks: list[int]) -
     block, position = np.array(blocks), np.array([1, 0, 2, 2])[: len(blocks)]
     place = block * b + position
     expected = np.linalg.inv(whole)[np.ix_(place, place)]
-    factors = block_tridiagonal.eliminate(diagonal, beside, [[]] * n)
+    factors = block_tridiagonal.eliminate(diagonal, beside, [[]] * n, [b] * n)
     assert factors.part_of_inverse(block, position) == pytest.approx(expected)
