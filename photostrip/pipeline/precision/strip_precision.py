@@ -53,8 +53,9 @@ def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], poi
             by_a, by_b = a.by_control(in_a, of_a[part]), b.by_control(in_b, of_b[part])
             mixed = (by_a * a.variance[of_a[part]]) @ by_b.transpose(0, 2, 1)
             total[shared] += mixed + mixed.transpose(0, 2, 1)
+    total /= (count**2)[:, None, None]
     return Precision(
-        points=total / (count**2)[:, None, None],
+        points=total,
         photos=tuple(strip.photos for strip in strips),
         sigma=tuple(strip.sigma for strip in strips),
         basis=tuple(strip.basis for strip in strips),

@@ -279,7 +279,8 @@ def form_strip(
     """Form a strip from its pairs, without any control."""
     sigma = strip.median_sigma(observations)
     screened, weight = screened_pairs(strip, observations, settings.relative, stages)
-    oriented, scatter = screened.orientation, screened.scatter.by_pair
+    # a fresh value: the rays that it finds, 48 bytes for each of its rows, go with it, what is kept of the stages stays
+    oriented, scatter = replace(screened.orientation), screened.scatter.by_pair
     refuse_unusable(oriented, screened.converged, strip.photos)
     wrong: tuple[Rejection, ...] = ()
     tested = True

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers, pieces
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
@@ -26,6 +26,9 @@ CONDITION_LIMIT = 1e6
 SMALLEST_PARALLAX = 1e-3  # of the principal distance, mean over a pair: below it there is no base to speak of
 LEAST_IN_FRONT = 0.5  # share of the points of a pair
 SCREENINGS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")  # searches for gross errors
+# whose cofactors are laid out together: those of 87 000 rows are the largest block of a run, and once it is freed, the
+# C library keeps all smaller ones for itself, too
+ROWS = 32_768
 BY_PAIR = ("elements", "sigmas", "sigma0", "condition", "iterations", "cofactors")
 BY_ROW = ("parallax", "redundancy")
 
@@ -162,7 +165,10 @@ def assess_pairs(elements: Floats, pairs: Pairs, iterations: Numbers) -> Orienta
         freedom = pairs.sums((pairs.weight > 0).astype(float)) - MINIMUM_POINTS
         variance = pairs.sums(pairs.weight * q**2) / freedom  # of a y parallax: twice that of an image coordinate
         variance[freedom < 1] = np.nan
-        spread = np.einsum("im,mij,jm->m", jacobian, cofactors[pairs.pair], jacobian)
+        spread = np.empty(len(q))
+        for rows in pieces(len(q), ROWS):
+            by = jacobian[:, rows]
+            spread[rows] = np.einsum("im,mij,jm->m", by, cofactors[pairs.pair[rows]], by)
         return Orientation(
             pairs=pairs,
             elements=elements,
