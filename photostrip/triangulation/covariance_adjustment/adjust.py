@@ -122,7 +122,7 @@ class CovarianceAdjustment:
         errors, change = self.system.errors, left_out.change
         images = relinearisation.image_errors(change)
         points, photos = (
-            prediction.errors(change, rows, images) for rows in (errors.points, prediction.photo_rows(errors))
+            prediction.errors(change, rows, images) for rows in (errors.points.whole(), prediction.photo_rows(errors))
         )
         return replace(
             self,
@@ -173,7 +173,7 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
     errors, formed = one.strip.errors, one.strip.formed
     images = relinearisation.image_errors(one.system) - one.images
     points, photos = (
-        prediction.errors(one.system, rows, images) for rows in (errors.points, prediction.photo_rows(errors))
+        prediction.errors(one.system, rows, images) for rows in (errors.points.whole(), prediction.photo_rows(errors))
     )
     similarity = one.strip.absolute.similarity
     return CovarianceAdjustment(

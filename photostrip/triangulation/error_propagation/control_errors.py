@@ -17,7 +17,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.points import ControlPoints
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows, PointRows
 from photostrip.triangulation.polynomial.terms import columns
 
 
@@ -69,7 +69,9 @@ class FitOperator:
         return [found[terms] for terms in self.terms]
 
 
-def misclosures(points: ErrorRows, control: ControlPoints, control_rows: Numbers, axes: Floats) -> Misclosures:
+def misclosures(
+    points: ErrorRows | PointRows, control: ControlPoints, control_rows: Numbers, axes: Floats
+) -> Misclosures:
     """Rows of derivatives of the misclosures, in the order of the points, each with its coordinates that count.
 
     control: the control, with standard deviations along `axes`.

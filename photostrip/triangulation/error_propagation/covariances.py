@@ -26,6 +26,7 @@ from photostrip.triangulation.error_propagation.derivatives import (
     SHARING,
     SPAN,
     ErrorRows,
+    PointRows,
     add_products,
     add_rows,
 )
@@ -205,7 +206,7 @@ def _times_covariances(errors: StripErrors, by_component: Floats) -> Floats:
 
 
 def covariances(
-    errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, influence: Callable[[Numbers], Floats]
+    errors: StripErrors, rows: ErrorRows | PointRows, fit: ParameterCovariances, influence: Callable[[Numbers], Floats]
 ) -> Floats:
     """Covariances (n, d, d) of corrected points or photos, for a variance factor of 1 of the image coordinates.
 
@@ -231,7 +232,7 @@ def covariances(
     return result
 
 
-def _slices(rows: ErrorRows) -> list[slice]:
+def _slices(rows: ErrorRows | PointRows) -> list[slice]:
     """Cut many rows into parts of bounded memory."""
     count, slots, size, components = rows.by_component.shape
     size *= SIMILARITY_PARAMETERS + 2 * (slots + SHARING) * components  # of ``_coefficients``

@@ -14,6 +14,7 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass, replace
+from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
@@ -33,10 +34,15 @@ class ImagePoints:
 
     row: Numbers  # (n,): row in the table of image points
     photo: Numbers  # (n,): place of its photo in the strip, ascending
-    sigma: Floats  # (n, 2): stated standard deviations of x and y, mm
+    stated: Floats  # (k, 2): standard deviations of all image points in that table, mm
     # (n, 2, 13): by x and y in their standard deviations: scale of the model photo - 2, components of the models
     # photo - 1 and photo (``MOVED``)
     components: Floats
+
+    @property
+    def sigma(self) -> Floats:
+        """Stated standard deviations (n, 2) of x and y, mm."""
+        return self.stated[self.row]
 
     def rows_of(self, rows: Numbers) -> Numbers:
         """Places here of rows in the table of image points."""
@@ -97,7 +103,7 @@ class ErrorRows:
         )
 
     def take(self, rows: Numbers) -> Self:
-        return self._selected(rows, *ranges(*self.entries(rows)))
+        return self._selected(rows, *ranges(*entries(self.item, rows)))
 
     def part(self, start: int, stop: int) -> Self:
         """Rows from start to stop, without copying."""
@@ -129,9 +135,48 @@ class ErrorRows:
         """Leave out the similarity of the first model, where that is an unknown and no error."""
         return replace(self, by_similarity=np.zeros_like(self.by_similarity))
 
-    def entries(self, rows: Numbers) -> tuple[Numbers, Numbers]:
-        """First and last + 1 of the image points that belong to rows."""
-        return np.searchsorted(self.item, rows), np.searchsorted(self.item, rows, side="right")
+
+@dataclass(frozen=True, eq=False)
+class PointRows:
+    """Errors of the n points of a strip as ``ErrorRows`` have them, d = 3.
+
+    Their derivatives by the similarity, 170 bytes a point, follow from their places where they are needed.
+    """
+
+    xyz: Floats  # (n, 3): from the origin of the similarities, metres
+    # first, by_component, item, image, by_image: as in ``ErrorRows``
+    first: Numbers
+    by_component: Floats
+    item: Numbers
+    image: Numbers
+    by_image: Floats
+
+    def take(self, rows: Numbers) -> ErrorRows:
+        item, entry = ranges(*entries(self.item, rows))
+        return ErrorRows(
+            first=self.first[rows],
+            by_similarity=self.by_similarity(rows),
+            by_component=self.by_component[rows],
+            item=item,
+            image=self.image[entry],
+            by_image=self.by_image[entry],
+        )
+
+    def whole(self) -> ErrorRows:
+        """Give all rows."""
+        return ErrorRows(
+            first=self.first,
+            by_similarity=self.by_similarity(np.arange(len(self.first))),
+            by_component=self.by_component,
+            item=self.item,
+            image=self.image,
+            by_image=self.by_image,
+        )
+
+    def by_similarity(self, rows: Numbers) -> Floats:
+        """Displacements of some points by the similarity of their first model, (..., 3, 7)."""
+        found = similarity_derivatives(self.xyz[rows.ravel()], np.zeros(3))
+        return found.reshape(*rows.shape, *found.shape[1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +190,11 @@ class PlacedStrip:
     rotations: Floats  # (p + 1, 3, 3)
     images: ImagePoints
     steps: Floats  # (p, 7, 6)
+
+
+def entries(item: Numbers, rows: Numbers) -> tuple[Numbers, Numbers]:
+    """First and last + 1 of the image points that belong to rows; ``item``: the row of each, ascending."""
+    return np.searchsorted(item, rows), np.searchsorted(item, rows, side="right")
 
 
 def ranges(start: Numbers, stop: Numbers) -> tuple[Numbers, Numbers]:

@@ -11,11 +11,11 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import NamedTuple
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import similarity_derivatives
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, PlacedStrip
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, PlacedStrip, PointRows
 
 
-def with_bridges(points: ErrorRows, strip: PlacedStrip) -> ErrorRows:
-    """Complete the rows of the points of a strip by those without a model, which hold ``by_similarity`` only so far."""
+def with_bridges(points: PointRows, strip: PlacedStrip) -> PointRows:
+    """Complete the rows of the points of a strip by those without a model, which move with their first model so far."""
     ends = _ends(strip)
     photo = strip.images.photo[ends.image]
     rays = np.concatenate([ends.xy, np.full((*photo.shape, 1), -strip.orientation.pairs.focal)], axis=2)
@@ -36,9 +36,9 @@ def with_bridges(points: ErrorRows, strip: PlacedStrip) -> ErrorRows:
     order = np.argsort(item, kind="stable")
     image = ends.image.ravel()
     by_image = middle.by_image.reshape(-1, 3, 2) * strip.images.sigma[image][:, None, :]
-    return ErrorRows(
+    return PointRows(
+        xyz=points.xyz,
         first=first,
-        by_similarity=points.by_similarity,
         by_component=by_component,
         item=item[order],
         image=np.concatenate([points.image, image])[order],

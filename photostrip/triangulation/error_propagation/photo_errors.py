@@ -12,7 +12,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.points import take_rows
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, ranges
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, entries, ranges
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.resection.collinearity import distances, partials
 from photostrip.triangulation.resection.resection import Resection, runs
@@ -83,20 +83,20 @@ def _some_photos(
     count, most = len(photos), int(place.max()) + 1
     by = _resected(sightings, resection, item, place, distance)
     points, images = errors.points, errors.images
-    sighting, entry = ranges(*points.entries(sightings.point))
+    sighting, entry = ranges(*entries(points.item, sightings.point))
     beside = item * most + place
     by_image = points.by_image[entry].transpose(0, 2, 1) @ by.point.reshape(-1, 3, 6)[beside[sighting]]
     image = points.image[entry]
     once_more = np.flatnonzero(image == images.rows_of(sightings.image)[sighting])
     directly = by.image.reshape(-1, 2, 6)[beside[sighting[once_more]]]
-    by_image[once_more] += directly * images.sigma[image[once_more]][:, :, None]
+    by_image[once_more] += directly * images.stated[images.row[image[once_more]]][:, :, None]
 
     first = np.minimum.reduceat(points.first[sightings.point], starts)
     # where a photo has fewer points, the last again, with derivatives of zero
     point = sightings.point[
         np.minimum(starts[:, None] + np.arange(most), np.append(starts[1:], len(item))[:, None] - 1)
     ]
-    similar, along = points.by_similarity[point], points.by_component[point]
+    similar, along = points.by_similarity(point), points.by_component[point]
     shift, slots = points.first[point] - first[:, None], along.shape[2]
     farthest, all_similar = int(shift.max()), similar.reshape(count, 3 * most, -1)
     carried = np.zeros((count, farthest + slots, most, 3, COMPONENTS))

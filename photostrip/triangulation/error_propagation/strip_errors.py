@@ -34,9 +34,9 @@ from photostrip.triangulation.error_propagation.derivatives import (
     SCALE,
     SHARING,
     SPAN,
-    ErrorRows,
     ImagePoints,
     PlacedStrip,
+    PointRows,
     add_rows,
 )
 from photostrip.triangulation.error_propagation.pair_errors import PairErrors
@@ -61,7 +61,7 @@ class StripErrors:
     # model that of the last photo
     steps: Floats
     component_covariances: Floats  # (p, 3, 6, 6): Q, of each model with itself, the next and the one after
-    points: ErrorRows
+    points: PointRows
     make_pairs: Callable[[], PairErrors]
     origin: Floats  # (3,): common origin of all similarities
 
@@ -106,12 +106,12 @@ def differentiate_strip(
         images=ImagePoints(
             row=row,
             photo=position[row],
-            sigma=sigma[row],
+            stated=sigma,
             components=np.zeros((len(row), 2, MOVED.stop - MOVED.start)),
         ),
         steps=np.zeros((len(scale), SIMILARITY_PARAMETERS, COMPONENTS)),
     )
-    points = _PointRows.of(strip)
+    points = _PointsInMaking.of(strip)
     of_scale = np.zeros((2, len(scale), 5))
     for section in _sections(orientation, formed.junctions):
         own = section.numbers
@@ -199,7 +199,7 @@ def _add_components(images: ImagePoints, section: _Section, pairs: PairErrors, o
     add_rows(of_scale[0], joined.junction, (before[:, None] @ center_to_point)[:, 0])
     by_next = after[:, None] @ pairs.point_by_elements[joined.after]
     add_rows(of_scale[1], joined.junction + 1, -by_next[:, 0])
-    place, stated = images.rows_of(orientation.rows), images.sigma[images.rows_of(orientation.rows)].reshape(-1, 4)
+    place, stated = images.rows_of(orientation.rows), images.stated[orientation.rows].reshape(-1, 4)
     by_parallax = pair_errors.elements_by_parallax(orientation, pairs.parallax_by_elements)[own]
     parallax = np.where(orientation.used[:, None], pairs.parallax_by_image * stated, 0.0)[own]
     scale, scale_before = ((by_parallax * shares[orientation.pairs.pair[own]]).sum(axis=1) for shares in of_scale)
@@ -250,7 +250,7 @@ def _component_covariances(images: ImagePoints, models: int) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class _PointRows:
+class _PointsInMaking:
     """Rows of the points in the making: means over their k models, each brought back over the steps to the first."""
 
     strip: PlacedStrip
@@ -308,23 +308,23 @@ class _PointRows:
             self.by_image[place[:, side]] += share * pairs.point_by_image[rows - start, :, columns]
         self.by_component[item, self.slot[some], :, ELEMENTS] = share * pairs.point_by_elements[rows - start]
 
-    def finished(self) -> ErrorRows:
+    def finished(self) -> PointRows:
         """Return the rows, all models having been put in."""
         steps, by_component, first = self.strip.steps, self.by_component, self.first
         held = np.zeros(by_component.shape[:2])
         held[self.item, self.slot] = 1 / self.strip.formed.model_count[self.item]
         beyond = np.cumsum(held[:, ::-1], axis=1)[:, ::-1]
-        by_similarity = similarity_derivatives(self.strip.xyz, np.zeros(3))
+        xyz = self.strip.xyz
         for s in range(by_component.shape[1] - 1):  # share of the models after each slot
             moved = np.flatnonzero(beyond[:, s + 1] > 0)
             for some in np.split(moved, range(IMAGES, len(moved), IMAGES)):  # the steps of all take twice the memory
-                along = by_similarity[some] @ steps[first[some] + s]
+                along = similarity_derivatives(xyz[some], np.zeros(3)) @ steps[first[some] + s]
                 by_component[some, s] += beyond[some, s + 1, None, None] * along
         by_image = self.by_image
         by_image *= self.strip.images.sigma[self.image][:, None, :]
-        return ErrorRows(
+        return PointRows(
+            xyz=xyz,
             first=first,
-            by_similarity=by_similarity,
             by_component=by_component,
             item=self.point,
             image=self.image,

@@ -78,7 +78,7 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     again = conditions.misclosures_at(wanted, strip.of_photos.formed, strip.absolute.similarity, control)
     assert again == pytest.approx(wanted.value, abs=1e-9)
     solved = system.system(errors, wanted, factor)
-    tables = [errors.points, prediction.photo_rows(errors)]
+    tables = [errors.points.whole(), prediction.photo_rows(errors)]
 
     by_images = written_out(wanted.rows.without_similarity(), errors)[:, 0]
     design = np.zeros((len(wanted.value), 7 * (n + 1)))
@@ -390,5 +390,5 @@ def test_many_points_of_a_model_get_their_covariances_together(photos: int, lap:
     direct, together = prediction._explained(columns), dense_models.explained(columns)
     assert together == pytest.approx(direct, abs=1e-12 * np.abs(direct).max())
     assert prediction.covariances(solved, copies)[::40] == pytest.approx(
-        prediction.covariances(solved, errors.points), abs=1e-12 * np.abs(one_by_one).max()
+        prediction.covariances(solved, errors.points.whole()), abs=1e-12 * np.abs(one_by_one).max()
     )

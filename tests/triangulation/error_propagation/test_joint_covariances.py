@@ -16,14 +16,14 @@ from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
-    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows, PointRows
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
 
 CLOSE = 1e-10  # of the largest standard deviations: sums of thousands of products agree so far
 
 
-def single(points: ErrorRows, some: np.ndarray) -> ErrorRows:
+def single(points: PointRows, some: np.ndarray) -> ErrorRows:
     """Coordinates of points in random directions, three of each, in no order."""
     rng = np.random.default_rng(3)
     rows = rng.permutation(np.repeat(some, 3))
