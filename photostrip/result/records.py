@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, cast, overload
@@ -37,7 +36,7 @@ class Row(Mapping[str, Any]):
 class Named(Sequence[str]):
     """A column of texts of which many are the same: each text stands once, the column holds its number."""
 
-    def __init__(self, names: Sequence[Any] | NDArray[Any], numbers: Numbers) -> None:
+    def __init__(self, names: Sequence[Any] | NDArray[Any], numbers: NDArray[Any]) -> None:
         self.names, self.numbers = names, numbers
 
     def __len__(self) -> int:
@@ -78,24 +77,12 @@ class Grouped(Sequence[list[Any]]):
             ends = self.ends[start : stop + 1]
             return Grouped(self.values[ends[0] : ends[-1]], [end - ends[0] for end in ends])
         first = place if place >= 0 else place + len(self)
-        return list(self.values[self.ends[first] : self.ends[first + 1]])
+        start, stop = self.ends[first], self.ends[first + 1]
+        return list(self.values[start:stop]) if start < stop else []
 
     def __iter__(self) -> Iterator[list[Plain]]:
         values = list(self.values)
         return (values[start:stop] for start, stop in pairwise(self.ends))
-
-    @classmethod
-    def of(cls, lists: Iterable[Iterable[Plain]]) -> Grouped:
-        values: list[Plain] = []
-        ends = array("q", [0])
-        for each in lists:
-            values.extend(each)
-            ends.append(len(values))
-        return cls(values, ends)
-
-    def taken(self, order: Numbers) -> Grouped:
-        values, ends = list(self.values), self.ends
-        return Grouped.of(values[ends[place] : ends[place + 1]] for place in order.tolist())
 
 
 class Records(Sequence[dict[str, Any]]):
@@ -154,9 +141,11 @@ def as_lists(value: Plain) -> Plain:
     return list(value) if isinstance(value, Records) else value
 
 
-def column_of(rows: Records | Sequence[Mapping[str, Plain]], key: str) -> Sequence[Plain]:
-    """Return the values of a key in all records."""
-    return rows.columns[key] if isinstance(rows, Records) and len(rows) else [row[key] for row in rows]
+def column_of(rows: Records | Sequence[Mapping[str, Plain]], key: str, *, optional: bool = False) -> Sequence[Plain]:
+    """Return the values of a key in all records; None where it is missing and may be."""
+    if isinstance(rows, Records) and len(rows):
+        return rows.columns[key]
+    return [row.get(key) if optional else row[key] for row in rows]
 
 
 def as_records(columns: Mapping[str, Sequence[Plain]]) -> list[Document]:

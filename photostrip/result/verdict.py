@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from itertools import compress, groupby
 from operator import itemgetter
+from typing import Any
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
 from photostrip.notes import Document, before, counted, listed
-from photostrip.result.records import Records, column_of
+from photostrip.result.records import column_of
 from photostrip.statistics import SECOND_LOOK, TEST_LEVEL, chi2_quantile, f_p_value
 
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
@@ -34,8 +35,6 @@ NAMED = 3  # pairs, photos, findings or notes of one kind that are named
 
 def verdict_of(document: Document) -> Document:
     """Return status, accuracy in a sentence and what to look at, from a document that has no verdict yet."""
-    control = document["control"]
-    document = {**document, "control": control.rows() if isinstance(control, Records) else control}
     errors = list(_findings(document, "error"))
     failed = [*_tolerances(document), *errors]
     look_at = [
@@ -86,7 +85,7 @@ def _numbers(document: Document) -> Iterator[str]:
     yield from _control(document)
     yield from _odd(document, "control", named)
     yield from _odd(document, "check", named)
-    if not named.issuperset(row["id"] for row in _rows(document, "check")):
+    if not named.issuperset(name for (name,) in _given(document, "check", "id")):
         yield from _checks(document)
     yield from _odd(document, "cross_validation", named)
     yield from _cross_validation(document)
@@ -142,10 +141,12 @@ def _whole(document: Document, role: str) -> Document:
     return found
 
 
-def _rows(document: Document, role: str) -> Iterator[Document]:
-    if role == "cross_validation":
-        return iter(document.get(role, {}).get("points", []))
-    return (row for row in document["control"] if row["role"] == role)
+def _given(document: Document, role: str, *keys: str) -> Iterator[tuple[Any, ...]]:
+    """Give the values of some keys at the points of a role."""
+    left_out = role == "cross_validation"
+    points = document.get(role, {}).get("points", []) if left_out else document["control"]
+    values = zip(*(column_of(points, key, optional=key == "rejected") for key in keys), strict=True)
+    return values if left_out else compress(values, (each == role for each in column_of(points, "role")))
 
 
 def headline_rms(document: Document, role: str, part: str) -> Document:
@@ -154,13 +155,17 @@ def headline_rms(document: Document, role: str, part: str) -> Document:
     if not out:
         whole: Document = _whole(document, role)[part]
         return whole
-    rows = (_without_rejected(row) for row in _rows(document, role) if row["id"] not in out)
-    kept = [(row[part], row[f"{part}_um"]) for row in rows if row[part] is not None]
+    axes, points = set("xy" if part == "plan" else "z"), _given(document, role, "id", "rejected", part, f"{part}_um")
+    kept = [
+        sizes
+        for name, rejected, *sizes in points
+        if name not in out and sizes[0] is not None and axes.isdisjoint(rejected or "")
+    ]
     return {"count": len(kept), **dict(zip(("rms", "rms_um"), map(_rms, zip(*kept, strict=True)), strict=True))}
 
 
 def _standing_out(document: Document, role: str, part: str) -> list[str]:
-    return [row["id"] for row in _rows(document, role) if part in row["stands_out"]]
+    return [name for name, parts in _given(document, role, "id", "stands_out") if part in parts]
 
 
 def _rms(values: Sequence[float]) -> float:
@@ -186,25 +191,20 @@ def _control(document: Document) -> Iterator[str]:
         )
 
 
-def _without_rejected(row: Document) -> Document:
-    """Return a control point without what was rejected, which has a note of its own."""
-    out = row.get("rejected", "")
-    plan = None if "x" in out or "y" in out else row["plan"]
-    return {**row, "plan": plan, "height": None if "z" in out else row["height"]}
-
-
 def _odd(document: Document, role: str, named: set[str]) -> Iterator[str]:
     """Name the points that do not go with the others, in plan and in height, and that nothing else has `named`."""
-    odd = [row for row in _rows(document, role) if row["stands_out"] and row["id"] not in named]
+    points = _given(document, role, "id", "stands_out", *PARTS)
+    known = ((name, parts, dict(zip(PARTS, sizes, strict=True))) for name, parts, *sizes in points)
+    odd = [each for each in known if each[1] and each[0] not in named]
     if not odd:
         return
     sizes = [
-        f"{row['id']} ({', '.join(f'{abs(row[part]):.3f} m in {part}' for part in row['stands_out'])})" for row in odd
+        f"{name} ({', '.join(f'{abs(size[part]):.3f} m in {part}' for part in parts)})" for name, parts, size in odd
     ]
     others = " and ".join(
         f"{headline_rms(document, role, part)['rms']:.3f} m in {part}"
         for part in PARTS
-        if any(part in row["stands_out"] for row in odd)
+        if any(part in parts for _, parts, _ in odd)
     )
     left_out = ", left out," if role == "cross_validation" else ""
     noun, verb = ("point", "stands") if len(odd) == 1 else ("points", "stand")
@@ -369,7 +369,8 @@ def _open_findings(document: Document) -> list[Document]:
 
 def _findings(document: Document, severity: str) -> Iterator[str]:
     """Name what the data say against themselves and nobody has accepted, and whether it was used."""
-    out = {row["id"] for row in document["control"] if row.get("rejected", "")}
+    given = (column_of(document["control"], key, optional=key == "rejected") for key in ("id", "rejected"))
+    out = {name for name, rejected in zip(*given, strict=True) if rejected}
     open_ones = [each for each in _open_findings(document) if each["severity"] == severity]
     for _, group in groupby(open_ones, key=itemgetter("code")):
         kind = list(group)

@@ -80,9 +80,8 @@ def _entries(**columns: object) -> list[Document]:
 def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]:
     ids, photos, oriented = observations.point_ids, strip.strip.photos, strip.of_photos.orientation
     wrong_rays = {each.row for each in strip.of_photos.wrong_rays if each.cause == WRONG_RAY}
-    pair, point, rays = oriented.pairs.pair.tolist(), oriented.point.tolist(), oriented.rows.tolist()
-    rank = natural_rank(ids).tolist()
-    every = sorted(strip.of_photos.rejections, key=lambda each: (pair[each.row], rank[point[each.row]]))
+    pair, point, rays, rank = oriented.pairs.pair, oriented.point, oriented.rows, natural_rank(ids)
+    every = sorted(strip.of_photos.rejections, key=lambda each: (int(pair[each.row]), int(rank[point[each.row]])))
     found: list[Document] = [{}] * len(every)
     for unit, factor in (("um", MICROMETRES), ("", 1.0)):
         places = [n for n, each in enumerate(every) if (each.test == "parallax") == (unit == "um")]

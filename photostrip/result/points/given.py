@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
-from itertools import compress
+from collections.abc import Sequence
 from math import erfc, sqrt
 
 import numpy as np
@@ -20,9 +19,11 @@ from photostrip.result.numbers import natural_rank
 from photostrip.result.points.own_precision import chances, normalised
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.quantities import records
-from photostrip.result.records import Grouped, Records
+from photostrip.result.records import Grouped, Named, Records
 
 PARTS = "plan", "height"
+COUNTED = "x", "y", "xy", "z", "xz", "yz", "xyz"  # words of the project file for the coordinates that count
+PLACES = np.array([1, 2, 4], np.int8)  # what each coordinate adds to the place of the word, counted from 1
 CONTROL = "control"  # kind of observations of a bundle adjustment
 LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of itself at least
 
@@ -40,7 +41,7 @@ class Differences:
     checks: tuple[Numbers, Floats]  # check points, and their differences over standard deviations (``normalised``)
     chance: Floats  # (c, 2): probability of a larger difference in plan, in height
     scale: Floats  # (c,): denominator of the photo scale at the point; NaN where it has no coordinates
-    strips: tuple[tuple[str, ...], ...]
+    held: Flags  # (s, c): which strip holds which point
     rejected: Flags  # (c, 3): coordinates east, north, up of the control that were found wrong and not used
     # (c, 2): whether the difference in plan, in height, is too large beside those of the other points of its role
     stands_out: Flags
@@ -87,7 +88,7 @@ def differences(result: Result) -> Differences:
         checks=checks,
         chance=chance,
         scale=_scale(result, held),
-        strips=tuple(tuple(s.strip.id for s, yes in zip(result.strips, row, strict=True) if yes) for row in held.T),
+        held=held,
         rejected=rejected,
         stands_out=_stands_out(control.check, np.where(rejected, np.nan, parts), chance),
     )
@@ -99,7 +100,7 @@ def _likely(ratio: Floats, rows: Numbers, values: Floats) -> Floats:
     At check points from the precision of the point itself, where it is known; elsewhere from the ratio of the
     difference to its standard deviation.
     """
-    found = np.array([[erfc(each / sqrt(2.0))] * 2 for each in ratio.tolist()]).reshape(-1, 2)
+    found = np.repeat(np.fromiter((erfc(each / sqrt(2.0)) for each in ratio.tolist()), float)[:, None], 2, axis=1)
     own = chances(values)
     for part, column in zip(PARTS, found.T, strict=True):
         known = np.isfinite(own[f"p_{part}"])
@@ -192,21 +193,27 @@ def _expected(result: Result, held: Flags) -> Floats:
 def control_of(result: Result, found: Differences) -> Records:
     """Return the list ``control``: every given point with what is left there, in natural order of the ids."""
     control = result.inputs.control
+    order = np.argsort(natural_rank(control.ids))
     columns = {
-        "id": list(control.ids),
-        "role": ["check" if check else "control" for check in control.check.tolist()],
-        "use": [_use(*counts) for counts in control.use.tolist()],
-        "rejected": [_use(*out) if any(out) else "" for out in found.rejected.tolist()],
-        "measured": result.control_rows >= 0,
-        **size_columns(found.axes, found.plan, found.height, found.scale),
-        "sigma": _in_list_order(result, control.sigma),
-        "sigma_fit": _in_list_order(result, found.sigma),
-        "normalised": found.normalised,
-        "stands_out": Grouped.of(compress(PARTS, row) for row in found.stands_out.tolist()),
-        "list": control.frame + 1,
-        "strips": Grouped.of(found.strips),
+        "id": Named(control.ids, order),
+        "role": Named(("control", "check"), control.check[order].astype(np.int8)),
+        "use": Named(("off", *COUNTED), control.use[order] @ PLACES),
+        "rejected": Named(("", *COUNTED), found.rejected[order] @ PLACES),
+        "measured": result.control_rows[order] >= 0,
+        **size_columns(found.axes[order], found.plan[order], found.height[order], found.scale[order]),
+        "sigma": _in_list_order(result, control.sigma)[order],
+        "sigma_fit": _in_list_order(result, found.sigma)[order],
+        "normalised": found.normalised[order],
+        "stands_out": _chosen(PARTS, found.stands_out[order]),
+        "list": control.frame[order] + 1,
+        "strips": _chosen([strip.strip.id for strip in result.strips], found.held.T[order]),
     }
-    return records("control", columns).taken(np.argsort(natural_rank(control.ids)))
+    return records("control", columns)
+
+
+def _chosen(names: Sequence[str], chosen: Flags) -> Grouped:
+    """Return for each row the names that are chosen in it."""
+    return Grouped(Named(names, np.nonzero(chosen)[1]), [0, *np.cumsum(chosen.sum(axis=1)).tolist()])
 
 
 def _in_list_order(result: Result, enu: Floats) -> Floats:
@@ -216,12 +223,6 @@ def _in_list_order(result: Result, enu: Floats) -> Floats:
         rows = result.inputs.control.frame == number
         columns[rows] = frame.user_from_internal(enu[rows])
     return columns
-
-
-@cache  # one text for thousands of points
-def _use(east: bool, north: bool, up: bool) -> str:  # noqa: FBT001 (of one kind, in the order of the axes)
-    """Return the word of the project file for which coordinates count."""
-    return f"{'x' if east else ''}{'y' if north else ''}{'z' if up else ''}" or "off"
 
 
 def size_columns(axes: Floats, plan: Floats, height: Floats, scale: Floats) -> Document:

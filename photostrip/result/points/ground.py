@@ -53,7 +53,7 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> Records:
         models[strip.formed.point] += strip.formed.model_count
     columns = {
         "id": Named(ids, points.number),
-        "role": Named(ROLES, result.roles),
+        "role": Named(ROLES, result.roles.astype(np.int8)),
         **coordinates(result.output, points.ground),
         **point_columns(result),
         "rays": points.rays,

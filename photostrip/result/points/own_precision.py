@@ -59,5 +59,5 @@ def _along_given_axes(result: Result, precision: Precision, numbers: Numbers, at
 
 def chances(normalised: Floats) -> dict[str, Floats]:
     """Return the probabilities of larger differences in plan and in height, from those (n, 2) of ``normalised``."""
-    height = np.array([erfc(abs(z) / sqrt(2)) for z in normalised[:, 1]])
+    height = np.fromiter((erfc(abs(z) / sqrt(2)) for z in normalised[:, 1].tolist()), float)
     return {"p_plan": np.exp(-(normalised[:, 0] ** 2) / 2), "p_height": height}
