@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Bottom to top. A room is a module or a folder directly below photostrip/.
 LAYERS = (
-    {"arrays", "errors", "frozen", "notes", "statistics", "threads", "units", "visible"},
+    {"arrays", "errors", "frozen", "notes", "number_columns", "statistics", "threads", "units", "visible"},
     {"points", "camera", "geometry", "geodesy", "rejection"},
     {"triangulation", "terrestrial"},
     {"simulation"},

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photostrip.formats.text import number_columns
-from photostrip.formats.text.number_columns import Cells, Column, Texts
+from photostrip import number_columns
+from photostrip.number_columns import Cells, Column, Texts
 from photostrip.result.numbers import Plain, RoundedColumn
 from photostrip.result.records import Grouped, Named, Records
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from photostrip.formats.text import number_columns
-from photostrip.formats.text.number_columns import Cells, Texts
+from photostrip import number_columns
 from photostrip.notes import Document
+from photostrip.number_columns import Cells, Texts
 from photostrip.pipeline.results import Result
 from photostrip.result import columns as tables
 from photostrip.result.columns import Column

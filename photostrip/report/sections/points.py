@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import groupby
 from math import fabs
@@ -12,7 +13,7 @@ from photostrip.report.page.numbers import joined, metres, micrometres, ratio, s
 from photostrip.report.page.parts import DASH, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.models import scale_word
-from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN, elsewhere, worst_first
+from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN, column_of, elsewhere, worst_first
 
 AXES = ("x", "y", "z")
 LETTERS = {"east": "x", "north": "y", "up": "z"}  # of `use`
@@ -165,11 +166,8 @@ def image_section(document: Document) -> Section:
         else "Every photo is oriented again on its adjusted points, so that orientations and points agree. "
     )
     text += f"rms of the image residuals {micrometres(summary['image_rms_um'])} µm."
-    photos = sorted(document["photos"], key=lambda p: p["image_rms_um"] or 0.0, reverse=True)[:WORST_POINTS]
-    points = sorted(document["points"], key=lambda p: p["image_rms_um"] or 0.0, reverse=True)[:WORST_POINTS]
-    rays: dict[int, int] = {}
-    for point in document["points"]:
-        rays[point["rays"]] = rays.get(point["rays"], 0) + 1
+    photos, points = _worst(document["photos"]), _worst(document["points"])
+    rays = Counter(column_of(document["points"], "rays"))
     facts = Facts((("points by photos", ", ".join(f"{rays[n]} on {counted(n, 'photo')}" for n in sorted(rays))),))
     rms = number("rms", "image_rms_um", 1, "µm")
     worst_photos = tabulated(
@@ -179,6 +177,13 @@ def image_section(document: Document) -> Section:
         points, (words("worst points", "id"), rms, number("photos", "rays"), words("role", "role", rank=1))
     )
     return Section("Image residuals", (Words(text), facts, worst_photos, worst_points))
+
+
+def _worst(rows: Sequence[Document]) -> list[Document]:
+    """Return the photos or points with the largest residuals."""
+    size = column_of(rows, "image_rms_um")
+    places = sorted(range(len(size)), key=lambda place: float(size[place] or 0.0), reverse=True)
+    return [rows[place] for place in places[:WORST_POINTS]]
 
 
 def rejected_section(document: Document, *, everything: bool) -> Section:

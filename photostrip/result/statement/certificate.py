@@ -9,7 +9,6 @@ latitude 8, angles of photos 4 (radians 6).
 from __future__ import annotations
 
 import hashlib
-import math
 import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,11 +19,15 @@ from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from photostrip import __version__
-from photostrip.arrays import pieces
+import numpy as np
+
+from photostrip import __version__, number_columns
+from photostrip.arrays import Floats, pieces
 from photostrip.geodesy.proj_operation import proj_versions
 from photostrip.notes import Document
-from photostrip.result.records import Records
+from photostrip.number_columns import Cells, Texts
+from photostrip.result.numbers import RoundedColumn
+from photostrip.result.records import Named, Records, column_of
 
 if TYPE_CHECKING:
     from photostrip.geodesy.frame_spec import FrameSpec
@@ -78,7 +81,8 @@ def _lines(document: Document) -> Iterator[str]:
     angles = photos.columns["angles"] if isinstance(photos, Records) else [photo["angles"] for photo in photos]
     for unit, of_unit in groupby(angles, itemgetter("unit")):
         values = [each["values"] or () for each in of_unit]
-        written = iter(_written(chain.from_iterable(values), ANGLES[unit]))
+        cells = _cells(_floats(chain.from_iterable(values)), ANGLES[unit])
+        written = iter(number_columns.joined([cells], "\n").split("\n"))
         yield "\n".join(f"angles {' '.join(islice(written, len(each)))}" for each in values)
     yield from _rows("given", document["control"], ("id", "role", "use"), dict.fromkeys(("dx", "dy", "dz"), METRES))
     yield from _rows("rejected", document["rejected"], ("photo", "point", "stage"), {})
@@ -98,28 +102,36 @@ def _figures(value: Any) -> Iterator[str]:  # noqa: ANN401 (any value)
     elif isinstance(value, str):
         yield value
     else:
-        yield from _written([value], METRES)
+        yield "-" if value is None else f"{float(f'{value:.{METRES}f}') + 0.0:.{METRES}f}"
 
 
 def _rows(what: str, rows: Records | list[Document], texts: Sequence[str], numbers: Mapping[str, int]) -> Iterator[str]:
     """Write a line for each record, with these texts and these numbers."""
-    keys = (*texts, *numbers)
-    columns = [rows.columns[key] if isinstance(rows, Records) else [row[key] for row in rows] for key in keys]
+    ids, values = [_texts(column_of(rows, key)) for key in texts], [_floats(column_of(rows, key)) for key in numbers]
     for part in pieces(len(rows)):
-        cells = [list(map(str, column[part])) for column in columns[: len(texts)]]
-        cells += [
-            _written(column[part], number)
-            for column, number in zip(columns[len(texts) :], numbers.values(), strict=True)
-        ]
-        yield "\n".join(f"{what} {' '.join(row)}" for row in zip(*cells, strict=True))
+        cells = [number_columns.as_texts(column[part]) for column in ids]
+        cells += [_cells(column[part], places) for column, places in zip(values, numbers.values(), strict=True)]
+        first, between = (number_columns.repeated(text, part.stop - part.start) for text in (what, " "))
+        yield number_columns.joined([first, *(each for column in cells for each in (between, column))], "\n")
 
 
-def _written(values: Iterable[float | None], decimals: int) -> list[str]:
-    """Write numbers with these decimals, ``-`` for those that do not exist, never ``-0``: all by one form."""
-    known = [math.nan if value is None else value for value in values]
-    zero = f"{0.0:.{decimals}f}\n"
-    text = f"%.{decimals}f\n" * len(known) % tuple(known)
-    return text.replace(f"-{zero}", zero).replace("nan", "-").split("\n")[:-1]
+def _texts(column: Sequence[Any]) -> Texts:
+    if isinstance(column, Named):
+        return number_columns.texts_of(column.names)[column.numbers]
+    return number_columns.texts_of(list(map(str, column)))
+
+
+def _floats(values: Iterable[float | None]) -> Floats:
+    """Return numbers as an array, NaN for those that do not exist."""
+    return np.array(values if isinstance(values, RoundedColumn) else list(values), float)
+
+
+def _cells(values: Floats, decimals: int) -> Cells:
+    """Write numbers with these decimals, ``-`` for those that do not exist, never ``-0``."""
+    known = values.copy()
+    for row in np.flatnonzero(np.abs(values) < 10.0**-decimals).tolist():
+        known[row] = float(f"{values[row]:.{decimals}f}") + 0.0
+    return number_columns.as_fixed(known, decimals, "-")
 
 
 @cache

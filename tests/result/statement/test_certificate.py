@@ -78,3 +78,15 @@ def test_versions_are_those_that_are_installed() -> None:
     assert found["proj"].count(".") == 2
     assert found["epsg"].startswith("v")
     assert versions(with_proj=False)["proj"] is None
+
+
+def test_numbers_are_hashed_as_a_form_writes_them_and_zero_without_a_sign() -> None:
+    def hashed(value: float | None) -> str:
+        document = plain()
+        document["control"][2]["dz"] = value
+        return result_hash(document)
+
+    assert len({hashed(value) for value in (-0.0004, -0.0, 0.0004)}) == 1
+    assert hashed(0.0005) == hashed(0.001) != hashed(-0.001)  # 0.0005 is a little more than that, 0.0015 as well
+    assert hashed(0.0015) == hashed(0.002)
+    assert hashed(None) not in {hashed(0.0), hashed(1e9)}

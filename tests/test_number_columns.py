@@ -8,10 +8,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.formats.text import number_columns
+from photostrip import number_columns
 
 if TYPE_CHECKING:
-    from photostrip.formats.text.number_columns import Cells
+    from photostrip.number_columns import Cells
 
 NUMBERS = st.lists(
     st.floats(allow_nan=False, allow_infinity=False, width=64)
