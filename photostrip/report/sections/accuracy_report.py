@@ -30,7 +30,6 @@ from photostrip.report.sections.strip import (
     relative_section,
 )
 from photostrip.report.sections.verdict import accuracy, headline, verdict_section
-from photostrip.report.statements.statement import certificate_section, statement_section
 
 
 class SectionName(StrEnum):
@@ -117,6 +116,8 @@ def _of_the_accuracy(document: Document, *, everything: bool) -> Iterator[tuple[
 
 def _of_the_points(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:
     """Give what is left at points and photos, what was rejected, what is not determined."""
+    from photostrip.report.statements.statement import certificate_section, statement_section
+
     yield SectionName.CONTROL, control_section(document, everything=everything)
     yield SectionName.CHECK, check_section(document, everything=everything)
     if "statement" in document:
