@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -108,7 +109,7 @@ class FormedPhotos:
         return of
 
     def control_rays(self, oriented: Oriented) -> list[ControlRay]:
-        rays = self._rays_in_use()
+        rays = self._rays_in_use
         point = np.searchsorted(self.formed.point, self.observations.point[rays.rows])
         order = np.argsort(point, kind="stable")
         low = np.searchsorted(point[order], oriented.control_rows)
@@ -152,7 +153,7 @@ class FormedPhotos:
         xyz = oriented.xyz if correction is None else correction(oriented.xyz)
         if covariance is not None:
             xyz = covariance.xyz
-        rays = self._rays_in_use()
+        rays = self._rays_in_use
         points = np.searchsorted(formed.point, self.observations.point[rays.rows])
         if covariance is None:
             resection = self._resected(oriented, rays, points, xyz)
@@ -221,6 +222,7 @@ class FormedPhotos:
         )
         return adjust(start, settings.covariance)
 
+    @cached_property
     def _rays_in_use(self) -> _Rays:
         """Image points that are used in a model or place a point without one, in the order of the photos."""
         oriented, formed = self.orientation, self.formed
