@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import chain, count, repeat
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
@@ -51,6 +51,14 @@ def locate(wanted: Iterable[str], ids: Iterable[str]) -> Numbers:
     """Place of each wanted id among ids; -1 for those that are not there."""
     place = dict(zip(ids, count(), strict=False))
     return np.fromiter(map(place.get, wanted, repeat(-1)), np.intp)
+
+
+@lru_cache(maxsize=4)
+def located(wanted: tuple[str, ...], ids: tuple[str, ...]) -> Numbers:
+    """Do the same for ids that are asked for in many places of a run: given points, the photos of a strip."""
+    found = locate(wanted, ids)
+    found.setflags(write=False)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +108,9 @@ class PhotoPoints:
     def photo_index(self) -> dict[str, int]:
         return {name: number for number, name in enumerate(self.photo_ids)}
 
-    def places(self, photos: Sequence[str]) -> Numbers:
+    def places(self, photos: tuple[str, ...]) -> Numbers:
         """Place of the photo of every image point among some photos; -1 for the others."""
-        return np.asarray(locate(self.photo_ids, photos)[self.photo], np.intp)
+        return np.asarray(located(self.photo_ids, photos)[self.photo], np.intp)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.points import ControlPoints, PhotoPoints, PointTable, frozen, locate
+from photostrip.points import ControlPoints, PhotoPoints, PointTable, frozen, locate, located
 
 
 def table(ids: list[str] | tuple[str, ...]) -> PointTable:
@@ -20,6 +20,15 @@ def control(n: int = 4) -> ControlPoints:
     use = ~np.isnan(enu)
     check = np.arange(n) % 2 == 1
     return ControlPoints(tuple("ABCDEFGH"[:n]), enu, use, check, np.full((n, 3), 0.05), np.arange(n))
+
+
+@pytest.mark.parametrize("wanted", [("c", "a"), ("b",), ("x", "c")])
+def test_places_that_are_kept_are_those_of_the_ids_asked_for_and_cannot_be_written(wanted: tuple[str, ...]) -> None:
+    ids = ("a", "b", "c")
+    assert located(wanted, ids).tolist() == located(wanted, ids).tolist() == locate(wanted, ids).tolist()
+    assert located(wanted, ids[::-1]).tolist() == locate(wanted, ids[::-1]).tolist()
+    with pytest.raises(ValueError, match="read-only"):
+        located(wanted, ids)[0] = 5
 
 
 # ----------------------------------------------------------------------------------------------- frozen

@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.points import ControlPoints, PhotoPoints, locate, located
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Adjusted, Result
@@ -26,11 +26,11 @@ def measured_control(control: ControlPoints, observations: PhotoPoints) -> Contr
     return control.take(np.array(kept, np.intp))
 
 
-def rows_of_given(ids: Sequence[str], numbers: Numbers, point_ids: Sequence[str]) -> Numbers:
+def rows_of_given(ids: tuple[str, ...], numbers: Numbers, point_ids: tuple[str, ...]) -> Numbers:
     """Row of each given point among points that have numbers in a list of ids; -1 for those that are not there."""
     place = np.full(len(point_ids) + 1, -1)  # the last for ids that are not there
     place[numbers] = np.arange(len(numbers))
-    return np.asarray(place[locate(ids, point_ids)], np.intp)
+    return np.asarray(place[located(ids, point_ids)], np.intp)
 
 
 def cartesian_of(control: ControlPoints, frames: Sequence[GroundFrame]) -> Floats:

@@ -276,7 +276,7 @@ def _rest(
 ) -> Floats:
     """Intersect the points that no strip has from the photos oriented so far, as those of two strips."""
     focal = {photo: strip.camera.principal_distance for strip in inputs.strips for photo in strip.photos}
-    place = observations.places(list(oriented))
+    place = observations.places(tuple(oriented))
     missing = np.isnan(points[observations.point, 0]) & (place >= 0)
     rays = np.bincount(observations.point[missing], minlength=len(points))
     rows = np.flatnonzero(missing & (rays[observations.point] >= 2))

@@ -17,7 +17,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Settings, Strip
-from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.points import ControlPoints, PhotoPoints, locate, located
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.triangulation.plausibility.control.straightening import Rays, StripPoints
 from photostrip.triangulation.plausibility.photos import mosaic
@@ -236,7 +236,7 @@ def mosaic_points(
     total = np.bincount(point, minlength=len(observations.point_ids))
     count = np.maximum(total, 1)
     x, y = (np.bincount(point, part, len(total)) / count for part in (z.real, z.imag))
-    numbers = locate(control.ids, observations.point_ids)
+    numbers = located(control.ids, observations.point_ids)
     given = np.flatnonzero((numbers >= 0) & (total[numbers] > 0))
     held = numbers[given]
     depth = strip.camera.principal_distance * median(np.abs(plane.factor))
@@ -276,7 +276,7 @@ def places_along_strip(
     size = len(observations.point_ids)
     count = np.bincount(observations.point[rows], minlength=size)
     total = np.bincount(observations.point[rows], along, size)
-    numbers = locate(control.ids, observations.point_ids)
+    numbers = located(control.ids, observations.point_ids)
     given = np.flatnonzero((numbers >= 0) & (count[numbers] >= LEAST_RAYS))
     chosen = numbers[given]
     return given, total[chosen] / count[chosen]

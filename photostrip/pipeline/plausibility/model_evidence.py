@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -43,7 +43,7 @@ def form_strips(models: MeasuredModels, settings: Settings) -> Iterator[tuple[Mo
 
 
 def model_strips(
-    strips: Iterable[tuple[ModelStrip, FormedModels]], point_ids: Sequence[str], control: ControlPoints
+    strips: Iterable[tuple[ModelStrip, FormedModels]], point_ids: tuple[str, ...], control: ControlPoints
 ) -> Iterator[ModelStripEvidence]:
     """Collect what the gate looks at in strips that have two perspective centres."""
     for strip, formed in strips:
@@ -52,7 +52,7 @@ def model_strips(
 
 
 def _evidence(
-    strip: ModelStrip, formed: FormedModels, control: ControlPoints, point_ids: Sequence[str]
+    strip: ModelStrip, formed: FormedModels, control: ControlPoints, point_ids: tuple[str, ...]
 ) -> ModelStripEvidence:
     known = np.flatnonzero(np.isfinite(formed.centers[:, 0]))
     centers, depth = formed.centers[known], _depths(formed)[known]

@@ -52,7 +52,7 @@ class StripStage(Protocol[Errors]):
         """Points and perspective centres, in the scale of the first model."""
 
     @property
-    def point_ids(self) -> Sequence[str]:
+    def point_ids(self) -> tuple[str, ...]:
         """Ids of the points as they are numbered."""
 
     def point_precision(self, scale: float) -> tuple[float, float]:
@@ -226,7 +226,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
 
 
 def control_of(
-    formed: FormedStrip | FormedModels, control: ControlPoints, point_ids: Sequence[str]
+    formed: FormedStrip | FormedModels, control: ControlPoints, point_ids: tuple[str, ...]
 ) -> tuple[ControlPoints, Numbers]:
     """Control points that have strip coordinates, and their rows there."""
     rows = rows_of_given(control.ids, formed.point, point_ids)

@@ -52,7 +52,7 @@ class LinkedModels:
     formed: FormedModels
 
     @property
-    def point_ids(self) -> Sequence[str]:
+    def point_ids(self) -> tuple[str, ...]:
         return self.measured.point_ids
 
     def point_precision(self, scale: float) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
 from photostrip.pipeline.given_points import rejected_control
 from photostrip.pipeline.results import Result
-from photostrip.points import locate
+from photostrip.points import locate, located
 from photostrip.result.numbers import natural_rank
 from photostrip.result.points.own_precision import chances, normalised
 from photostrip.result.points.standing_out import stand_out
@@ -141,7 +141,7 @@ def _turned(found: Floats, frame: GroundFrame, place: Floats, axes: Floats) -> F
 
 def _held(result: Result) -> Flags:
     """Return which strip holds which given point, shape (s, c)."""
-    numbers = locate(result.inputs.control.ids, result.refined.observations.point_ids)
+    numbers = located(result.inputs.control.ids, result.refined.observations.point_ids)
     held = [np.isin(numbers, strip.formed.point) for strip in result.strips]
     return np.array(held, bool).reshape(len(result.strips), len(numbers))
 

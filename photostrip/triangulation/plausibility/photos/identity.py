@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers, median
 from photostrip.notes import Finding
-from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.points import ControlPoints, PhotoPoints, located
 from photostrip.triangulation.plausibility.finding import found
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -185,7 +185,7 @@ def find_copied_points(control: ControlPoints, observations: PhotoPoints) -> Ite
     new[1:] = (key[order[1:]] != key[order[:-1]]).any(axis=1)
     one = np.empty_like(rows)
     one[order] = rows[order[new]][np.cumsum(new) - 1]
-    shown = locate(control.ids, observations.point_ids)
+    shown = located(control.ids, observations.point_ids)
     both = (one != rows) & (shown[one] >= 0) & (shown[rows] >= 0)
     for a, b in zip(one[both][:MOST_COPIED].tolist(), rows[both][:MOST_COPIED].tolist(), strict=True):
         at = [np.flatnonzero(observations.point == shown[row]) for row in (a, b)]

@@ -16,7 +16,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import dataclass
 from photostrip.notes import Finding, counted
-from photostrip.points import PhotoPoints, locate
+from photostrip.points import PhotoPoints
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def find_shifted_photo(
     tried: adjusts with the principal point of a photo, or of one near it; takes the place in the strip of the photo of
         every image point, and that of the photo.
     """
-    position = locate(observations.photo_ids, adjusted.photos)[observations.photo]
+    position = observations.places(adjusted.photos)
     misfit = _misfit(position, distinct(rows), adjusted)
     if not (adjusted.doubted or misfit.max() > POOR_SQUARES):
         return
