@@ -185,7 +185,7 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     return Accuracy(
         method=COVARIANCE,
         used=COVARIANCE,
-        covariance=prediction.covariances(solved, errors.points.whole()),
+        covariance=prediction.covariances(solved, errors.points),
         control=numbers,
         detectable=detectable,
     )

@@ -51,6 +51,8 @@ class CovarianceAdjustment:
     @cached_property
     def points(self) -> Floats:
         """Covariances (q, 3, 3) of the points, metres^2."""
+        if self.left_out is None:
+            return prediction.covariances(self.system, self.system.errors.points) * self.factor
         return self.of_points(np.arange(len(self.xyz)))
 
     def of_points(self, points: Numbers) -> Floats:
@@ -122,7 +124,7 @@ class CovarianceAdjustment:
         errors, change = self.system.errors, left_out.change
         images = relinearisation.image_errors(change)
         points, photos = (
-            prediction.errors(change, rows, images) for rows in (errors.points.whole(), prediction.photo_rows(errors))
+            prediction.errors(change, rows, images) for rows in (errors.points.whole(), prediction.photo_rows(change))
         )
         return replace(
             self,
@@ -173,7 +175,8 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
     errors, formed = one.strip.errors, one.strip.formed
     images = relinearisation.image_errors(one.system) - one.images
     points, photos = (
-        prediction.errors(one.system, rows, images) for rows in (errors.points.whole(), prediction.photo_rows(errors))
+        prediction.errors(one.system, rows, images)
+        for rows in (errors.points.whole(), prediction.photo_rows(one.system))
     )
     similarity = one.strip.absolute.similarity
     return CovarianceAdjustment(

@@ -39,11 +39,11 @@ class Factors:
     def solve(self, right: Floats) -> Floats:
         """Solve for right sides (n, b, k) by blocks."""
         reduced = right.copy()
-        for number in range(1, len(right)):
-            reduced[number] -= self.shares[number - 1].T @ reduced[number - 1]
+        for share, own, later in zip(self.shares[:-1], reduced[:-1], reduced[1:], strict=True):
+            np.subtract(later, share.T @ own, out=later)
         result: Floats = self.inverses @ reduced
-        for number in range(len(right) - 2, -1, -1):
-            result[number] -= self.shares[number] @ result[number + 1]
+        for share, own, later in zip(self.shares[-2::-1], result[-2::-1], result[:0:-1], strict=True):
+            np.subtract(own, share @ later, out=own)
         return result
 
     def near(self, number: int) -> range:
@@ -126,9 +126,9 @@ def eliminate(diagonal: Floats, beside: Floats, cuts: Sequence[Sequence[int]], h
     """
     beside[-1] = 0.0
     for number in range(len(diagonal)):
-        diagonal[number] = _inverse(diagonal[number], cuts[number])
+        diagonal[number] = inverse = _inverse(diagonal[number], cuts[number])
         if number + 1 < len(diagonal):
-            share = diagonal[number] @ beside[number]
+            share = inverse @ beside[number]
             diagonal[number + 1] -= _symmetric(beside[number], share)
             beside[number] = share
     return Factors(diagonal, beside, heights)

@@ -18,7 +18,8 @@ from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, SCALE, ErrorRows
+from photostrip.triangulation.error_propagation.pair_errors import PairErrors
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors, scale_shares
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -36,18 +37,21 @@ class LocalSimilarities:
     to_common: Floats  # (p, 7, 7): from the unknowns of each model to the similarity about the common origin
     from_common: Floats  # (p, 7, 7): the way back
     length: float  # mean base, by which rotations and logarithms of scales are multiplied, metres
+    centers: Floats  # (p + 1, 3): perspective centres of all photos from the common origin, metres
 
     @classmethod
-    def of(cls, errors: StripErrors) -> Self:
-        """Take them about the left centres C of the models: t_common = t - theta x C - lambda C."""
-        centers = centers_of(errors)[:-1]
-        length = float(np.linalg.norm(errors.pairs.base, axis=1).mean())
-        shift = np.tile(np.eye(SIMILARITY_PARAMETERS), (len(centers), 1, 1))
-        shift[:, :3, 3:6], shift[:, :3, 6] = cross_matrix(centers), -centers
-        back = np.tile(np.eye(SIMILARITY_PARAMETERS), (len(centers), 1, 1))
-        back[:, :3, 3:6], back[:, :3, 6] = -cross_matrix(centers), centers
+    def of(cls, errors: StripErrors, base: Floats) -> Self:
+        """Take them about the left centres C of the models, of bases (p, 3): t_common = t - theta x C - lambda C."""
+        # the step's scale column is minus the centre that joins its model to the next
+        following = -errors.steps[:, :3, SCALE]
+        centers = np.concatenate([following[:1] - base[:1], following])
+        left, length = centers[:-1], float(np.linalg.norm(base, axis=1).mean())
+        shift = np.tile(np.eye(SIMILARITY_PARAMETERS), (len(left), 1, 1))
+        shift[:, :3, 3:6], shift[:, :3, 6] = cross_matrix(left), -left
+        back = np.tile(np.eye(SIMILARITY_PARAMETERS), (len(left), 1, 1))
+        back[:, :3, 3:6], back[:, :3, 6] = -cross_matrix(left), left
         size = np.array([1.0] * 3 + [length] * 4)
-        return cls(shift / size, back * size[:, None], length)
+        return cls(to_common=shift / size, from_common=back * size[:, None], length=length, centers=centers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +95,11 @@ def conditions(
     distances: bool = True,
 ) -> Conditions:
     """Collect all conditions of a strip; `misclosures` (w,) is strip minus given of the control coordinates, metres."""
-    local = LocalSimilarities.of(errors)
+    pairs = errors.make_pairs()
+    local = LocalSimilarities.of(errors, pairs.base)
     parts = [_junctions(errors, local), _control(control, misclosures, local)]
     if distances:
-        parts.append(_distances(errors, orientation, formed, local))
+        parts.append(_distances(errors, pairs, orientation, formed, local))
     return Conditions.joined(parts)
 
 
@@ -152,7 +157,7 @@ def _control(control: Misclosures, misclosures: Floats, local: LocalSimilarities
 
 
 def _distances(
-    errors: StripErrors, orientation: Orientation, formed: FormedStrip, local: LocalSimilarities
+    errors: StripErrors, pairs: PairErrors, orientation: Orientation, formed: FormedStrip, local: LocalSimilarities
 ) -> Conditions:
     """Distances of pass points from the common centre, after minus before the junction: w = L v.
 
@@ -160,7 +165,7 @@ def _distances(
     count as information. One point of each junction is left out too, the scale transfer having used up one of them:
     the one with the largest share in the scale.
     """
-    joined, pairs, images = formed.junctions, errors.pairs, errors.images
+    joined, images = formed.junctions, errors.images
     chosen = np.flatnonzero(joined.used)
     share, _ = scale_shares(joined, pairs)
     order = np.lexsort(((share[chosen] ** 2).sum(axis=1), joined.junction[chosen]))
@@ -178,7 +183,7 @@ def _distances(
     along = (ray / np.linalg.norm(ray, axis=1)[:, None])[:, None]
     count = len(chosen)
     by_component = np.zeros((count, 2, 1, COMPONENTS))
-    moved = similarity_derivatives(centers_of(errors)[junction + 1] + ray_before, np.zeros(3))
+    moved = similarity_derivatives(local.centers[junction + 1] + ray_before, np.zeros(3))
     by_component[:, 0] = along @ moved @ errors.steps[junction]
     by_component[:, 0, :, ELEMENTS] -= along @ pairs.point_by_elements[before]
     by_component[:, 1, :, ELEMENTS] += along @ pairs.point_by_elements[after]
@@ -212,10 +217,3 @@ def _spread(junction: Numbers, across: Floats, most: int) -> Numbers:
     rank = np.arange(len(order)) - np.repeat(begin, count)
     step = np.maximum(np.repeat(count, count) / most, 1.0)
     return np.asarray(order[np.floor(rank / step) != np.floor((rank - 1) / step)], np.intp)
-
-
-def centers_of(errors: StripErrors) -> Floats:
-    """Perspective centres of all photos, from the common origin, shape (p + 1, 3), metres."""
-    # the step's scale column is minus the centre that joins its model to the next
-    following = -errors.steps[:, :3, 5]
-    return np.concatenate([following[:1] - errors.pairs.base[:1], following])

@@ -13,11 +13,10 @@ from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_der
 from photostrip.statistics import gamma_cdf, normal_quantile
 from photostrip.triangulation.covariance_adjustment import dense_models, relinearisation, system
 from photostrip.triangulation.covariance_adjustment.columns import AT_A_TIME, Columns
-from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of
+from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE
 from photostrip.triangulation.error_propagation import joint_covariances
 from photostrip.triangulation.error_propagation.covariances import along_strip, local_covariances
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
-from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, PointRows
 
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
 
@@ -64,7 +63,7 @@ def errors(found: system.System, rows: ErrorRows, images: Floats) -> Floats:
     return np.asarray(by_images + (by_unknowns @ found.unknowns[rows.first, :, None])[:, :, 0], float)
 
 
-def covariances(found: system.System, rows: ErrorRows) -> Floats:
+def covariances(found: system.System, rows: ErrorRows | PointRows) -> Floats:
     """Covariances (n, d, d) of what is left of the errors of points and photos, for a variance factor of 1.
 
     With b the column of a row: its covariances with the conditions and its coefficients of the unknowns,
@@ -74,7 +73,7 @@ def covariances(found: system.System, rows: ErrorRows) -> Floats:
     """
     order = np.argsort(rows.first, kind="stable")
     section = rows.first[order] // (found.layout.width * AT_A_TIME)
-    size = rows.by_similarity.shape[1]
+    size = rows.by_component.shape[2]
     result = np.empty((len(order), size, size))
     for some in np.split(order, np.flatnonzero(np.diff(section)) + 1):
         columns = Columns.of(found, rows.take(some))
@@ -88,7 +87,7 @@ def photo_covariances(found: system.System) -> Floats:
 
     Their columns lie in their own block: the block of the inverse on the diagonal says all.
     """
-    rows, layout, models = photo_rows(found.errors), found.layout, np.arange(found.errors.models)
+    rows, layout, models = photo_rows(found), found.layout, np.arange(found.errors.models)
     by_unknowns = rows.by_similarity[:-1] @ found.conditions.local.to_common
     inverse, count = found.factors.diagonal_of_inverse, SIMILARITY_PARAMETERS
     places = zip((models // layout.width).tolist(), layout.unknown.tolist(), strict=True)
@@ -113,18 +112,17 @@ def _explained(of_rows: Columns) -> Floats:
     return known
 
 
-def photo_rows(errors: StripErrors) -> ErrorRows:
+def photo_rows(found: system.System) -> ErrorRows:
     """Rows of the photos of a strip: centre and small rotation, d = 6.
 
-    Each photo moves with the model on its right, the last with its own.
+    Each photo moves with the model on its right, the last with its own and the step behind it.
     """
-    models = errors.models
+    models = found.errors.models
     by_similarity = np.zeros((models + 1, 6, SIMILARITY_PARAMETERS))
-    by_similarity[:, :3] = similarity_derivatives(centers_of(errors), np.zeros(3))
+    by_similarity[:, :3] = similarity_derivatives(found.conditions.local.centers, np.zeros(3))
     by_similarity[:, 3:, 3:6] = np.eye(3)
     by_component = np.zeros((models + 1, 1, 6, COMPONENTS))
-    by_component[-1, 0, :3, ELEMENTS] = errors.pairs.base_by_elements[-1]
-    by_component[-1, 0, 3:, ELEMENTS] = errors.pairs.rotation_by_elements[-1]
+    by_component[-1, 0] = by_similarity[-1] @ found.errors.steps[-1]
     return ErrorRows.without_images(np.append(np.arange(models), models - 1), by_similarity, by_component)
 
 
@@ -170,8 +168,9 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     blocks = list(columns.blocks(range(layout.blocks)))
     reduced = np.zeros((0, 0))
     for number, height in enumerate(factors.heights):
-        near = [blocks[each] for each in factors.near(number)]
-        right = np.zeros((height, near[-1].rows.stop))  # later columns begin in later blocks
+        around = [blocks[each] for each in factors.near(number)]
+        near = [each for each in around if each.rows.start < each.rows.stop]
+        right = np.zeros((height, around[-1].rows.stop))  # later columns begin in later blocks
         for block, at, values in near:
             right[:, at] = values[1 + number - block, :height]
         if number:

@@ -265,7 +265,7 @@ def _add_design(layout: SystemLayout, wanted: Conditions, diagonal: Floats, besi
     """Add A: the unknowns of each condition's own model, and of the next one."""
     rows = wanted.rows
     for model, values in ((rows.first, rows.by_similarity[:, 0]), (rows.first + 1, wanted.following)):
-        known = model < len(layout.unknown)  # none follows the last
+        known = np.flatnonzero(values.any(axis=1) & (model < len(layout.unknown)))  # none follows the last
         columns = layout.unknown[model[known]][:, None] + np.arange(SIMILARITY_PARAMETERS)
         apart = model[known] // layout.width > layout.block[known]
         block, position = layout.block[known, None], layout.position[known, None]

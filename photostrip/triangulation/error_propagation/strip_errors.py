@@ -16,7 +16,7 @@ Source: derived; see docs/precision.md, eq. 2 and 3.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cached_property, partial
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -62,13 +62,9 @@ class StripErrors:
     steps: Floats
     component_covariances: Floats  # (p, 3, 6, 6): Q, of each model with itself, the next and the one after
     points: PointRows
+    # finds errors inside the pairs again: as much memory as a quarter of all else, and not always asked for
     make_pairs: Callable[[], PairErrors]
     origin: Floats  # (3,): common origin of all similarities
-
-    @cached_property
-    def pairs(self) -> PairErrors:
-        """Errors inside the pairs, found again: as much memory as a quarter of all else, and not always asked for."""
-        return self.make_pairs()
 
     @property
     def models(self) -> int:

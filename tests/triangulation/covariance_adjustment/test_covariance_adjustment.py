@@ -78,7 +78,7 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     again = conditions.misclosures_at(wanted, strip.of_photos.formed, strip.absolute.similarity, control)
     assert again == pytest.approx(wanted.value, abs=1e-9)
     solved = system.system(errors, wanted, factor)
-    tables = [errors.points.whole(), prediction.photo_rows(errors)]
+    tables = [errors.points.whole(), prediction.photo_rows(solved)]
 
     by_images = written_out(wanted.rows.without_similarity(), errors)[:, 0]
     design = np.zeros((len(wanted.value), 7 * (n + 1)))
@@ -355,7 +355,7 @@ def test_points_on_many_photos_leave_so_many_distances_to_each_junction(monkeypa
     assert set(left.tolist()) < every
     for junction in nonempty(np.unique(joined.junction[sorted(every)]).tolist()):
         of_junction = np.array([each for each in sorted(every) if joined.junction[each] == junction])
-        across = errors.pairs.point[joined.after[of_junction], 1]
+        across = errors.make_pairs().point[joined.after[of_junction], 1]
         chosen = np.isin(of_junction, left)
         assert chosen.sum() == min(most, len(of_junction))
         assert across[chosen].min() == across.min()
