@@ -93,8 +93,7 @@ def joined(columns: Sequence[Column], between: str) -> str:
 
 
 def _joined(columns: Sequence[Cells], end: str) -> bytes:
-    lines = np.concatenate([*columns, repeated(end, columns[0].shape[1])])
-    return lines.T.tobytes().translate(None, b"\0")
+    return np.concatenate([*columns, repeated(end, columns[0].shape[1])]).T.tobytes().translate(None, b"\0")
 
 
 def listed(cells: Cells, ends: Sequence[int]) -> Lists:

@@ -25,7 +25,7 @@ from photostrip.result.records import Grouped, Named, Records
 ODD = re.compile(r'[",\s]')  # without these no id needs quotes
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
 BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column
-LINES = 2000  # that are written at a time
+LINES = 8000  # that are written at a time
 
 
 def beside_json(document: Document, resolved: str, result: Result | None) -> dict[str, Iterable[str]]:
