@@ -10,7 +10,7 @@ from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
 from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
 from photostrip.report.sections.points import AXES, DIFFERENCES, IDS_NAMED, given_table, largest
-from photostrip.report.sections.strip import ALL_SHOWN, column_of, rows_of, worst_first
+from photostrip.report.sections.strip import ALL_SHOWN, column_of, worst_first
 
 PARTS = "plan", "height"
 UNKNOWN = dict.fromkeys(("plan", "height", "p_plan", "p_height", "sigma_x", "sigma_y", "sigma_z"))
@@ -42,17 +42,17 @@ def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
 
 def _tested(document: Document, given: Sequence[Document], *, everything: bool, most: int) -> Table:
     check = document["precision"]["check"]
-    tested = {row["id"]: row for row in rows_of(check["points"])}
+    unlikely = {row["id"]: _unlikely(row) for row in check["points"]}
     where = ("points", "check", "control")
-    worst, note = worst_first(
-        given, lambda row: _unlikely(tested.get(row["id"], UNKNOWN)), where, everything=everything, most=most
-    )
+    worst, note = worst_first(given, lambda row: unlikely.get(row["id"], -1.0), where, everything=everything, most=most)
     names = {row["id"] for row in worst}
-    points = document["points"]
-    places = {point: place for place, point in enumerate(column_of(points, "id")) if point in names}
+    points, tested = (
+        {name: rows[place] for place, name in enumerate(column_of(rows, "id")) if name in names}
+        for rows in (document["points"], check["points"])
+    )
     shown = []
     for row in worst:
-        point, z = points[places[row["id"]]] if row["id"] in places else UNKNOWN, tested.get(row["id"], UNKNOWN)
+        point, z = (found.get(row["id"], UNKNOWN) for found in (points, tested))
         sigma = {key: point[key] for key in ("sigma_x", "sigma_y", "sigma_z")}
         likely = {"z_plan": z["plan"], "z_height": z["height"], "p_plan": z["p_plan"], "p_height": z["p_height"]}
         shown.append({**row, **sigma, **likely})
@@ -123,13 +123,13 @@ def _table(
         ),
         *more,
     )
-    found = [[value for row in rows if (value := row[key]) is not None] for key in DIFFERENCES]
+    sums = [_rms_and_mean([value for row in rows if (value := row[key]) is not None]) for key in DIFFERENCES]
     blank, nothing = ("",) * 3, ("",) * len(more)
     z = [cell for part in seen.over for cell in (ratio(part), "")]
     inside = [cell for part in seen.inside for cell in (part, "")]
     foot = (
-        ("rms", *(metres(_rms(values)) for values in found), *blank, *z, *nothing),
-        ("mean", *(signed(_mean(values)) for values in found), *blank, *("",) * 4, *nothing),
+        ("rms", *(metres(rms) for rms, _ in sums), *blank, *z, *nothing),
+        ("mean", *(signed(mean) for _, mean in sums), *blank, *("",) * 4, *nothing),
         (
             "largest",
             *(largest(rows, *each) for each in zip(DIFFERENCES, axes, strict=True)),
@@ -142,12 +142,9 @@ def _table(
     return tabulated(shown, columns, foot, note)
 
 
-def _rms(values: Sequence[float]) -> float | None:
-    return (sum(value**2 for value in values) / len(values)) ** 0.5 if values else None
-
-
-def _mean(values: Sequence[float]) -> float | None:
-    return sum(values) / len(values) if values else None
+def _rms_and_mean(values: Sequence[float]) -> tuple[float | None, float | None]:
+    count = len(values)
+    return ((sum(value**2 for value in values) / count) ** 0.5, sum(values) / count) if values else (None, None)
 
 
 def _unlikely(row: Document) -> float:

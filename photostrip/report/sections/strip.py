@@ -15,6 +15,7 @@ from photostrip.report.page.tables import Shown, angle, number, tabulated, words
 
 ALL_SHOWN = 24  # rows up to which a table is printed whole
 HIGH_LEVERAGE = 0.7  # share of a control point in the polynomial at its own place
+MOST_MADE = 5000  # rows; one takes 1400 bytes, and not made is read in ten times the time
 STRIPS_SHOWN = 3  # strips up to which every polynomial is shown with its evidence
 WORST_SHOWN = 12  # rows shown of a longer one
 ELEMENTS = (("alpha1", "α1"), ("kappa1", "κ1"), ("alpha2", "α2"), ("omega2", "ω2"), ("kappa2", "κ2"))
@@ -49,8 +50,8 @@ def column_of(rows: Sequence[Document], key: str) -> list[Any]:
 
 
 def rows_of(rows: Sequence[Document]) -> Sequence[Document]:
-    """Return rows that can be gone through many times; those that are kept as columns without making them."""
-    return rows.rows() if hasattr(rows, "rows") else rows
+    """Return rows that can be gone through many times; many that are kept as columns without making them."""
+    return rows.rows() if hasattr(rows, "rows") and len(rows) > MOST_MADE else list(rows)
 
 
 def elsewhere(rest: int, what: str, section: str, block: str) -> str:
