@@ -15,7 +15,7 @@ from photostrip.triangulation.resection.collinearity import KnownPhotos, distanc
 ITERATIONS = 20
 CONVERGED = 1e-10  # rad, and of the distance to the points; the next step would be its square
 UNKNOWNS = 6
-AT_A_TIME = 4096  # image points worked on together: what fits into the processor's cache
+AT_A_TIME = 8192  # image points worked on together: what fits into the processor's cache
 SINGULAR = 1e-12  # reciprocal condition of a scaled normal matrix
 
 
@@ -114,7 +114,9 @@ def _steps(
         )
         misfit_x, misfit_y = xy[rows].T - computed
         right[some, :, 0] = np.add.reduceat(by_x * misfit_x + by_y * misfit_y, first, axis=1).T
-        for row in range(UNKNOWNS):
+        normal[some, 0] = np.add.reduceat(by_x[0] * by_x, first, axis=1).T  # a shift along x moves x alone
+        normal[some, 1, 1:] = np.add.reduceat(by_y[1] * by_y[1:], first, axis=1).T
+        for row in range(2, UNKNOWNS):
             products = by_x[row] * by_x[row:]
             products += by_y[row] * by_y[row:]
             normal[some, row, row:] = np.add.reduceat(products, first, axis=1).T
