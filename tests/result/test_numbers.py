@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from photostrip.result.numbers import natural, natural_rank, rounded, significant
+from photostrip.result.numbers import natural, natural_rank, order_of, rounded, significant
 
 
 @given(st.lists(st.text("ab-_. 0019\n\0é", max_size=6)))
@@ -15,6 +15,12 @@ from photostrip.result.numbers import natural, natural_rank, rounded, significan
 def test_the_rank_of_many_ids_is_the_order_of_the_keys_of_single_ones(names: list[str]) -> None:
     rank = natural_rank(tuple(names))
     assert sorted(names, key=natural) == [names[row] for row in rank.argsort()]
+
+
+def test_rows_stand_by_number_then_by_rank() -> None:
+    number, rank = np.random.default_rng(3).integers(0, 7, (2, 90))
+    assert order_of(number, rank).tolist() == np.lexsort((rank, number)).tolist()
+    assert order_of(number[:0], rank[:0]).tolist() == []
 
 
 def test_numbers_count_as_numbers() -> None:

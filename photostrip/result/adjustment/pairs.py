@@ -10,6 +10,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.pipeline.results import PhotoStages, Result, StripResult
+from photostrip.result.numbers import order_of
 from photostrip.result.quantities import grouped, records
 from photostrip.result.records import Named, Records
 from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest, residual_sigma
@@ -122,7 +123,7 @@ def parallaxes_of(result: Result, rank: Numbers) -> Records:
     found = []
     for strip in result.photo_strips:
         oriented, screened, photos = strip.of_photos.orientation, strip.of_photos.screened, strip.strip.photos
-        order = np.lexsort((rank[oriented.point], oriented.pairs.pair))
+        order = order_of(oriented.pairs.pair, rank[oriented.point])
         columns = {
             "points": Named(ids, oriented.point[order]),
             "q_um": 1000.0 * oriented.parallax[order],

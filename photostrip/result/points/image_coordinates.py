@@ -7,7 +7,7 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result
-from photostrip.result.numbers import EXACT, RoundedColumn, natural_rank, significant
+from photostrip.result.numbers import EXACT, RoundedColumn, natural_rank, order_of, significant
 from photostrip.result.quantities import grouped
 from photostrip.result.records import Named, Records
 from photostrip.units import MICROMETRES
@@ -49,7 +49,7 @@ def refined_rows(result: Result) -> Records:
     found = result.refined.observations
     place = {photo: number for number, photo in enumerate(p for strip in result.inputs.strips for p in strip.photos)}
     order = np.array([place.get(photo, len(place)) for photo in found.photo_ids], np.intp)
-    rows = np.lexsort((natural_rank(found.point_ids)[found.point], order[found.photo]))
+    rows = order_of(order[found.photo], natural_rank(found.point_ids)[found.point])
     sigma: Floats = found.sigma[rows] * MICROMETRES
     columns = {
         "photo": Named(found.photo_ids, found.photo[rows]),

@@ -13,7 +13,7 @@ from photostrip.geometry.rotation import angles
 from photostrip.notes import Document
 from photostrip.pipeline.inputs import Strip
 from photostrip.pipeline.results import Result, StripResult
-from photostrip.result.numbers import PER_RADIAN, Plain, RoundedColumn, to_decimals
+from photostrip.result.numbers import PER_RADIAN, Plain, RoundedColumn, order_of, to_decimals
 from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns
 from photostrip.result.quantities import angle_decimals, grouped, records
@@ -45,7 +45,7 @@ def _of_strip(result: Result, strip: StripResult, rank: Numbers) -> ImageResidua
     observations, stages = result.refined.observations, strip.of_photos
     position = stages.strip.positions(observations)
     rows = np.flatnonzero(position >= 0)
-    rows = rows[np.lexsort((rank[observations.point[rows]], position[rows]))]
+    rows = rows[order_of(position[rows], rank[observations.point[rows]])]
     known = np.full((len(observations.point_ids), 3), np.nan)
     known[strip.formed.point] = strip.xyz
     used = np.zeros(len(observations), bool)
@@ -105,9 +105,9 @@ def point_rms(result: Result, images: Sequence[ImageResiduals]) -> Floats:
     observations = result.refined.observations
     squares, count = np.zeros(len(observations.point_ids)), np.zeros(len(observations.point_ids))
     for image in images:
-        point = observations.point[image.rows[image.used]]
-        np.add.at(squares, point, (image.residuals[image.used] ** 2).sum(axis=1))
-        np.add.at(count, point, 2)
+        point, (x, y) = observations.point[image.rows[image.used]], image.residuals[image.used].T
+        np.add.at(squares, point, x**2 + y**2)
+        np.add.at(count, point, 2.0)
     with np.errstate(invalid="ignore"):
         return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))
 
