@@ -23,7 +23,7 @@ from photostrip.triangulation.error_propagation.covariances import by_images
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, MOVED, SHARING, SPAN, ErrorRows, add_rows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
-from photostrip.triangulation.relative_orientation.solution import iterate_elements, y_parallaxes
+from photostrip.triangulation.relative_orientation.solution import iterate_elements
 from photostrip.triangulation.strip_formation import non_neighbours
 from photostrip.triangulation.strip_formation.scale_transfer import Junctions
 from photostrip.triangulation.strip_formation.strip import FormedStrip, model_points, place_models
@@ -66,12 +66,11 @@ def largest_turn(found: System) -> float:
 def oriented_again(orientation: Orientation, xy: Floats) -> Orientation:
     """Orient the pairs of a strip on other image coordinates (k, 2), starting at the elements they have.
 
-    What is said of their precision stays.
+    Their parallaxes and what is said of their precision stay.
     """
     left, right = (xy[orientation.rows[:, side]] for side in (0, 1))
     pairs = replace(orientation.pairs, left=left, right=right)
-    elements = iterate_elements(orientation.elements, pairs).elements
-    return replace(orientation, pairs=pairs, elements=elements, parallax=y_parallaxes(elements, pairs))
+    return replace(orientation, pairs=pairs, elements=iterate_elements(orientation.elements, pairs).elements)
 
 
 def formed_again(
