@@ -5,9 +5,10 @@ overlap, control (corners, or bands of two or three points) and in what no stand
 error of 5 µm that all photos share, or a film error of 5 µm of each photo by itself, both smooth over the photo. Errors
 are those of all points that are not control, the geometric mean of plan and height. Printed are the best of similarity,
 polynomial and covariance in the cell, auto divided by it, the same in the worst single strip, and how often auto took
-the polynomial.
+the polynomial; at the end the same with other limits of what left-out errors may exceed.
 
 Usage: python benchmarks/auto.py [--seeds N] [--photos N ...] [--overlap PERCENT ...] [--errors none lens film]
+       [--undescribed MICROMETRES]
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from photostrip.pipeline.given_points import measured_control  # noqa: E402
 from photostrip.pipeline.image_coordinates import correct, orient_interior  # noqa: E402
 from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust  # noqa: E402
+from photostrip.pipeline.strips.choosing import MOST_EXCESS, decide  # noqa: E402
 from photostrip.pipeline.strips.forming import form_strips  # noqa: E402
 from photostrip.pipeline.strips.stages import Stages  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.pipeline.choice import Choice
     from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.results import StripResult
     from photostrip.simulation.simulation import Simulation
@@ -53,10 +56,11 @@ METHODS = ("similarity", "polynomial", "covariance")
 PHOTOS, OVERLAPS, ERRORS = (6, 10), (60.0, 80.0), ("none", "lens", "film")
 BANDS, PER_BAND = (2, 3, 4, 6, 12), (3, 2)
 LONG = 50  # photos from which on one overlap and fewer strips do
-UNDESCRIBED = 0.005  # mm, rms over a photo
+UNDESCRIBED = 5.0  # micrometres, rms over a photo
 HALF = 115.0  # mm, half a photo
 IN_MEAN, IN_ONE = 1.05, 1.2  # times the errors of the best method that auto may have, in a cell and in a strip
 CENTIMETRES = 100.0
+LIMITS = (MOST_EXCESS / 2, MOST_EXCESS, 2 * MOST_EXCESS, np.inf)  # of the excess of left-out errors
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,7 @@ class Cell:
     bands: int
     per_band: int
     error: str
+    undescribed: float = UNDESCRIBED  # micrometres
 
     @property
     def control(self) -> str:
@@ -92,16 +97,31 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """Errors of a cell: by method and strip, plan and height, metres; and what auto took in each strip."""
+    """Errors of a cell: by method and strip, plan and height, metres; and what auto chose by in each strip."""
 
     cell: Cell
     errors: dict[str, Floats]
-    taken: tuple[str, ...]
+    choices: tuple[Choice | None, ...]
 
     def of(self, method: str) -> float:
         """Errors of a method over all strips, plan and height as one."""
-        mean = np.sqrt((self.errors[method] ** 2).mean(axis=0))
-        return float(np.sqrt(mean.prod()))
+        return size_of(self.errors[method])
+
+    @property
+    def taken(self) -> tuple[str, ...]:
+        """What auto took in each strip."""
+        return tuple("polynomial" if choice is None else choice.taken for choice in self.choices)
+
+    def at(self, most: float) -> Row:
+        """Give the cell as it were with another limit of what left-out errors may exceed."""
+
+        def decided(choice: Choice) -> Choice:
+            taken = decide(choice.predicted, choice.left_out, choice.excess, self.cell.bands, most)
+            return replace(choice, taken=taken)
+
+        row = replace(self, choices=tuple(choice and decided(choice) for choice in self.choices))
+        chosen = np.array([self.errors[method][number] for number, method in enumerate(row.taken)])
+        return replace(row, errors=self.errors | {AUTO: chosen})
 
     @property
     def best(self) -> str:
@@ -119,21 +139,28 @@ class Row:
         return float(np.sqrt((self.errors[AUTO] / self.errors[self.best]).prod(axis=1)).max())
 
 
-def cells(photos: Sequence[int], overlaps: Sequence[float], errors: Sequence[str]) -> Iterator[Cell]:
+def size_of(errors: Floats) -> float:
+    """Errors of strips, (n, 2) in plan and in height, as one."""
+    return float(np.sqrt(np.sqrt((errors**2).mean(axis=0)).prod()))
+
+
+def cells(
+    photos: Sequence[int], overlaps: Sequence[float], errors: Sequence[str], undescribed: float = UNDESCRIBED
+) -> Iterator[Cell]:
     """Give all cells of the grid."""
     layouts = [(bands, per_band) for per_band in PER_BAND for bands in BANDS]
     for count in photos:
         for overlap in overlaps[:1] if count > LONG else overlaps:
             for bands, per_band in layouts:
                 if bands <= count:
-                    yield from (Cell(count, overlap, bands, per_band, error) for error in errors)
+                    yield from (Cell(count, overlap, bands, per_band, error, undescribed) for error in errors)
 
 
-def smooth_error(xy: Floats, rng: np.random.Generator) -> Floats:
-    """Return image errors (n, 2) of second and third powers of the coordinates, drawn anew at every call."""
+def smooth_error(xy: Floats, rng: np.random.Generator, size: float) -> Floats:
+    """Return image errors (n, 2), mm, of powers of the coordinates, drawn anew at every call; `size` in micrometres."""
     weights = rng.normal(size=(7, 2))
-    size = np.sqrt(np.square(_powers(_raster()) @ weights).mean())
-    found: Floats = _powers(xy / HALF) @ weights * (UNDESCRIBED / size)
+    drawn = np.sqrt(np.square(_powers(_raster()) @ weights).mean())
+    found: Floats = _powers(xy / HALF) @ weights * (size / 1000 / drawn)
     return found
 
 
@@ -147,24 +174,24 @@ def _raster() -> Floats:
     return np.column_stack([x.ravel(), y.ravel()])
 
 
-def spoiled(inputs: Inputs, error: str, seed: int) -> Inputs:
+def spoiled(inputs: Inputs, cell: Cell, seed: int) -> Inputs:
     """Add what no standard deviation knows."""
-    if error == "none":
+    if cell.error == "none":
         return inputs
     rng, measured = np.random.default_rng([seed, 99]), inputs.observations
     xy = measured.xy.copy()
     groups = [np.arange(len(xy))]
-    if error == "film":
+    if cell.error == "film":
         groups = [np.flatnonzero(measured.photo == photo) for photo in range(len(measured.photo_ids))]
     for rows in groups:
-        xy[rows] += smooth_error(xy[rows], rng)
+        xy[rows] += smooth_error(xy[rows], rng, cell.undescribed)
     return replace(inputs, observations=replace(measured, xy=xy))
 
 
-def errors_of(cell: Cell, seed: int) -> tuple[dict[str, Floats], str]:
-    """Adjust one strip in every way; rms errors in plan (of one coordinate) and in height, and what auto took."""
+def errors_of(cell: Cell, seed: int) -> tuple[dict[str, Floats], Choice | None]:
+    """Adjust one strip in every way; rms errors in plan (of one coordinate) and in height, and what auto chose by."""
     simulation = simulate(cell.spec(seed))
-    inputs, settings = spoiled(inputs_of(simulation), cell.error, seed), settings_of(simulation)
+    inputs, settings = spoiled(inputs_of(simulation), cell, seed), settings_of(simulation)
     ground, photo = tie_ground_frames(inputs, settings, None, None), orient_interior(inputs, settings)
     observations = correct(photo, inputs, settings, ground, Stages()).observations
     (formed,) = form_strips(inputs, observations, settings, Stages())
@@ -173,9 +200,8 @@ def errors_of(cell: Cell, seed: int) -> tuple[dict[str, Floats], str]:
     )
     screened = reject_wrong_control(oriented, settings)
     adjusted = {each: adjust(screened, replace(settings, adjustment=each)) for each in (*METHODS, AUTO)}
-    choice = adjusted[AUTO].choice
-    taken = "polynomial" if choice is None else choice.taken
-    return {name: _rms(simulation, each, observations.point_ids) for name, each in adjusted.items()}, taken
+    errors = {name: _rms(simulation, each, observations.point_ids) for name, each in adjusted.items()}
+    return errors, adjusted[AUTO].choice
 
 
 def _rms(simulation: Simulation, strip: StripResult, point_ids: Sequence[str]) -> Floats:
@@ -192,7 +218,7 @@ def row_of(cell: Cell, seeds: int) -> Row:
     """Adjust the strips of a cell."""
     found = [errors_of(cell, seed) for seed in range(1, 1 + seeds)]
     errors = {name: np.array([errors[name] for errors, _ in found]) for name in (*METHODS, AUTO)}
-    return Row(cell, errors, tuple(taken for _, taken in found))
+    return Row(cell, errors, tuple(choice for _, choice in found))
 
 
 def line_of(row: Row) -> str:
@@ -222,6 +248,21 @@ def summary_of(rows: Sequence[Row]) -> str:
     )
 
 
+def limits_of(rows: Sequence[Row]) -> str:
+    """Say what other limits of the excess of left-out errors would have brought."""
+    lines = [
+        "| most excess | auto / best, mean | worst cell | worst strip | polynomial taken |",
+        "|---|---|---|---|---|",
+    ]
+    for most in LIMITS:
+        found = [row.at(most) for row in rows]
+        ratios = [row.ratio for row in found]
+        mean, taken = np.exp(np.log(ratios).mean()), sum(row.taken.count("polynomial") for row in found)
+        worst = max(row.worst for row in found)
+        lines.append(f"| {most:g} | {mean:.3f} | {max(ratios):.2f} | {worst:.2f} | {taken} |")
+    return "\n".join(lines)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -229,14 +270,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--photos", type=int, nargs="+", default=PHOTOS)
     parser.add_argument("--overlap", type=float, nargs="+", default=OVERLAPS)
     parser.add_argument("--errors", nargs="+", choices=ERRORS, default=ERRORS)
+    parser.add_argument("--undescribed", type=float, default=UNDESCRIBED, help="rms over a photo, micrometres")
     asked = parser.parse_args(arguments)
     sys.stdout.write(f"| {' | '.join(HEADS)} |\n|{'---|' * len(HEADS)}\n")
     rows = []
-    for cell in cells(asked.photos, asked.overlap, asked.errors):
+    for cell in cells(asked.photos, asked.overlap, asked.errors, asked.undescribed):
         rows.append(row_of(cell, max(1, asked.seeds // 5) if cell.photos > LONG else asked.seeds))
         sys.stdout.write(line_of(rows[-1]) + "\n")
         sys.stdout.flush()
-    sys.stdout.write(f"\n{summary_of(rows)}\n")
+    sys.stdout.write(f"\n{summary_of(rows)}\n\n{limits_of(rows)}\n")
     return 0
 
 

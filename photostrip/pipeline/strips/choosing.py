@@ -39,18 +39,24 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
     predicted = _predicted(oriented, polynomial, covariance)
     groups, by = _groups(oriented, polynomial)
     left_out, excess = _left_out(oriented, polynomial, covariance, groups)
-    taken = method_of(predicted.ratio)
-    believed = excess <= MOST_EXCESS or len(distinct(_bands(oriented))) < TELLING
-    if left_out is not None and not believed and left_out.ratio > 1 / BETTER:
-        taken = POLYNOMIAL
     return Choice(
-        taken=taken,
+        taken=decide(predicted, left_out, excess, len(distinct(_bands(oriented)))),
         predicted=predicted,
         left_out=left_out,
         left_out_by=by,
         excess=excess,
         distances=covariance.tested.distances,
     )
+
+
+def decide(
+    predicted: Witness, left_out: Witness | None, excess: float, bands: int, most_excess: float = MOST_EXCESS
+) -> str:
+    """Name the method that both witnesses speak for, with so many bands of control."""
+    believed = excess <= most_excess or bands < TELLING
+    if left_out is not None and not believed and left_out.ratio > 1 / BETTER:
+        return POLYNOMIAL
+    return method_of(predicted.ratio)
 
 
 def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Witness:
