@@ -142,13 +142,13 @@ def test_mutations_prints_changes_and_who_notices_them(monkeypatch: pytest.Monke
     place = r"^\| `geometry/\w+\.py:\d+` \| `.+` to `.+` in `.+` \|"
     listed = printed("mutations.py", "--count", "5", "--room", "geometry", "--list", python=PYTHON)
     assert len(re.findall(rf"{place} \|$", listed, re.MULTILINE)) == 5
-    out = printed("mutations.py", "--count", "2", "--seed", "1", "--room", "geometry", "--near", python=PYTHON)
+    out = printed("mutations.py", "--count", "4", "--seed", "1", "--room", "geometry", "--near", python=PYTHON)
     tests = re.findall(rf"{place} (.+) \|$", out, re.MULTILINE)
-    assert len(tests) == 2
+    assert len(tests) == 4
     noticed = [test for test in tests if test.startswith("`geometry/test_")]  # which are drawn changes with the code
     assert noticed
-    assert tests.count("NOT noticed") == 2 - len(noticed)
-    counts = f"2 | {len(noticed)} |"
+    assert tests.count("NOT noticed") == 4 - len(noticed)
+    counts = f"{len(tests)} | {len(noticed)} |"
     assert f"\n| geometry | {counts}\n| all | {counts}\n" in out
 
 
