@@ -193,9 +193,8 @@ def _control(document: Document) -> Iterator[str]:
 
 def _odd(document: Document, role: str, named: set[str]) -> Iterator[str]:
     """Name the points that do not go with the others, in plan and in height, and that nothing else has `named`."""
-    points = _given(document, role, "id", "stands_out", *PARTS)
-    known = ((name, parts, dict(zip(PARTS, sizes, strict=True))) for name, parts, *sizes in points)
-    odd = [each for each in known if each[1] and each[0] not in named]
+    points = [each for each in _given(document, role, "id", "stands_out", *PARTS) if each[1] and each[0] not in named]
+    odd = [(name, parts, dict(zip(PARTS, sizes, strict=True))) for name, parts, *sizes in points]
     if not odd:
         return
     sizes = [
