@@ -124,9 +124,7 @@ class GroundFrame:
         geodetic = self.geodetic(points)
         if self.kind == "geocentric":
             return geocentric_from_geodetic(geodetic, self._datum_ellipsoid) / self.plan_factor
-        plan = geodetic[:, :2] / self._angle
-        if self._plane is not None:
-            plan = self._plane.apply(plan, inverse=True)
+        plan = self._plan(geodetic)
         require_reached(finite_rows(plan), f"outside the domain of {self.spec.name}", ids)
         return np.column_stack([plan, self._from_ellipsoidal(plan, geodetic[:, 2], ids)])
 
@@ -152,7 +150,7 @@ class GroundFrame:
             require_reached(finite_rows(geodetic), f"no datum shift is known there to {self.spec.name}", None)
         return geodetic
 
-    def axes_at(self, xyz: ArrayLike) -> Floats:
+    def axes_at(self, xyz: ArrayLike, ground: Floats | None = None) -> Floats:
         """Directions (n, 3, 3) of the ground axes at Cartesian points; rows are unit vectors in the Cartesian frame.
 
         They are orthogonal and right-handed: grid east, grid north and the ellipsoid's normal of a projected frame;
@@ -160,19 +158,22 @@ class GroundFrame:
         lines of a grid do not cross at right angles (a projection that is not conformal), the right angle lies evenly
         between them.
 
+        ground: (n, 3), optional, coordinates of the same points in this frame.
         Raises GeometryError for a geographic frame at a pole, where there is no east, and outside the domain of a
             projection.
         """
         points = np.asarray(xyz, dtype=np.float64).reshape(-1, 3)
         if self.kind in {"geocentric", "local"}:
             return np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
+        if ground is not None and self.kind == "projected" and self._shift is None:
+            return self._grid_axes(ground[:, :2])
         geodetic = self.geodetic(points)
-        axes = true_axes(geodetic) if self.kind == "geographic" else self._grid_axes(geodetic)
+        axes = true_axes(geodetic) if self.kind == "geographic" else self._grid_axes(self._plan(geodetic))
         return axes if self._shift is None else self._shifted_axes(geodetic, axes)
 
-    def level_axes_at(self, xyz: ArrayLike) -> Floats:
+    def level_axes_at(self, xyz: ArrayLike, ground: Floats | None = None) -> Floats:
         """Directions as ``axes_at`` gives them, but true east, north and the normal for ``geocentric``."""
-        return true_axes(self.geodetic(xyz)) if self.kind == "geocentric" else self.axes_at(xyz)
+        return true_axes(self.geodetic(xyz)) if self.kind == "geocentric" else self.axes_at(xyz, ground)
 
     def convergence(self, xyz: ArrayLike) -> Floats:
         """Meridian convergence at Cartesian points: the azimuth of grid north, radians in (-pi, pi], shape (n,).
@@ -185,7 +186,7 @@ class GroundFrame:
         if self.kind != "projected":
             return np.zeros(len(points))
         geodetic = self.geodetic(points)
-        true, grid_north = true_axes(geodetic), self._grid_axes(geodetic)[:, 1]
+        true, grid_north = true_axes(geodetic), self._grid_axes(self._plan(geodetic))[:, 1]
         east, north = np.einsum("nij,nj->in", true[:, :2], grid_north)
         return np.asarray(np.arctan2(east, north))
 
@@ -305,20 +306,24 @@ class GroundFrame:
             require_rows(finite_rows(geodetic), f"no datum shift from {self.spec.name} is known there", ids)
         return geocentric_from_geodetic(geodetic, self._cartesian)
 
-    def _grid_axes(self, geodetic: Floats) -> Floats:
-        """Rows grid east, grid north, normal in the geocentric frame of the own datum.
+    def _plan(self, geodetic: Floats) -> Floats:
+        """Plan coordinates (n, 2) of longitudes and latitudes, radians."""
+        plan = geodetic[:, :2] / self._angle
+        return plan if self._plane is None else self._plane.apply(plan, inverse=True)
+
+    def _grid_axes(self, plan: Floats) -> Floats:
+        """Rows grid east, grid north, normal in the geocentric frame of the own datum at plan coordinates (n, 2).
 
         Where one gets when the grid coordinate grows, by central differences of fourth order: that needs nothing of
         the projection and works at poles and at the meridian of 180 degrees.
         """
         if self._plane is None or self.ellipsoid is None:
             raise PhotostripError(f"{self.spec.name} has no grid")
-        plan = self._plane.apply(geodetic[:, :2] / self._angle, inverse=True)
         step = _DERIVATIVE_STEP * self.ellipsoid[0] / self.plan_factor
         offsets = step * np.array([[2, 0], [1, 0], [-1, 0], [-2, 0], [0, 2], [0, 1], [0, -1], [0, -2]])
         weights = np.array([-1.0, 8.0, -8.0, 1.0])
-        axes, reached = np.empty((len(geodetic), 3, 3)), np.zeros(len(geodetic), bool)
-        for rows in pieces(len(geodetic)):
+        axes, reached = np.empty((len(plan), 3, 3)), np.zeros(len(plan), bool)
+        for rows in pieces(len(plan)):
             ends = plan[rows].T[:, None, :] + offsets.T[:, :, None]
             lonlat = self._plane.apply(ends.reshape(2, -1).T) * self._angle
             reached[rows] = finite_rows(lonlat).reshape(8, -1).all(axis=0)

@@ -313,7 +313,7 @@ class Result:
         """Covariances (n, 3, 3) of the points along east, north and up, metres^2; None when they are not known."""
         if self.precision is None:
             return None
-        level = self.output.level_axes_at(self.points.cartesian)
+        level = self.output.level_axes_at(self.points.cartesian, self.points.ground)
         return np.asarray(level @ self.precision.points @ level.transpose(0, 2, 1), float)
 
     @property

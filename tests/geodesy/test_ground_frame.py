@@ -123,6 +123,14 @@ def test_transverse_mercator_is_that_of_krueger_s_series(lon: float, lat: float)
 
 @pytest.mark.parametrize("crs", GRIDS)
 @given(u=st.floats(0.05, 0.95), v=st.floats(0.05, 0.95), up=height)
+def test_axes_are_the_same_where_coordinates_are_known(crs: str, u: float, v: float, up: float) -> None:
+    grid = FRAMES[crs]
+    xyz = cartesian(grid, point_of(crs, u, v, up))
+    assert (grid.axes_at(xyz, grid.ground_from_cartesian(xyz)) == grid.axes_at(xyz)).all()
+
+
+@pytest.mark.parametrize("crs", GRIDS)
+@given(u=st.floats(0.05, 0.95), v=st.floats(0.05, 0.95), up=height)
 def test_axes_are_right_angled_and_follow_the_grid(crs: str, u: float, v: float, up: float) -> None:
     grid = FRAMES[crs]
     lonlath = point_of(crs, u, v, up)

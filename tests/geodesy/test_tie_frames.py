@@ -106,6 +106,7 @@ def test_axes_are_carried_through_a_datum_shift() -> None:
         own.axes_at(own.cartesian_from_ground(PULKOVO)).reshape(-1, 3), (0.0, 0.0, 0.0, *towgs84[3:6], 0.0)
     )
     axes = given.axes_at(given.cartesian_from_ground(PULKOVO))
+    assert (given.axes_at(given.cartesian_from_ground(PULKOVO), np.array(PULKOVO)) == axes).all()
     assert axes.reshape(-1, 3) == pytest.approx(turned, abs=1e-6)  # small rotations are not quite rotations
     assert np.abs(own.axes_at(own.cartesian_from_ground(PULKOVO)) - axes).max() > 1e-4
     assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.broadcast_to(np.eye(3), (2, 3, 3)), abs=1e-14)

@@ -127,9 +127,9 @@ def photos_of(result: Result, images: Sequence[ImageResiduals]) -> Records | lis
 def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> Records:
     photos, resection = strip.strip.photos, strip.of_photos.resection
     centers = strip.intermediate.cartesian_from_intermediate(resection.centers)
-    axes = result.output.axes_at(centers)
-    rotations = axes @ strip.intermediate.cartesian_rotations(resection.rotations)
     ground = result.output.ground_from_cartesian(centers, ids=[f"at the center of photo {photo}" for photo in photos])
+    axes = result.output.axes_at(centers, ground)
+    rotations = axes @ strip.intermediate.cartesian_rotations(resection.rotations)
     known = result.precision
     columns = {
         "image_rms_um": 1000.0 * resection.rms,

@@ -66,7 +66,8 @@ class Polynomial:
 
     def corrections(self, xyz: Floats) -> Floats:
         """Corrections of positions (n, 3) after the similarity, to be added. Source: [001] eq. 150."""
-        return np.column_stack([polynomial_terms.columns(xyz, axis.terms) @ axis.coefficients for axis in self.axes])
+        columns = {terms: polynomial_terms.columns(xyz, terms) for terms in {axis.terms for axis in self.axes}}
+        return np.column_stack([columns[axis.terms] @ axis.coefficients for axis in self.axes])
 
     def __call__(self, xyz: Floats) -> Floats:
         """Corrected positions; see ``corrections``."""
