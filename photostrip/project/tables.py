@@ -55,11 +55,15 @@ def read_tables(reading: Reading) -> Tables:
     for path, findings in reading.named(("fiducial_measurements", "file")):
         fiducials = read_measurements(path, findings, _manner(root, "fiducial_measurements", photos))
     control: list[ControlTable | None] = []
+    # an id is one text, in whichever tables it stands: those of check points take 60 bytes each
+    known = {} if observations is None else dict(zip(observations.target_ids, observations.target_ids, strict=True))
     for number, node in enumerate(root.list_at("control")):
         control.append(None)
         for path, findings in reading.named(("control", number, "file")):
             up, columns = _height_column(node), _columns(node)
-            control[-1] = read_control(path, up, findings, default_sigma=node.has("sigma"), columns=columns)
+            read = read_control(path, up, findings, default_sigma=node.has("sigma"), columns=columns)
+            if read is not None:
+                control[-1] = replace(read, ids=[known.get(name, name) for name in read.ids])
     refuse_repeated(control, reading.findings)
     for path, findings in reading.named(("camera_positions", "file")):
         node = root.entries["camera_positions"]
