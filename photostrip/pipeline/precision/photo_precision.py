@@ -44,6 +44,13 @@ def of_photos(
     stated = strip.of_photos.sigma
     factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
+    compared = check_points.compare_with_checks(strip, errors, checks.spread(), oriented.frames)
+    check = None if compared is None else check_points.by_fit(found, compared, parameters, factor)
+    photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
+    for some in () if of_checks else found.photos():
+        of_some = covariances.covariances(errors, some.rows, parameters, some.influence.__getitem__)
+        photos[some.photos] = of_some * factor
+    # the largest table at last, when what the others take is free again
     wanted = checks.rows if of_checks else np.arange(len(xyz))
     table = errors.points.take(wanted) if of_checks else errors.points
     points = covariances.covariances(errors, table, parameters, lambda rows: fit.influence(xyz[wanted[rows]]))
@@ -51,11 +58,6 @@ def of_photos(
     if of_checks:
         of_checked, points = points, np.full((len(xyz), 3, 3), np.nan)
         points[wanted] = of_checked
-    photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
-    for some in () if of_checks else found.photos():
-        of_some = covariances.covariances(errors, some.rows, parameters, some.influence.__getitem__)
-        photos[some.photos] = of_some * factor
-    compared = check_points.compare_with_checks(strip, errors, checks.spread(), oriented.frames)
     axes = strip.intermediate.axes
     for piece in pieces(len(points)):  # all at once take twice as much again
         points[piece] = axes @ points[piece] @ axes.T
@@ -67,7 +69,7 @@ def of_photos(
         variance=found.control.variance,
         sigma=stated * float(np.sqrt(factor)),
         basis=basis,
-        check=None if compared is None else check_points.by_fit(found, compared, parameters, factor),
+        check=check,
     )
 
 

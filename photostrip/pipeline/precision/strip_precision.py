@@ -34,13 +34,26 @@ class StripPrecision:
 
 
 def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:
-    """Precision of all strips together; a point of several strips is their mean.
+    """Precision of all strips together."""
+    return Precision(
+        points=_means(strips, results, points.number),
+        photos=tuple(strip.photos for strip in strips),
+        sigma=tuple(strip.sigma for strip in strips),
+        basis=tuple(strip.basis for strip in strips),
+        checks=tuple(strip.check for strip in strips),
+    )
+
+
+def _means(strips: Sequence[StripPrecision], results: Sequence[StripResult], number: Numbers) -> Floats:
+    """Covariances (n, 3, 3) of the points of all strips; a point of several strips is their mean.
 
     Strips have no image coordinate in common; what their points share are the errors of common control.
     """
-    rows = [np.searchsorted(points.number, result.formed.point) for result in results]
-    count = np.bincount(np.concatenate(rows), minlength=len(points.number))
-    total = np.zeros((len(points.number), 3, 3))
+    if len(strips) == 1:
+        return strips[0].points
+    rows = [np.searchsorted(number, result.formed.point) for result in results]
+    count = np.bincount(np.concatenate(rows), minlength=len(number))
+    total = np.zeros((len(number), 3, 3))
     for row, strip in zip(rows, strips, strict=True):
         total[row] += strip.points
     for (row_a, a), (row_b, b) in combinations(zip(rows, strips, strict=True), 2):
@@ -54,13 +67,7 @@ def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], poi
             mixed = (by_a * a.variance[of_a[part]]) @ by_b.transpose(0, 2, 1)
             total[shared] += mixed + mixed.transpose(0, 2, 1)
     total /= (count**2)[:, None, None]
-    return Precision(
-        points=total,
-        photos=tuple(strip.photos for strip in strips),
-        sigma=tuple(strip.sigma for strip in strips),
-        basis=tuple(strip.basis for strip in strips),
-        checks=tuple(strip.check for strip in strips),
-    )
+    return total
 
 
 def _keys(strip: StripPrecision) -> Numbers:

@@ -36,7 +36,7 @@ from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
 SIGMA_LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
-COEFFICIENTS = 200_000  # of rows worked on at a time: what fits into the processor's cache
+COEFFICIENTS = 100_000  # of rows worked on at a time: what fits into the processor's cache
 
 
 def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
