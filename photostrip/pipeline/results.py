@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers, pieces
 from photostrip.frozen import dataclass
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
@@ -313,8 +313,12 @@ class Result:
         """Covariances (n, 3, 3) of the points along east, north and up, metres^2; None when they are not known."""
         if self.precision is None:
             return None
-        level = self.output.level_axes_at(self.points.cartesian, self.points.ground)
-        return np.asarray(level @ self.precision.points @ level.transpose(0, 2, 1), float)
+        points, given = self.points, self.precision.points
+        found = np.empty(given.shape)
+        for some in pieces(len(found)):  # axes and products of all at once take twice as much again
+            level = self.output.level_axes_at(points.cartesian[some], points.ground[some])
+            found[some] = level @ given[some] @ level.transpose(0, 2, 1)
+        return found
 
     @property
     def roles(self) -> Numbers:
