@@ -114,9 +114,10 @@ class Row:
 
     def at(self, most: float) -> Row:
         """Give the cell as it were with another limit of what left-out errors may exceed."""
+        cell = self.cell
 
         def decided(choice: Choice) -> Choice:
-            taken = decide(choice.predicted, choice.left_out, choice.excess, self.cell.bands, most)
+            taken = decide(choice.predicted, choice.left_out, choice.excess, cell.bands, cell.photos - 1, most)
             return replace(choice, taken=taken)
 
         row = replace(self, choices=tuple(choice and decided(choice) for choice in self.choices))

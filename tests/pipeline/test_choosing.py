@@ -88,7 +88,25 @@ def test_a_lens_error_that_no_calibration_knows_brings_the_polynomial_back() -> 
     assert choice.left_out is not None
     assert (choice.taken, choice.contradicted) == ("polynomial", True)
     assert choice.predicted.ratio < BETTER < 1 / BETTER < choice.left_out.ratio
-    assert choice.excess > 3.0
+    assert choice.excess > choosing.MOST_EXCESS
+
+
+@pytest.mark.parametrize(
+    ("models", "bands", "excess", "covariance", "taken"),
+    [
+        (20, 3, 3.6, 1.2, "polynomial"),
+        (20, 3, 3.4, 1.2, "covariance"),  # such errors are to be expected
+        (20, 3, 3.6, 1.1, "covariance"),  # those of the polynomial are hardly smaller
+        (20, 2, 9.0, 1.2, "covariance"),  # nothing between two bands tells how the strip bends
+        (299, 3, 9.0, 1.2, "covariance"),  # 150 models: 3.5 times the root of 150 / 14, 11.4
+        (299, 3, 11.5, 1.2, "polynomial"),
+    ],
+)
+def test_left_out_errors_decide_where_they_exceed_what_is_to_be_expected_between_bands(
+    models: int, bands: int, excess: float, covariance: float, taken: str
+) -> None:
+    predicted, left_out = Witness((1.0, 1.0), (0.5, 0.5), 100), Witness((1.0, 1.0), (covariance, covariance), 1)
+    assert choosing.decide(predicted, left_out, excess, bands, models) == taken
 
 
 def test_standard_deviations_are_those_that_either_run_states() -> None:

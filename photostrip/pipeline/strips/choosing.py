@@ -27,8 +27,11 @@ from photostrip.triangulation.polynomial.terms import bands
 
 Oriented = OrientedStrip[Any]
 
-# left-out errors over what the covariance lets expect, beyond which its standard deviations are not to be believed
-MOST_EXCESS = 3.0
+# left-out errors over what the covariance lets expect, beyond which its standard deviations are not to be believed;
+# where bands are farther apart, more in proportion to the root of the models between them: an error that all photos
+# share bends a strip by the square of their number, random ones by its power 1.5. Table in docs/accuracy.md
+MOST_EXCESS = 3.5
+NEAR_BANDS = 14.0  # models from one to the next
 TELLING = 3  # bands of control from which on left-out errors say how a strip bends between the others
 MOST_GROUPS = 12  # bands or points that are left out in turn, spread over the strip
 MOST_POINTS = 300  # new points whose standard deviations are compared, spread likewise
@@ -40,7 +43,7 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
     groups, by = _groups(oriented, polynomial)
     left_out, excess = _left_out(oriented, polynomial, covariance, groups)
     return Choice(
-        taken=decide(predicted, left_out, excess, len(distinct(_bands(oriented)))),
+        taken=decide(predicted, left_out, excess, len(distinct(_bands(oriented))), oriented.errors.models),
         predicted=predicted,
         left_out=left_out,
         left_out_by=by,
@@ -50,12 +53,18 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
 
 
 def decide(
-    predicted: Witness, left_out: Witness | None, excess: float, bands: int, most_excess: float = MOST_EXCESS
+    predicted: Witness,
+    left_out: Witness | None,
+    excess: float,
+    bands: int,
+    models: int,
+    most_excess: float = MOST_EXCESS,
 ) -> str:
-    """Name the method that both witnesses speak for, with so many bands of control."""
-    believed = excess <= most_excess or bands < TELLING
-    if left_out is not None and not believed and left_out.ratio > 1 / BETTER:
-        return POLYNOMIAL
+    """Name the method that both witnesses speak for, in a strip of so many models with so many bands of control."""
+    if left_out is not None and bands >= TELLING and left_out.ratio > 1 / BETTER:
+        apart = models / (bands - 1)
+        if excess > most_excess * np.sqrt(max(apart / NEAR_BANDS, 1.0)):
+            return POLYNOMIAL
     return method_of(predicted.ratio)
 
 
