@@ -18,6 +18,7 @@ from photostrip.result.numbers import Plain, natural_rank, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record, records
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.strip_formation.scale_transfer import depths
+from photostrip.triangulation.strip_formation.strip import model_points
 from photostrip.units import MICROMETRES
 
 ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity
@@ -133,12 +134,15 @@ def _from_junctions(strip: StripResult, observations: PhotoPoints) -> list[Docum
     stages, ids = strip.of_photos, observations.point_ids
     joined, oriented = stages.formed.junctions, stages.orientation
     out: list[int] = np.flatnonzero(~joined.used).tolist()
+    if not out:
+        return []
     rank = natural_rank(ids)
     out.sort(key=lambda row: (int(joined.junction[row]), int(rank[joined.point[row]])))
     rows = np.array(out, np.intp)
     base, _ = oriented.relative
     deviation = joined.ratio[rows] / joined.factor[joined.junction[rows]] - 1
-    depth = depths(stages.formed.vectors[joined.after[rows]], base[joined.junction[rows] + 1])
+    models = model_points(oriented, stages.formed.first, left_ray=stages.formed.left_ray)
+    depth = depths(models.vectors[joined.after[rows]], base[joined.junction[rows] + 1])
     size = deviation * oriented.pairs.focal / depth * MICROMETRES
     return [
         _entry(

@@ -64,9 +64,7 @@ class FormedStrip:
     base_inclination: Floats
     # (m, 3): strip coordinates of every row of the pairs' table, from its own model; NaN where rays do not meet
     model_xyz: Floats
-    # vectors, gap: as in ``StereoModels``
-    vectors: Floats
-    gap: Floats
+    gap: Floats  # (m,): as in ``StereoModels``
     point: Numbers  # (q,): numbers of the points of the strip, ascending
     xyz: Floats  # (q, 3): strip coordinates, mean over the models that hold the point
     model_count: Numbers  # (q,): number of those models
@@ -182,7 +180,6 @@ def place_models(
         base_direction=tau,
         base_inclination=nu,
         model_xyz=xyz,
-        vectors=models.vectors,
         gap=models.gap,
         point=mean.point,
         xyz=mean.xyz,
