@@ -134,6 +134,11 @@ ROWS = {
     "check": Row("check of 1000 photos", DENSE, 2.0, command="check"),
     "lidar-10000": Row("300 photos, 10 000 check points", strip_spec(300, 60, check=10_000, extra=40)),
     "lidar-50000": Row("300 photos, 50 000 check points", strip_spec(300, 60, check=50_000, extra=180)),
+    "lidar-covariance": Row(
+        "300 photos, 50 000 check points, covariance",
+        strip_spec(300, 60, check=50_000, extra=180),
+        adjustment="covariance",
+    ),
 }
 
 
