@@ -40,7 +40,7 @@ def of_photos(
     if strip.of_photos.covariance is not None:
         return _of_covariance(strip, strip.of_photos.covariance, checks, oriented.frames, of_checks=of_checks)
     found = propagation(strip, oriented, observations)
-    errors, fit, xyz, operator = found.errors, found.fit, oriented.xyz, found.fit.operator
+    errors, fit, xyz, control, operator = found.errors, found.fit, oriented.xyz, found.control, found.fit.operator
     stated = strip.of_photos.sigma
     factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
@@ -50,14 +50,13 @@ def of_photos(
     for some in () if of_checks else found.photos():
         of_some = covariances.covariances(errors, some.rows, parameters, some.influence.__getitem__)
         photos[some.photos] = of_some * factor
-    # the largest table at last, when what the others take is free again
-    wanted = checks.rows if of_checks else np.arange(len(xyz))
-    table = errors.points.take(wanted) if of_checks else errors.points
-    points = covariances.covariances(errors, table, parameters, lambda rows: fit.influence(xyz[wanted[rows]]))
+    del found  # with the rays of all photos: the largest table comes last, when what the others take is free again
+    table, at = (errors.points.take(checks.rows), xyz[checks.rows]) if of_checks else (errors.points, xyz)
+    points = covariances.covariances(errors, table, parameters, lambda rows: fit.influence(at[rows]))
     points *= factor
     if of_checks:
         of_checked, points = points, np.full((len(xyz), 3, 3), np.nan)
-        points[wanted] = of_checked
+        points[checks.rows] = of_checked
     axes = strip.intermediate.axes
     for piece in pieces(len(points)):  # all at once take twice as much again
         points[piece] = axes @ points[piece] @ axes.T
@@ -65,8 +64,8 @@ def of_photos(
         points=points,
         photos=_turned(strip, photos),
         by_control=lambda rows, columns: axes @ fit.influence(xyz[rows]) @ operator[:, columns],
-        control=np.column_stack([strip.formed.point[strip.control_rows][found.control.point], found.control.axis]),
-        variance=found.control.variance,
+        control=np.column_stack([strip.formed.point[strip.control_rows][control.point], control.axis]),
+        variance=control.variance,
         sigma=stated * float(np.sqrt(factor)),
         basis=basis,
         check=check,

@@ -109,12 +109,12 @@ class FormedPhotos:
         return of
 
     def control_rays(self, oriented: Oriented) -> list[ControlRay]:
-        rays = self._rays_in_use
-        point = np.searchsorted(self.formed.point, self.observations.point[rays.rows])
+        rows = self._rays_in_use
+        point = np.searchsorted(self.formed.point, self.observations.point[rows])
         order = np.argsort(point, kind="stable")
         low = np.searchsorted(point[order], oriented.control_rows)
         twice = np.flatnonzero(np.bincount(point, minlength=len(self.formed.point))[oriented.control_rows] == 2)
-        both = rays.photo[order[low[twice, None] + np.arange(2)]]
+        both = self.strip.positions(self.observations)[rows[order[low[twice, None] + np.arange(2)]]]
         ray = self.formed.xyz[oriented.control_rows[twice], None] - self.formed.centers[both]
         ray /= np.linalg.norm(ray, axis=2)[:, :, None]
         return [
@@ -153,14 +153,15 @@ class FormedPhotos:
         xyz = oriented.xyz if correction is None else correction(oriented.xyz)
         if covariance is not None:
             xyz = covariance.xyz
-        rays = self._rays_in_use
-        points = np.searchsorted(formed.point, self.observations.point[rays.rows])
+        rows = self._rays_in_use
+        photo = strip.positions(self.observations)[rows]
+        points = np.searchsorted(formed.point, self.observations.point[rows])
         if covariance is None:
-            resection = self._resected(oriented, rays, points, xyz)
+            resection = self._resected(oriented, photo, points, xyz)
         else:
             photos = strip.oriented(covariance.centers, covariance.rotations)
-            resection = with_residuals(self.observations.xy[rays.rows], xyz[points], rays.photo, photos)
-        arm = xyz[points] - resection.centers[rays.photo]
+            resection = with_residuals(self.observations.xy[rows], xyz[points], photo, photos)
+        arm = xyz[points] - resection.centers[photo]
         return StripResult(
             precision=oriented.precision,
             intermediate=oriented.intermediate,
@@ -172,7 +173,7 @@ class FormedPhotos:
             xyz=xyz,
             cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
             rays=np.bincount(points, minlength=len(formed.point)),
-            depth=float(-(arm * resection.rotations[:, :, 2][rays.photo]).sum(axis=1).mean()),
+            depth=float(-(arm * resection.rotations[:, :, 2][photo]).sum(axis=1).mean()),
             notes=(
                 *overruling.notes(settings.relative, strip.id, strip.photos),
                 *notes.screening_notes(strip, self.screened, self.sigma),
@@ -197,7 +198,7 @@ class FormedPhotos:
                 formed=formed,
                 wrong_rays=self.wrong_rays,
                 resection=resection,
-                rows=rays.rows,
+                rows=rows,
                 covariance=covariance,
             ),
         )
@@ -223,25 +224,23 @@ class FormedPhotos:
         return adjust(start, settings.covariance)
 
     @cached_property
-    def _rays_in_use(self) -> _Rays:
-        """Image points that are used in a model or place a point without one, in the order of the photos."""
+    def _rays_in_use(self) -> Numbers:
+        """Rows of image points that are used in a model or place a point without one, in the order of the photos."""
         oriented, formed = self.orientation, self.formed
         in_models = oriented.rows[oriented.used & np.isfinite(formed.model_xyz).all(axis=1)]
         rows = distinct(np.append(in_models, formed.bridging))
-        photo = self.strip.positions(self.observations)[rows]
-        order = np.argsort(photo, kind="stable")
-        return _Rays(rows[order], photo[order])
+        return rows[np.argsort(self.strip.positions(self.observations)[rows], kind="stable")]
 
-    def _resected(self, oriented: Oriented, rays: _Rays, points: Numbers, adjusted: Floats) -> Resection:
+    def _resected(self, oriented: Oriented, photo: Numbers, points: Numbers, adjusted: Floats) -> Resection:
         """Orient every photo on its adjusted points, so that orientations and points belong together."""
         strip, formed, similarity = self.strip, self.formed, oriented.absolute.similarity
         # A polynomial can move a long strip by much: a photo starts where its points went, on the average.
         moved = adjusted - similarity(formed.xyz)
-        count = np.maximum(np.bincount(rays.photo, minlength=len(strip.photos)), 1)
-        shift = [np.bincount(rays.photo, moved[points, axis], len(strip.photos)) / count for axis in range(3)]
+        count = np.maximum(np.bincount(photo, minlength=len(strip.photos)), 1)
+        shift = [np.bincount(photo, moved[points, axis], len(strip.photos)) / count for axis in range(3)]
         centers = similarity(formed.centers) + np.column_stack(shift)
         start = strip.oriented(centers, similarity.rotation @ formed.rotations)
-        resection = resect(self.observations.xy[rays.rows], adjusted[points], rays.photo, start)
+        resection = resect(self.observations.xy[self._rays_in_use], adjusted[points], photo, start)
         if not resection.solved.any():
             msg = (
                 f"strip {strip.id}: no photo can be oriented on its adjusted points: strip and control do not "
@@ -249,14 +248,6 @@ class FormedPhotos:
             )
             raise GeometryError(msg, photos=strip.photos, code="no-photo-oriented")
         return resection
-
-
-@dataclass(frozen=True, eq=False)
-class _Rays:
-    """Image points of a strip, ordered by photo."""
-
-    rows: Numbers  # (m,): rows of the observations
-    photo: Numbers  # (m,): place of the photo in the strip
 
 
 def screened_pairs(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from heapq import nlargest
 
 from photostrip.notes import Document, counted, listed
 from photostrip.report.page.layout import lay_out
@@ -250,8 +251,8 @@ def _likewise(rest: Sequence[Document]) -> str:
 def _worst_of(rows: Sequence[Document], key: str, most: int) -> list[Document]:
     """Return the rows with the largest values of a key, where it is known."""
     values = column_of(rows, key)
-    known = [place for place, value in enumerate(values) if value is not None]
-    return [rows[place] for place in sorted(known, key=lambda place: float(values[place]), reverse=True)[:most]]
+    known = (place for place, value in enumerate(values) if value is not None)
+    return [rows[place] for place in nlargest(most, known, key=lambda place: float(values[place]))]
 
 
 def _rejection(row: Document) -> str:

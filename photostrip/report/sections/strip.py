@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
+from heapq import nlargest
 from typing import Any
 
 from photostrip.notes import Document, counted
@@ -39,7 +40,7 @@ def worst_first(
     """
     if everything or len(rows) <= most:
         return list(rows), ""
-    chosen = sorted(rows, key=badness, reverse=True)[: min(most, WORST_SHOWN)]
+    chosen = nlargest(min(most, WORST_SHOWN), rows, key=badness)
     return chosen, f"worst first; {elsewhere(len(rows) - len(chosen), *where)}"
 
 

@@ -6,7 +6,6 @@ Source: derived; see docs/precision.md, eq. 1-4.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from itertools import pairwise
 from typing import Self
 
@@ -46,13 +45,9 @@ class ImagePoints:
 
     def rows_of(self, rows: Numbers) -> Numbers:
         """Places here of rows in the table of image points."""
-        return np.asarray(self._places[rows], np.intp)
-
-    @cached_property
-    def _places(self) -> Numbers:
-        found = np.full(int(self.row.max()) + 1, -1)
-        found[self.row] = np.arange(len(self.row))
-        return found
+        places = np.full(len(self.stated), -1)  # a table of the size of all image points, not worth keeping
+        places[self.row] = np.arange(len(self.row))
+        return np.asarray(places[rows], np.intp)
 
 
 @dataclass(frozen=True, eq=False)
