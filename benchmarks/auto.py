@@ -105,7 +105,8 @@ class Row:
 
     def of(self, method: str) -> float:
         """Errors of a method over all strips, plan and height as one."""
-        return size_of(self.errors[method])
+        mean = np.sqrt((self.errors[method] ** 2).mean(axis=0))
+        return float(np.sqrt(mean.prod()))
 
     @property
     def taken(self) -> tuple[str, ...]:
@@ -138,11 +139,6 @@ class Row:
     def worst(self) -> float:
         """The largest of the same ratio of single strips."""
         return float(np.sqrt((self.errors[AUTO] / self.errors[self.best]).prod(axis=1)).max())
-
-
-def size_of(errors: Floats) -> float:
-    """Errors of strips, (n, 2) in plan and in height, as one."""
-    return float(np.sqrt(np.sqrt((errors**2).mean(axis=0)).prod()))
 
 
 def cells(
