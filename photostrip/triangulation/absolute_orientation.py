@@ -188,8 +188,7 @@ def lay(
     reach: (q, 3), optional, all points of the strip, strip coordinates. What the control must determine is their
         position: control far along a narrow strip is enough when it spans the strip's width. Without them a square of
         the control's length counts.
-    watch: called at every step with the similarity before it, and shifts, rotations and scale of the step, metres at
-        the end of the strip.
+    watch: called at every step with the similarity before it and the step (7,), metres at the end of the strip.
     known: (n, 3, 3), optional, axes along which strip and control are compared (``Targets.axes``).
     enough: of the strip's half length: the last step is smaller.
     Raises GeometryError when the control does not determine seven parameters; the free motion is named.
@@ -205,17 +204,23 @@ def lay(
     axes = targets.axes(xyz) if known is None else known
     spread = None if reach is None else Spread.of(reach)
     share = np.sqrt(weight[targets.control.use])
+    before, step, squares = similarity, np.zeros(PARAMETERS), np.inf
     for iteration in range(1, ITERATIONS + 1):
         xyz = similarity(strip)
         if iteration == LAST_AXES_UPDATE and known is None:
-            axes = targets.axes(xyz)
+            axes, squares = targets.axes(xyz), np.inf
         plain, free = design(xyz, targets, axes, half)
-        root = np.eye(PARAMETERS) if spread is None else spread.motion(similarity, xyz.mean(axis=0), half)
-        values = _refuse_deficient(plain, root, xyz, targets, half)  # weights do not decide what is free
-        step = np.asarray(np.linalg.lstsq(plain * share[:, None], free * share, rcond=None)[0], float)
-        if watch is not None:
-            watch(similarity, step)
-        similarity = corrected(similarity, step, xyz.mean(axis=0), half)
+        found = float(np.square(free * share).sum())
+        if found > squares + np.square(enough * half * share).sum():  # too long: control kilometres off bends the rest
+            step = step / 2
+        else:
+            before, squares = similarity, found
+            root = np.eye(PARAMETERS) if spread is None else spread.motion(similarity, xyz.mean(axis=0), half)
+            values = _refuse_deficient(plain, root, xyz, targets, half)  # weights do not decide what is free
+            step = np.asarray(np.linalg.lstsq(plain * share[:, None], free * share, rcond=None)[0], float)
+            if watch is not None:
+                watch(similarity, step)
+        similarity = corrected(before, step, before(strip).mean(axis=0), half)
         if np.abs(step).max() < enough * half:
             break
     if similarity.rotation[2, 2] < 0:

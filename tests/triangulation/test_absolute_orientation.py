@@ -169,6 +169,30 @@ def test_an_optimiser_finds_the_same_for_any_mixture_and_any_weights(use: dict[s
         assert found.sigma0 == pytest.approx(np.sqrt((weight * misclosure**2).sum() / redundancy), rel=1e-6)
 
 
+def one_far(name: str, off: float) -> Case:
+    noise = np.zeros((len(FULL), 3))
+    noise[list(FULL).index(name), 1] = off
+    return case(FULL, sigma=(0.05, 0.05, 0.2), noise=noise)
+
+
+@pytest.mark.parametrize(("name", "off"), [("A", 1e3), ("A", 30e3), ("A", 100e3), ("D", 1e3), ("H", 1e3)])
+def test_an_optimiser_finds_the_same_where_a_point_is_kilometres_off(name: str, off: float) -> None:
+    one = one_far(name, off)
+    weight = weights(one.control, PRECISION)
+    misclosures = one.orient().misclosures, optimised(one, weight)(one.strip) - np.nan_to_num(one.control.enu)
+    ours, theirs = ((weight * each**2).sum() for each in misclosures)
+    assert ours == pytest.approx(theirs, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "off", "code"), [("D", 30e3, "control-of-other-points"), ("H", 100e3, "control-deficient")]
+)
+def test_a_strip_that_a_point_turns_over_does_not_shrink_to_nothing(name: str, off: float, code: str) -> None:
+    with pytest.raises(GeometryError, match=r"half of the points are more than|point H lies 98\.71 km") as caught:
+        one_far(name, off).orient()
+    assert caught.value.code == code
+
+
 # ------------------------------------------------------------------------------------ back to the truth
 
 

@@ -789,16 +789,14 @@ def test_a_strip_that_a_wrong_distance_tears_apart_is_not_taken_for_control_of_o
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [8810017, 8810070])
-def test_slips_that_no_model_strip_can_be_laid_on_are_named(seed: int) -> None:
+def test_slips_that_turn_a_strip_of_models_over_are_named(seed: int) -> None:
     """In the last third of 15 models; in a local system, where another order of columns fits by chance."""
     (mistake,) = (each for each in plausibility.MISTAKES if each.name == "slip of a digit, models")
     case = mistake.make(seed)
     planted = mistake.plant(case)
     assert planted is not None
     inputs, ids = planted
-    with pytest.raises(PhotostripError) as failure:
-        triangulate(inputs, mistake.settings(case))
-    (finding,) = failure.value.findings
+    (finding,) = triangulate(inputs, mistake.settings(case)).findings
     assert (finding.code, frozenset(finding.points)) == ("P406", ids)
     assert "typing error" in finding.message
 
