@@ -78,6 +78,7 @@ class Case:
     relief: float = 60.0
     uav: bool = False
     layout: str = "bands"
+    extra: int = 2  # points of each model beside the five rows of Gruber points
     methods: tuple[str, ...] = METHODS
 
     @property
@@ -87,7 +88,7 @@ class Case:
             camera=replace(UAV) if self.uav else replace(FILM, principal_distance=153.0),
             flight=Flight(photos=self.photos, end_lap_percent=self.lap),
             terrain=Terrain(relief=self.relief),
-            points=Points(rows=5, reach_percent=75.0, extra_per_model=2),
+            points=Points(rows=5, reach_percent=75.0, extra_per_model=self.extra),
             control=Control(
                 layout=self.layout,
                 bands=self.bands,
@@ -138,6 +139,8 @@ BUNDLE = (
     Case("300 photos, every 5", 300, every=5, sigma=GOOD),
     Case("40 photos, 80 %", 40, every=10, lap=80.0, sigma=GOOD),
     Case("40 photos, 80 %, middle", 40, lap=80.0, layout=MIDDLE, sigma=GOOD),
+    Case("20 photos, 94 %", 20, every=6, lap=94.0, sigma=GOOD),
+    Case("20 photos, 94 %, dense", 20, every=6, lap=94.0, sigma=GOOD, extra=60),
 )
 
 

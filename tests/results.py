@@ -100,13 +100,14 @@ def known(
     directory: Path | None = None,
     tied: TiedFrames | None = None,
     stages: Stages | None = None,
+    joint: bool = True,
 ) -> Result:
     """Do as ``triangulate``, or give what the same data with the same settings gave before, far from any grid."""
     if directory is not None and any(path.suffix in GRIDS for path in directory.iterdir()):
-        return triangulate(inputs, settings, directory=directory, tied=tied, stages=stages)
-    asked = pickle.dumps((inputs, settings))
+        return triangulate(inputs, settings, directory=directory, tied=tied, stages=stages, joint=joint)
+    asked = pickle.dumps((inputs, settings, joint))
     if asked not in _results:
-        _results[asked] = triangulate(inputs, settings, directory=directory, tied=tied, stages=stages)
+        _results[asked] = triangulate(inputs, settings, directory=directory, tied=tied, stages=stages, joint=joint)
     return _results[asked]
 
 

@@ -63,16 +63,18 @@ class Project:
         """Return all that can be said before anything is adjusted."""
         return _checked(self.loaded.path, self._assignments, self._source)
 
-    def run(self) -> Result:
+    def run(self, *, joint: bool = True) -> Result:
         """Adjust it.
 
+        joint: whether joint covariances of points may be asked of the result (``Result.covariance_of``); what they are
+            made of takes a third of the memory.
         Raises InputError or GeometryError, with the findings that may be the cause.
         """
         from photostrip.project.loading import adjust_project
         from photostrip.result.document import document_of
 
         with reading_from(self._source):
-            computed = self.loaded.result(adjust_project(self.loaded, self._stages))
+            computed = self.loaded.result(adjust_project(self.loaded, self._stages, joint=joint))
             document = document_of(computed, self.loaded.remarks)
             document["certificate"] = self._certificate(document, computed)
         return Result(document, computed=computed, resolved=self.loaded.resolved)

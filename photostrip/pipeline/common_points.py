@@ -43,7 +43,7 @@ def join_strips(
     notes: list[Note] = []
     for strip in strips:
         notes += strip.notes
-        covariance = None if strip.photo_stages is None else strip.photo_stages.covariance
+        covariance = None if strip.photo_stages is None else strip.photo_stages.solved
         if covariance is not None and not of_checks:
             notes += precision_beyond_control(strip.of_photos.strip, strip.control_rows, covariance)
     if settings.precision:

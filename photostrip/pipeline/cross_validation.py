@@ -15,7 +15,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import replace
 from photostrip.pipeline.given_points import rejected_control
 from photostrip.pipeline.inputs import Inputs
-from photostrip.pipeline.results import Fold, Result
+from photostrip.pipeline.results import Fold, Result, unsolved
 
 FOLDS = 10  # adjustments that are made at most
 
@@ -34,21 +34,10 @@ def cross_validate(result: Result, adjust: Callable[[Inputs], Result]) -> tuple[
         given = replace(control, check=left_out, use=use).take(taken)
         ids = tuple(control.ids[row] for row in np.sort(group))
         try:
-            folds.append(Fold(ids, _unsolved(adjust(replace(result.inputs, control=given)))))
+            folds.append(Fold(ids, unsolved(adjust(replace(result.inputs, control=given)))))
         except (GeometryError, InputError, np.linalg.LinAlgError) as error:
             folds.append(Fold(ids, None, str(error)))
     return tuple(folds)
-
-
-def _unsolved(result: Result) -> Result:
-    """Return it without the systems by which its strips were solved, which of ten folds fill the memory."""
-    strips = tuple(
-        strip
-        if strip.photo_stages is None
-        else replace(strip, photo_stages=replace(strip.photo_stages, covariance=None))
-        for strip in result.strips
-    )
-    return replace(result, strips=strips)
 
 
 def _groups(result: Result) -> list[Numbers]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, pieces
-from photostrip.frozen import dataclass
+from photostrip.frozen import dataclass, replace
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
     from photostrip.triangulation.bundle.quality.correlations import Correlation
     from photostrip.triangulation.bundle.selection import Selection
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment, CovarianceFigures
     from photostrip.triangulation.error_propagation.check_errors import CheckErrors
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
     from photostrip.triangulation.gross_errors.pairs import screening
@@ -55,7 +55,9 @@ class PhotoStages:
     resection: exterior.Resection  # photos oriented on the adjusted points, intermediate frame
     rows: Numbers  # (m,): image points that took part in the resections, rows of the observations
     # the adjustment with the strip's own covariance; None with other adjustments
-    covariance: CovarianceAdjustment | None = None
+    covariance: CovarianceFigures | None = None
+    # what its covariances are made of: until they are known, or joint covariances of points wanted
+    solved: CovarianceAdjustment | None = None
 
     @property
     def orientation(self) -> Orientation:
@@ -336,3 +338,12 @@ class Fold:
     left_out: tuple[str, ...]  # control points that were check points in it; no others were
     result: Result | None  # None where it could not be made
     reason: str = ""  # why not
+
+
+def unsolved(result: Result) -> Result:
+    """Return it without the systems by which its strips were solved, which take half of the memory."""
+    strips = tuple(
+        strip if strip.photo_stages is None else replace(strip, photo_stages=replace(strip.photo_stages, solved=None))
+        for strip in result.strips
+    )
+    return replace(result, strips=strips)

@@ -20,7 +20,7 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
-from photostrip.pipeline.results import AdjustedStrips, Result
+from photostrip.pipeline.results import AdjustedStrips, Result, unsolved
 from photostrip.pipeline.strips.absolute import StripStage, on_control
 from photostrip.pipeline.strips.adjusting import adjust, adjust_without
 from photostrip.pipeline.strips.forming import as_single_photos, form_strips
@@ -37,12 +37,14 @@ def triangulate(
     directory: Path | None = None,
     tied: TiedFrames | None = None,
     stages: Stages | None = None,
+    joint: bool = True,
 ) -> Result:
     """Take a project through the whole strip method.
 
     directory: the project file's directory, where grids named by the frames are looked for first.
     tied: frames of these inputs that have been tied already; those of other inputs are not used.
     stages: what runs with other settings have made, and what they may take over from this one.
+    joint: whether joint covariances of points may be asked of the result; what they are made of takes memory.
     Raises InputError when the settings or frames contradict each other or the control is left-handed.
     Raises GeometryError when a pair, a junction or the absolute orientation cannot be determined.
 
@@ -71,6 +73,8 @@ def triangulate(
         unsolvable = GeometryError(msg, code="singular")
         unsolvable.findings = of_failure()
         raise unsolvable from error
+    if not joint:
+        result = unsolved(result)
     return replace(result, findings=gate.of_result(result, directory, stages))
 
 

@@ -115,16 +115,22 @@ class Project:
             raise
 
 
-def adjust_project(project: Project, stages: Stages | None = None) -> Result:
+def adjust_project(project: Project, stages: Stages | None = None, *, joint: bool = True) -> Result:
     """Adjust a project; what is refused has its place in the project file.
 
     stages: what runs of it by other methods have made.
+    joint: whether joint covariances of points may be asked of the result.
     """
     from photostrip.pipeline.run import triangulate  # what only reads a project does without
 
     with project.places():
         return triangulate(
-            project.inputs, project.settings, directory=project.grid_folder, tied=project.tied, stages=stages
+            project.inputs,
+            project.settings,
+            directory=project.grid_folder,
+            tied=project.tied,
+            stages=stages,
+            joint=joint,
         )
 
 

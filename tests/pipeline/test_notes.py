@@ -55,7 +55,7 @@ def test_standard_deviations_beyond_the_control_are_told(share: float, adjustmen
     result = triangulate(without_far_control(share), Settings(adjustment=adjustment))
     document = document_of(result)
     (strip,) = result.strips
-    adjusted = strip.of_photos.covariance
+    adjusted = strip.of_photos.solved
     assert adjusted is not None
     told = [each["message"] for each in document["notes"] if each["code"] == "extrapolation"]
     largest = np.sqrt(adjusted.points[:, 2, 2].max())

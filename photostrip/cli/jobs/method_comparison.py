@@ -49,7 +49,7 @@ def compare_methods(
         for adjustment in METHODS:
             waiting.at(f"adjusting: {adjustment}")
             try:
-                result = _loaded(project, assignments, adjustment, stages).run()
+                result = _loaded(project, assignments, adjustment, stages).run(joint=False)
             except (GeometryError, InputError) as error:
                 found[adjustment] = refused_method(error)
                 failures.append(error)

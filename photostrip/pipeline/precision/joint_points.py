@@ -44,9 +44,9 @@ def _of_bundle(result: Result, rows: Numbers, axes: Floats) -> Floats:
 def _of_strip(result: Result, rows: Numbers, axes: Floats) -> Floats:
     strip, places = _strip_of(result, result.points.number[rows])
     stages = strip.photo_stages
-    if stages is None or stages.covariance is None:
+    if stages is None or stages.solved is None:
         raise _refused("only covariance and bundle adjustments keep joint covariances", BUNDLE)
-    adjusted = stages.covariance
+    adjusted = stages.solved
     directions = (axes @ strip.intermediate.axes).reshape(-1, 3)
     wanted = adjusted.system.errors.points.take(np.repeat(places, 3)).along(directions)
     joint = adjusted.joint_covariance(wanted)

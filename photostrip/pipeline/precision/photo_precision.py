@@ -37,8 +37,8 @@ def of_photos(
     given: all given points; the check points among them are compared with what is found.
     """
     checks = check_points.check_points(strip, given, observations)
-    if strip.of_photos.covariance is not None:
-        return _of_covariance(strip, strip.of_photos.covariance, checks, oriented.frames, of_checks=of_checks)
+    if strip.of_photos.solved is not None:
+        return _of_covariance(strip, strip.of_photos.solved, checks, oriented.frames, of_checks=of_checks)
     found = propagation(strip, oriented, observations)
     errors, fit, xyz, control, operator = found.errors, found.fit, oriented.xyz, found.control, found.fit.operator
     stated = strip.of_photos.sigma
@@ -82,7 +82,7 @@ def _of_covariance(
 ) -> StripPrecision:
     """Covariances from the system that the adjustment with the strip's own covariance has solved."""
     compared = check_points.compare_with_checks(strip, adjusted.system.errors, checks.spread(), frames)
-    control, axes = adjusted.control, strip.intermediate.axes
+    control, axes = adjusted.figures.control, strip.intermediate.axes
     if of_checks:
         points, photos = np.full((len(strip.xyz), 3, 3), np.nan), np.full((len(strip.strip.photos), 6, 6), np.nan)
         if compared is not None:
@@ -95,8 +95,8 @@ def _of_covariance(
         by_control=lambda rows, columns: np.asarray(axes @ adjusted.by_control(rows, columns), float),
         control=np.column_stack([strip.formed.point[strip.control_rows][control.point], control.axis]),
         variance=control.variance,
-        sigma=adjusted.sigma,
-        basis=adjusted.basis,
+        sigma=adjusted.figures.sigma,
+        basis=adjusted.figures.basis,
         check=None if compared is None else check_points.by_covariance(adjusted, compared),
     )
 

@@ -33,12 +33,12 @@ def adjust_without(whole: StripResult, screened: ScreenedStrip[Errors], settings
 
     Raises numpy.linalg.LinAlgError where this part does not determine the rest.
     """
-    covariance = None if whole.photo_stages is None else whole.photo_stages.covariance
+    covariance = None if whole.photo_stages is None else whole.photo_stages.solved
     if whole.photo_stages is None or covariance is None:
         asked = POLYNOMIAL if settings.adjustment == AUTO else settings.adjustment
         return adjust(screened, replace(settings, adjustment=asked))
     held = np.isin(whole.control.ids, screened.oriented.control.ids)
-    gone = np.flatnonzero(~held[covariance.control.point])
+    gone = np.flatnonzero(~held[covariance.figures.control.point])
     if not len(gone):
         return whole
     left = covariance.without(gone)
@@ -46,7 +46,7 @@ def adjust_without(whole: StripResult, screened: ScreenedStrip[Errors], settings
         whole,
         xyz=left.xyz,
         cartesian=whole.intermediate.cartesian_from_intermediate(left.xyz),
-        photo_stages=replace(whole.photo_stages, covariance=left),
+        photo_stages=replace(whole.photo_stages, solved=left),
     )
 
 

@@ -48,7 +48,7 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
         left_out=left_out,
         left_out_by=by,
         excess=excess,
-        distances=covariance.tested.distances,
+        distances=covariance.figures.tested.distances,
     )
 
 
@@ -74,12 +74,12 @@ def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: Covarianc
     new = np.delete(np.arange(len(oriented.xyz)), oriented.control_rows[found.point])
     points = _spread(new if len(new) else np.arange(len(oriented.xyz)), MOST_POINTS)
     fit = _fit(oriented, polynomial, np.arange(len(found.point)))
-    parameters = covariances.of_parameters(errors, found, fit.operator, covariance.factor)
+    parameters = covariances.of_parameters(errors, found, fit.operator, covariance.figures.factor)
     influence = fit.influence(oriented.xyz[points]).__getitem__
     after = covariances.covariances(errors, errors.points.take(points), parameters, influence)
     both = [
         np.diagonal(each, axis1=1, axis2=2).mean(axis=0)
-        for each in (after * covariance.factor, covariance.of_points(points))
+        for each in (after * covariance.figures.factor, covariance.of_points(points))
     ]
     first, second = ((_root(v[:2].mean()), _root(v[2])) for v in both)
     return Witness(first, second, len(points))
@@ -134,7 +134,7 @@ def _left_out(
     squares = np.concatenate([pairs[number] for number in known], axis=1) ** 2
     mean = np.array([[_mean(row[~height]), _mean(row[height])] for row in squares])
     first, second = ((float(plan), float(up)) for plan, up in np.sqrt(mean))
-    expected = sum(len(by_covariance[number].errors) for number in known) * covariance.factor
+    expected = sum(len(by_covariance[number].errors) for number in known) * covariance.figures.factor
     excess = np.sqrt(sum(by_covariance[number].squares for number in known) / expected)
     return Witness(first, second, len(known)), float(excess)
 

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, column_medians, distinct
+from photostrip.arrays import Floats, Numbers, column_medians
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted
-from photostrip.pipeline.choice import Deformation
 from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.rejection import Rejection
@@ -25,7 +24,7 @@ from photostrip.triangulation.resection.resection import Resection
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment, CovarianceFigures
 
 # of the length that the control spans: how far points may lie beyond it. Of a polynomial they are extrapolated
 BEYOND_POLYNOMIAL = 0.1
@@ -225,23 +224,7 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
         yield Note("covariance-proposed", text, severity="note", strip=strip.id)
 
 
-def distance_notes(strip: Strip, formed: FormedStrip, found: Deformation) -> Iterator[Note]:
-    """Say what the adjustment with the covariance did not take, also where it was only compared with the polynomial."""
-    used, joined = 0, formed.junctions
-    if found.choice is not None:
-        used = found.choice.distances
-    elif found.covariance is not None:
-        used = found.covariance.tested.distances
-    known = int(joined.used.sum()) - len(distinct(joined.junction[joined.used]))
-    if 0 < used < known:
-        text = (
-            f"strip {strip.id}: its points lie on so many photos that the adjustment with the covariance used "
-            f"{used} of {known} distances at the junctions; a bundle uses all, and takes less time"
-        )
-        yield Note("distances-left-out", text, severity="note", strip=strip.id)
-
-
-def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceAdjustment | None) -> Iterator[Note]:
+def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceFigures | None) -> Iterator[Note]:
     """Say what the tests of the adjustment with the covariance of the strip found.
 
     Returns doubtful control, the worst point only: it raises the test values of its neighbours; and a failed test of

@@ -186,8 +186,7 @@ class FormedPhotos:
                 *notes.polynomial_notes(strip, correction, xyz),
                 *([] if correction is None or found.choice else notes.covariance_proposal(strip, correction)),
                 *notes.photo_notes(strip, resection),
-                *notes.distance_notes(strip, formed, found),
-                *notes.covariance_notes(strip, oriented.control, covariance),
+                *notes.covariance_notes(strip, oriented.control, None if covariance is None else covariance.figures),
             ),
             screened_control=screened.screened_control,
             shared=screened.shared,
@@ -199,7 +198,8 @@ class FormedPhotos:
                 wrong_rays=self.wrong_rays,
                 resection=resection,
                 rows=rows,
-                covariance=covariance,
+                covariance=None if covariance is None else covariance.figures,
+                solved=covariance,
             ),
         )
 

@@ -174,11 +174,11 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     found = control_errors.misclosures(errors.points, ground.control, numbers, axes)
     wanted = conditions.conditions(errors, strip.orientation, strip.formed, found, np.zeros(len(found.point)))
     solved = system.system(errors, wanted, 1.0)
-    cofactors = solved.cofactors
     rows = np.flatnonzero(wanted.kind == conditions.CONTROL)
-    redundant = cofactors[rows] * wanted.noise[rows]
+    cofactors = prediction.cofactors_of(solved, rows)
+    redundant = cofactors * wanted.noise[rows]
     with np.errstate(divide="ignore", invalid="ignore"):
-        size = np.where(redundant > NO_REDUNDANCY, DETECTABLE / np.sqrt(cofactors[rows]), np.inf)
+        size = np.where(redundant > NO_REDUNDANCY, DETECTABLE / np.sqrt(cofactors), np.inf)
     detectable = np.full((len(numbers), 3), np.nan)
     source = wanted.source[rows]
     detectable[found.point[source], found.axis[source]] = size

@@ -13,7 +13,7 @@ from photostrip.result.numbers import natural_rank
 from photostrip.result.quantities import record, records
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceFigures
 
 
 def covariances_of(result: Result) -> Document:
@@ -26,7 +26,7 @@ def covariances_of(result: Result) -> Document:
     return {"covariance": blocks} if blocks else {}
 
 
-def _block(strip: StripResult, found: CovarianceAdjustment) -> Document:
+def _block(strip: StripResult, found: CovarianceFigures) -> Document:
     tested = found.tested
     ratio = tested.squares / tested.redundancy if tested.redundancy > 0 else float("nan")
     block = {
@@ -45,7 +45,7 @@ def _block(strip: StripResult, found: CovarianceAdjustment) -> Document:
     return record("covariance", block)
 
 
-def _control(strip: StripResult, found: CovarianceAdjustment) -> list[Document]:
+def _control(strip: StripResult, found: CovarianceFigures) -> list[Document]:
     """Return the test values of the control coordinates, in natural order of the points."""
     ids = strip.control.ids
     order = np.lexsort((found.control.axis, natural_rank(ids)[found.control.point]))

@@ -26,24 +26,34 @@ from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 MOST_FORMATIONS = 10
 FRESH = 0.05  # radians that a strip may turn before its derivatives are made afresh
+# of the variance factor: control that is more than 10 000 times as uncertain as image coordinates without errors leaves
+# no digits of the unknowns
+LEAST_FACTOR = 1e-8
 ENOUGH = 0.1  # of the angle that an image coordinate's standard deviation spans: what squares of turns may leave
 
 
 @dataclass(frozen=True, eq=False)
-class CovarianceAdjustment:
-    """What the adjustment of a strip with its own covariance found, intermediate frame."""
+class CovarianceFigures:
+    """What is told of the adjustment of a strip with its own covariance."""
 
-    xyz: Floats  # (q, 3): adjusted points of the strip, metres
-    centers: Floats  # (m, 3): perspective centres, metres
-    rotations: Floats  # (m, 3, 3): photo to intermediate frame
     control: control_errors.Misclosures  # control coordinates that counted
-    control_rows: Numbers  # (c,): points of the strip that the control gives
     tested: prediction.AdjustmentTest  # test of the whole, and of each of these coordinates
     factor: float  # variance factor of the image coordinates
     basis: str  # where it comes from
     sigma: float  # standard deviation of an image coordinate of weight one, mm
-    system: strip_system.System  # the solved system, with the rows of the strip and the conditions
     formations: int  # how often the strip was formed
+
+
+@dataclass(frozen=True, eq=False)
+class CovarianceAdjustment:
+    """A strip adjusted with its own covariance, intermediate frame, and the system that says how precise it is."""
+
+    figures: CovarianceFigures
+    xyz: Floats  # (q, 3): adjusted points of the strip, metres
+    centers: Floats  # (m, 3): perspective centres, metres
+    rotations: Floats  # (m, 3, 3): photo to intermediate frame
+    control_rows: Numbers  # (c,): points of the strip that the control gives
+    system: strip_system.System  # the solved system, with the rows of the strip and the conditions
     # left_out, whole: control of the system that takes no part, when it was left out afterwards; the adjustment with it
     left_out: Without | None = None
     whole: CovarianceAdjustment | None = None
@@ -52,20 +62,20 @@ class CovarianceAdjustment:
     def points(self) -> Floats:
         """Covariances (q, 3, 3) of the points, metres^2."""
         if self.left_out is None:
-            return prediction.covariances(self.system, self.system.errors.points) * self.factor
+            return prediction.covariances(self.system, self.system.errors.points) * self.figures.factor
         return self.of_points(np.arange(len(self.xyz)))
 
     def of_points(self, points: Numbers) -> Floats:
         """Covariances (n, 3, 3) of some of the points, metres^2."""
         rows = self.system.errors.points.take(points)
         if self.left_out is None or self.whole is None:
-            return prediction.covariances(self.system, rows) * self.factor
+            return prediction.covariances(self.system, rows) * self.figures.factor
         predicted = self._predicted(points)
         if predicted is not None:
             at = np.arange(len(points))
             return predicted[at, :, at]
         explained = self.left_out.explained(rows)
-        return self.whole.points[points] + explained @ explained.transpose(0, 2, 1) * self.factor
+        return self.whole.points[points] + explained @ explained.transpose(0, 2, 1) * self.figures.factor
 
     def joint_covariance(self, rows: ErrorRows) -> Floats:
         """Covariances (n, n) of rows with d = 1, metres^2."""
@@ -73,7 +83,7 @@ class CovarianceAdjustment:
         if self.left_out is not None:
             explained = self.left_out.explained(rows)[:, 0]
             covariance += explained @ explained.T
-        return covariance * self.factor
+        return covariance * self.figures.factor
 
     def joint_covariance_at(self, points: Numbers, coordinates: control_errors.Misclosures) -> Floats:
         """Covariances (w, w) of coordinates of some of the points (n,), metres^2."""
@@ -91,16 +101,16 @@ class CovarianceAdjustment:
         place = np.full(len(self.xyz), -1)
         place[self.control_rows[self._points_left_out.point]] = np.arange(len(self._points_left_out.point))
         at = place[points]
-        return None if (at < 0).any() else self._points_left_out.covariance[at][:, :, at] * self.factor
+        return None if (at < 0).any() else self._points_left_out.covariance[at][:, :, at] * self.figures.factor
 
     @cached_property
     def _points_left_out(self) -> PointsLeftOut | None:
-        return None if self.left_out is None else self.left_out.points(self.control, self.factor)
+        return None if self.left_out is None else self.left_out.points(self.figures.control, self.figures.factor)
 
     @cached_property
     def photos(self) -> Floats:
         """Covariances (m, 6, 6) of centre and small rotation of the photos, metres^2 and radians^2."""
-        return prediction.photo_covariances(self.system) * self.factor
+        return prediction.photo_covariances(self.system) * self.figures.factor
 
     def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
         """Return what errors of control coordinates subtract from points.
@@ -123,12 +133,10 @@ class CovarianceAdjustment:
         left_out = Without.of(self.system, coordinates)
         errors, change = self.system.errors, left_out.change
         images = relinearisation.image_errors(change)
-        points, photos = (
-            prediction.errors(change, rows, images) for rows in (errors.points.whole(), prediction.photo_rows(change))
-        )
+        photos = prediction.photo_errors(change)
         return replace(
             self,
-            xyz=self.xyz - points,
+            xyz=self.xyz - prediction.errors(change, errors.points, images),
             centers=self.centers - photos[:, :3],
             rotations=from_vector(-photos[:, 3:]) @ self.rotations,
             left_out=left_out,
@@ -161,7 +169,8 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
     order of its square in the image. While that is more than a part of the scatter of image coordinates, the strip is
     formed of corrected image coordinates, and what is left is distributed.
     """
-    factor, basis = image_variance(start.orientation, start.sigma)
+    found, basis = image_variance(start.orientation, start.sigma)
+    factor = max(found, LEAST_FACTOR)
     one, formations = _solved(start, np.zeros((len(start.errors.images.row), 2)), settings, factor), 1
     turn = rate = relinearisation.largest_turn(one.system)
     while formations < MOST_FORMATIONS and turn * rate / 2 > ENOUGH * start.sigma / start.focal:
@@ -174,23 +183,23 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
         formations, rate = formations + 1, turn if fresh else rate
     errors, formed = one.strip.errors, one.strip.formed
     images = relinearisation.image_errors(one.system) - one.images
-    points, photos = (
-        prediction.errors(one.system, rows, images)
-        for rows in (errors.points.whole(), prediction.photo_rows(one.system))
-    )
+    photos = prediction.photo_errors(one.system)
     similarity = one.strip.absolute.similarity
-    return CovarianceAdjustment(
-        xyz=similarity(formed.xyz) - points,
-        centers=similarity(formed.centers) - photos[:, :3],
-        rotations=from_vector(-photos[:, 3:]) @ similarity.rotation @ formed.rotations,
+    figures = CovarianceFigures(
         control=one.strip.misclosures,
-        control_rows=start.control_rows,
         tested=prediction.tested(one.system, len(one.strip.misclosures.point), settings.level),
         factor=factor,
         basis=basis,
         sigma=start.sigma * float(np.sqrt(factor)),
-        system=one.system,
         formations=formations,
+    )
+    return CovarianceAdjustment(
+        figures=figures,
+        xyz=similarity(formed.xyz) - prediction.errors(one.system, errors.points, images),
+        centers=similarity(formed.centers) - photos[:, :3],
+        rotations=from_vector(-photos[:, 3:]) @ similarity.rotation @ formed.rotations,
+        control_rows=start.control_rows,
+        system=one.system,
     )
 
 
@@ -235,18 +244,19 @@ def _formed_again(
     found, wanted = strip.misclosures, before.system.conditions
     control = oriented.misclosures[found.point, found.axis]
     value = strip_conditions.misclosures_at(wanted, formed, oriented.similarity, control)
-    value += relinearisation.displacements(strip.errors, wanted.rows, images)[:, 0]
-    return _Linearised(again, images, strip_system.solved_for(before.system, replace(wanted, value=value)))
+    value += relinearisation.own_displacements(wanted.rows, images)[:, 0]
+    known = relinearisation.component_errors(strip.errors, images)
+    return _Linearised(again, images, strip_system.solved_for(before.system, value, known))
 
 
 def _solved(strip: StripOnControl, images: Floats, settings: CovarianceSettings, factor: float) -> _Linearised:
-    """Solve the conditions ``w + H v = A y + H v' + g``, v known so far, v' all errors of the image coordinates."""
+    """Solve the conditions ``w + E v = A y + B u + E v' + g``, v known so far, v' all errors of image coordinates."""
     found = strip.misclosures
     misclosures = strip.absolute.misclosures[found.point, found.axis]
     wanted = strip_conditions.conditions(
         strip.errors, strip.orientation, strip.formed, found, misclosures, distances=settings.distances
     )
-    if images.any():
-        known = relinearisation.displacements(strip.errors, wanted.rows, images)[:, 0]
-        wanted = replace(wanted, value=wanted.value + known)
-    return _Linearised(strip, images, strip_system.system(strip.errors, wanted, factor))
+    value = wanted.value + relinearisation.own_displacements(wanted.rows, images)[:, 0]
+    known = relinearisation.component_errors(strip.errors, images)
+    solved = strip_system.system(strip.errors, replace(wanted, value=value), factor, known)
+    return _Linearised(strip, images, solved)

@@ -1,81 +1,41 @@
-"""What an adjusted strip has to fulfil: steps between models, control, distances of pass points.
-
-Unknowns are the similarities of all models. Each is taken about the left perspective centre of its model and in metres
-at the distance of a base, so that a strip of any length makes a system of the same condition.
+"""What an adjusted strip has to fulfil: control, and distances of pass points from the common centres of their models.
 
 Source: derived; see docs/precision.md, eq. 7.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Self
-
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass, replace
-from photostrip.geometry.rotation import cross_matrix
+from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
+from photostrip.triangulation.covariance_adjustment.similarities import PhotoSimilarities
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, SCALE, ErrorRows
 from photostrip.triangulation.error_propagation.pair_errors import PairErrors
-from photostrip.triangulation.error_propagation.strip_errors import StripErrors, scale_shares
+from photostrip.triangulation.error_propagation.strip_errors import Section, StripErrors, scale_shares
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-JUNCTION, CONTROL, DISTANCE = 0, 1, 2
-# distances at all junctions over which a point reaches, at most: the time grows with their third power, see the table
-# in docs/precision.md; strips of 3 photos a point keep 333
-MOST_DISTANCES = 1000
-
-
-@dataclass(frozen=True, eq=False)
-class LocalSimilarities:
-    """Similarities of the models about their own left photos."""
-
-    to_common: Floats  # (p, 7, 7): from the unknowns of each model to the similarity about the common origin
-    from_common: Floats  # (p, 7, 7): the way back
-    length: float  # mean base, by which rotations and logarithms of scales are multiplied, metres
-    centers: Floats  # (p + 1, 3): perspective centres of all photos from the common origin, metres
-
-    @classmethod
-    def of(cls, errors: StripErrors, base: Floats) -> Self:
-        """Take them about the left centres C of the models, of bases (p, 3): t_common = t - theta x C - lambda C."""
-        # the step's scale column is minus the centre that joins its model to the next
-        following = -errors.steps[:, :3, SCALE]
-        centers = np.concatenate([following[:1] - base[:1], following])
-        left, length = centers[:-1], float(np.linalg.norm(base, axis=1).mean())
-        shift = np.tile(np.eye(SIMILARITY_PARAMETERS), (len(left), 1, 1))
-        shift[:, :3, 3:6], shift[:, :3, 6] = cross_matrix(left), -left
-        back = np.tile(np.eye(SIMILARITY_PARAMETERS), (len(left), 1, 1))
-        back[:, :3, 3:6], back[:, :3, 6] = -cross_matrix(left), left
-        size = np.array([1.0] * 3 + [length] * 4)
-        return cls(to_common=shift / size, from_common=back * size[:, None], length=length, centers=centers)
+CONTROL, DISTANCE = 0, 1
 
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Conditions ``w = A y + H v + g``, in the order of the strip."""
+    """Conditions ``w = A y + B u + E v + g``, point by point: u the error components, v the errors of image points.
 
-    rows: ErrorRows  # H, d = 1; ``by_similarity`` is A in the columns of the condition's own model
-    following: Floats  # (n, 7): A in the columns of the next model
+    Conditions of different points share no image point.
+    """
+
+    rows: ErrorRows  # d = 1; ``by_similarity`` by the similarity of the model ``first`` about the common origin
+    point: Numbers  # (n,): point of each
+    base: Numbers  # (n,): first model of that point, ascending
     value: Floats  # (n,): w, metres
     noise: Floats  # (n,): variance of g, metres^2
-    kind: Numbers  # (n,): ``JUNCTION``, ``CONTROL`` or ``DISTANCE``
-    source: Numbers  # (n,): junction; row of the misclosures; row of the pass points
-    local: LocalSimilarities  # the unknowns y
-
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Put conditions together, model by model."""
-        rows = ErrorRows.joined([part.rows for part in parts])
-        order = np.argsort(rows.first, kind="stable")
-        columns = {
-            name: np.concatenate([getattr(part, name) for part in parts])[order]
-            for name in ("following", "value", "noise", "kind", "source")
-        }
-        return cls(rows=rows.take(order), local=parts[0].local, **columns)
+    kind: Numbers  # (n,): ``CONTROL`` or ``DISTANCE``
+    source: Numbers  # (n,): row of the misclosures; row of the pass points
+    similarities: PhotoSimilarities  # the unknowns y
 
     def of_control(self, coordinates: Numbers) -> Numbers:
         """Conditions of control coordinates, given by their rows in the misclosures."""
@@ -83,6 +43,16 @@ class Conditions:
         place = np.empty(len(rows), np.intp)
         place[self.source[rows]] = rows
         return place[coordinates]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Conditions of one kind."""
+
+    rows: ErrorRows
+    value: Floats
+    noise: Floats
+    source: Numbers
 
 
 def conditions(
@@ -95,12 +65,40 @@ def conditions(
     distances: bool = True,
 ) -> Conditions:
     """Collect all conditions of a strip; `misclosures` (w,) is strip minus given of the control coordinates, metres."""
-    pairs = errors.make_pairs()
-    local = LocalSimilarities.of(errors, pairs.base)
-    parts = [_junctions(errors, local), _control(control, misclosures, local)]
+    count = len(misclosures)
+    parts = [_Part(rows=control.rows, value=misclosures, noise=control.variance, source=np.arange(count))]
     if distances:
-        parts.append(_distances(errors, pairs, orientation, formed, local))
-    return Conditions.joined(parts)
+        parts += [_distances(errors, *section) for section in errors.sections()]
+    rows = ErrorRows.joined([part.rows for part in parts])
+    kind = np.where(np.arange(len(rows.first)) < count, CONTROL, DISTANCE)
+    point, base = _points(errors, orientation, formed, rows)
+    order = np.lexsort((point, base))
+    value, noise, source = (
+        np.concatenate([getattr(part, name) for part in parts])[order] for name in ("value", "noise", "source")
+    )
+    return Conditions(
+        rows=rows.take(order),
+        point=point[order],
+        base=base[order],
+        value=value,
+        noise=noise,
+        kind=kind[order],
+        source=source,
+        similarities=PhotoSimilarities.of(errors),
+    )
+
+
+def _points(
+    errors: StripErrors, orientation: Orientation, formed: FormedStrip, rows: ErrorRows
+) -> tuple[Numbers, Numbers]:
+    """Points (n,) of rows, and their first models: of points that only join models, those of their first condition."""
+    of_image = np.empty(len(errors.images.row), np.intp)
+    of_image[errors.images.rows_of(orientation.rows)] = orientation.point[:, None]
+    point = of_image[rows.image[np.searchsorted(rows.item, np.arange(len(rows.first)))]]
+    first = np.full(int(orientation.point.max()) + 1, errors.models)
+    first[formed.point] = errors.points.first
+    np.minimum.at(first, point, rows.first)
+    return point, first[point]
 
 
 def misclosures_at(wanted: Conditions, formed: FormedStrip, similarity: Similarity, control: Floats) -> Floats:
@@ -121,99 +119,47 @@ def misclosures_at(wanted: Conditions, formed: FormedStrip, similarity: Similari
     return result
 
 
-def _junctions(errors: StripErrors, local: LocalSimilarities) -> Conditions:
-    """Seven for each junction: 0 = y(i+1) - y(i) carried over - S u(i)."""
-    junctions = errors.models - 1
-    count = junctions * SIMILARITY_PARAMETERS
-    carried = -local.from_common[1:] @ local.to_common[:-1]
-    by_component = -local.from_common[1:] @ errors.steps[:-1]
-    number = np.repeat(np.arange(junctions), SIMILARITY_PARAMETERS)
-    return Conditions(
-        rows=ErrorRows.without_images(
-            number,
-            carried.reshape(count, 1, SIMILARITY_PARAMETERS),
-            by_component.reshape(count, 1, 1, COMPONENTS),
-        ),
-        following=np.tile(np.eye(SIMILARITY_PARAMETERS), (junctions, 1)),
-        value=np.zeros(count),
-        noise=np.zeros(count),
-        kind=np.full(count, JUNCTION),
-        source=number,
-        local=local,
-    )
-
-
-def _control(control: Misclosures, misclosures: Floats, local: LocalSimilarities) -> Conditions:
-    rows, count = control.rows, len(misclosures)
-    return Conditions(
-        rows=replace(rows, by_similarity=rows.by_similarity @ local.to_common[rows.first]),
-        following=np.zeros((count, SIMILARITY_PARAMETERS)),
-        value=misclosures,
-        noise=control.variance,
-        kind=np.full(count, CONTROL),
-        source=np.arange(count),
-        local=local,
-    )
-
-
-def _distances(
-    errors: StripErrors, pairs: PairErrors, orientation: Orientation, formed: FormedStrip, local: LocalSimilarities
-) -> Conditions:
+def _distances(errors: StripErrors, section: Section, pairs: PairErrors) -> _Part:
     """Distances of pass points from the common centre, after minus before the junction: w = L v.
 
     What lies across the ray is left out: its variance nearly vanishes to first order, and what is left of it would
     count as information. One point of each junction is left out too, the scale transfer having used up one of them:
     the one with the largest share in the scale.
     """
-    joined, images = formed.junctions, errors.images
+    joined, images = section.junctions, errors.images
     chosen = np.flatnonzero(joined.used)
     share, _ = scale_shares(joined, pairs)
     order = np.lexsort(((share[chosen] ** 2).sum(axis=1), joined.junction[chosen]))
     number = joined.junction[chosen][order]
     last = np.append(number[1:] != number[:-1], np.ones(min(len(number), 1), bool))
     chosen = np.sort(chosen[order[~last]])
-    across = pairs.point[joined.after[chosen], 1]
-    chosen = np.sort(
-        chosen[_spread(joined.junction[chosen], across, MOST_DISTANCES // errors.points.by_component.shape[1])]
-    )
     junction, before, after = joined.junction[chosen], joined.before[chosen], joined.after[chosen]
+    first = junction + section.numbers.start
     ray_before, ray_after = pairs.point[before] - pairs.base[junction], pairs.point[after]
     lengths = np.linalg.norm(ray_before, axis=1) + np.linalg.norm(ray_after, axis=1)
     ray = (ray_before + ray_after) / lengths[:, None]
     along = (ray / np.linalg.norm(ray, axis=1)[:, None])[:, None]
     count = len(chosen)
     by_component = np.zeros((count, 2, 1, COMPONENTS))
-    moved = similarity_derivatives(local.centers[junction + 1] + ray_before, np.zeros(3))
-    by_component[:, 0] = along @ moved @ errors.steps[junction]
+    next_centers = -errors.steps[first, :3, SCALE]
+    moved = similarity_derivatives(next_centers + ray_before, np.zeros(3))
+    by_component[:, 0] = along @ moved @ errors.steps[first]
     by_component[:, 0, :, ELEMENTS] -= along @ pairs.point_by_elements[before]
     by_component[:, 1, :, ELEMENTS] += along @ pairs.point_by_elements[after]
-    rows = orientation.rows  # three photos see the point: left before, both in the middle, right after
+    rows = section.orientation.rows  # three photos see the point: left before, both in the middle, right after
     image = images.rows_of(np.column_stack([rows[before, 0], rows[before, 1], rows[after, 1]])).ravel()
     by_before, by_after = along @ pairs.point_by_image[before], along @ pairs.point_by_image[after]
     by_image = np.stack([-by_before[..., :2], by_after[..., :2] - by_before[..., 2:], by_after[..., 2:]], axis=1)
-    none = np.zeros((count, 1, SIMILARITY_PARAMETERS))
-    return Conditions(
+    return _Part(
         rows=ErrorRows(
-            first=junction,
-            by_similarity=none,
+            first=first,
+            by_similarity=np.zeros((count, 1, SIMILARITY_PARAMETERS)),
             by_component=by_component,
             item=np.repeat(np.arange(count), 3),
             image=image,
             by_image=by_image.reshape(-1, 1, 2) * images.sigma[image][:, None, :],
         ),
-        following=none[:, 0],
         value=np.einsum("ni,ni->n", along[:, 0], ray_after - ray_before),
         noise=np.zeros(count),
-        kind=np.full(count, DISTANCE),
-        source=chosen,
-        local=local,
+        source=section.passes[chosen],
     )
-
-
-def _spread(junction: Numbers, across: Floats, most: int) -> Numbers:
-    """Rows of at most so many of each junction, from one side of the strip to the other."""
-    order = np.lexsort((across, junction))
-    _, begin, count = np.unique(junction, return_index=True, return_counts=True)
-    rank = np.arange(len(order)) - np.repeat(begin, count)
-    step = np.maximum(np.repeat(count, count) / most, 1.0)
-    return np.asarray(order[np.floor(rank / step) != np.floor((rank - 1) / step)], np.intp)

@@ -16,8 +16,14 @@ from typing import Self
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import NamedTuple, dataclass, replace
-from photostrip.triangulation.covariance_adjustment.prediction import CHECKED, with_columns
+from photostrip.frozen import NamedTuple, dataclass
+from photostrip.triangulation.covariance_adjustment.prediction import (
+    CHECKED,
+    conditions_with_columns,
+    part_of_inverse,
+    with_columns,
+)
+from photostrip.triangulation.covariance_adjustment.reduced import Solved, of_conditions, solved
 from photostrip.triangulation.covariance_adjustment.system import System, solved_for
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
@@ -36,7 +42,7 @@ class LeftOut(NamedTuple):
 def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[LeftOut]:
     """Predict groups of control coordinates (rows of the misclosures), each from all the others."""
     rows = found.conditions.of_control(np.concatenate(groups))
-    inverse = found.part_of_inverse(rows)
+    inverse = part_of_inverse(found, rows)
     ends = np.cumsum([0, *(len(group) for group in groups)])
     return [
         _predicted(inverse[start:stop, start:stop], found.correlates[rows[start:stop]])
@@ -57,7 +63,7 @@ class Without:
 
     system: System  # with them
     coordinates: Numbers  # (c,): their rows in the misclosures
-    rows: Numbers  # (c,): their conditions
+    rows: Numbers  # (c,): their conditions, ascending
     inverse: Floats  # (c, c): Pi^-1
 
     @classmethod
@@ -66,23 +72,23 @@ class Without:
 
         Raises numpy.linalg.LinAlgError where the others do not determine them.
         """
-        rows = found.conditions.of_control(coordinates)
-        inverse = _inverse(found.part_of_inverse(rows))
+        rows = np.sort(found.conditions.of_control(coordinates))
+        inverse = _inverse(part_of_inverse(found, rows))
         if inverse is None:
             raise np.linalg.LinAlgError("the control that is left does not determine what is left out")
-        return cls(system=found, coordinates=coordinates, rows=rows, inverse=inverse)
+        return cls(system=found, coordinates=found.conditions.source[rows], rows=rows, inverse=inverse)
 
     @property
     def change(self) -> System:
         """The system with what leaving them out adds to its solution."""
         value = np.zeros(len(self.system.conditions.value))
         value[self.rows] = -self.inverse @ self.system.correlates[self.rows]
-        return solved_for(self.system, replace(self.system.conditions, value=value))
+        return solved_for(self.system, value)
 
     @cached_property
-    def columns(self) -> Floats:
-        """K^-1 E by blocks, shape (g, b, c)."""
-        return self.system.columns_of_inverse(self.rows)
+    def columns(self) -> Solved:
+        """What K^-1 E is made of."""
+        return solved(self.system, of_conditions(self.system, self.rows))
 
     def points(self, control: Misclosures, factor: float) -> PointsLeftOut:
         """Predict the points of the control of which all three coordinates are left out.
@@ -101,8 +107,7 @@ class Without:
 
     def influence(self, rows: ErrorRows, conditions: Numbers) -> Floats:
         """Return the part of the influence (n, d, k) of conditions that goes through what is left out."""
-        layout = self.system.layout
-        by_them = self.columns[layout.block[conditions], layout.position[conditions]]
+        by_them = conditions_with_columns(self.system, conditions, self.columns)
         return np.asarray(with_columns(self.system, rows, self.columns) @ (self.inverse @ by_them.T), float)
 
     def explained(self, rows: ErrorRows) -> Floats:

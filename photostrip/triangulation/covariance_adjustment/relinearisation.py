@@ -19,7 +19,7 @@ from photostrip.arrays import Floats
 from photostrip.frozen import replace
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.covariance_adjustment.system import System
-from photostrip.triangulation.error_propagation.covariances import by_images
+from photostrip.triangulation.error_propagation.covariances import by_components
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, MOVED, SHARING, SPAN, ErrorRows, add_rows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
@@ -34,32 +34,47 @@ def image_errors(found: System) -> Floats:
 
     In their stated standard deviations, in the order of ``errors.images``.
     """
-    return by_images(found.errors, found.conditions.rows.without_similarity(), found.correlates)
+    rows = found.conditions.rows
+    result = by_components(found.errors, -found.by_photo[:-1, :COMPONENTS] / found.similarities.size)
+    add_rows(result, rows.image, rows.by_image[:, 0] * found.correlates[rows.item][:, None])
+    return result
 
 
-def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Floats:
-    """Displace rows by errors of image coordinates (k, 2) in their stated standard deviations: shape (n, d).
-
-    The first model of each row is held fast: dX = sum K(s) u(first + s) + D v (eq. 3).
-    """
+def component_errors(errors: StripErrors, images: Floats) -> Floats:
+    """Errors (p, 6) of the components by those of image coordinates (k, 2) in their stated standard deviations."""
     points, photos = errors.images, errors.models + 1
     moved = np.zeros((photos, SPAN, COMPONENTS))
     flat = moved.reshape(photos, -1)
     add_rows(flat[:, MOVED], points.photo, np.einsum("ni,nic->nc", images, points.components))
-    components = np.zeros((SHARING + errors.models + rows.by_component.shape[1], COMPONENTS))  # from model -SHARING on
+    components = np.zeros((SHARING + photos, COMPONENTS))  # from model -SHARING on
     for slot in range(SPAN):
         components[slot : slot + photos] += moved[:, slot]
-    components = components[SHARING:]
+    return components[SHARING:-1]
+
+
+def own_displacements(rows: ErrorRows, images: Floats) -> Floats:
+    """Displace rows by errors of their own image points, the error components held fast: E v, shape (n, d)."""
     result = np.zeros(rows.by_similarity.shape[:2])
-    for slot in range(rows.by_component.shape[1]):
-        result += np.einsum("ndc,nc->nd", rows.by_component[:, slot], components[rows.first + slot])
     add_rows(result, rows.item, np.einsum("edi,ei->ed", rows.by_image, images[rows.image]))
+    return result
+
+
+def displacements(components: Floats, rows: ErrorRows, images: Floats) -> Floats:
+    """Displace rows by errors of components (p, 6) and of their own image points (k, 2): shape (n, d).
+
+    The first model of each row is held fast: dX = sum K(s) u(first + s) + D v (eq. 3).
+    """
+    slots = rows.by_component.shape[1]
+    components = np.concatenate([components, np.zeros((slots, COMPONENTS))])
+    result = own_displacements(rows, images)
+    for slot in range(slots):
+        result += np.einsum("ndc,nc->nd", rows.by_component[:, slot], components[rows.first + slot])
     return result
 
 
 def largest_turn(found: System) -> float:
     """Largest turn and change of scale of a model: root of the sum of their squares, radians."""
-    turns = found.unknowns[:, 3:] / found.conditions.local.length
+    turns = found.unknowns[:, 3:] * found.similarities.turn
     return float(np.sqrt(np.square(turns).sum(axis=1).max()))
 
 

@@ -1,102 +1,32 @@
-"""The banded system of a strip: conditions and unknowns model by model, their covariances, and its elimination.
+"""The banded system of a strip: the unknowns of all photos, what models and points say of them, and its elimination.
 
-Models are taken in blocks of as many as meet in one condition, so that only neighbouring blocks have anything in
-common. Within a block the conditions of a model come before its unknowns: in this order every pivot is regular.
+Conditions of a point share its image points and nothing else with other conditions but error components and unknowns.
+So they are eliminated first, point by point, whatever their number; what is left are 14 rows for each photo. Photos are
+taken in blocks of as many as a point reaches over, so that only neighbouring blocks have anything in common.
 
 Source: derived; see docs/precision.md, eq. 7.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cached_property
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass, replace
-from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
 from photostrip.triangulation.covariance_adjustment.conditions import Conditions
-from photostrip.triangulation.error_propagation.covariances import NearImages, around_models
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, ErrorRows, ranges
+from photostrip.triangulation.covariance_adjustment.similarities import PhotoSimilarities
+from photostrip.triangulation.covariance_adjustment.windows import PLACES, STEP, UNKNOWN, windows
+from photostrip.triangulation.error_propagation.covariances import NearImages
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows, ranges
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-AT_A_TIME = 32  # blocks that are made together
-
-
-@dataclass(frozen=True, eq=False)
-class PaddedRows:
-    """Rows with d = 1 of g consecutive blocks of w models, r places for each block, empty places 0."""
-
-    width: int  # w
-    begin: int  # the first of the blocks
-    by_component: Floats  # (g, 6 t, r): by the components of t models from the first of the block on
-    # (g, 6 (t + 4), r): covariances of their image coordinates, or of the whole rows without similarities, with
-    # components of the models from two before the first of the block to two after the last of these
-    covariances: Floats
-
-    @classmethod
-    def of(
-        cls, layout: SystemLayout, rows: ErrorRows, images: Floats, place: Numbers, blocks: range, places: int
-    ) -> Self:
-        """Put rows into places of their blocks.
-
-        images: covariances of their image points with components, as ``NearImages`` has them.
-        place: (n, d), of each coordinate in its block.
-        """
-        have, slots, count = rows.by_component.shape[1], layout.slots + layout.width - 1, len(blocks)
-        by_component = np.zeros((count, slots, COMPONENTS, places))
-        covariances = np.zeros((count, slots + 2 * SHARING, COMPONENTS, places))
-        block, shift = np.divmod(rows.first, layout.width)
-        for number in range(layout.width):
-            some = np.flatnonzero(shift == number)
-            own, at = block[some, None] - blocks.start, place[some]
-            by_component[own, number : number + have, :, at] = rows.by_component[some].transpose(0, 2, 1, 3)
-            covariances[own, number : number + images.shape[2], :, at] = images[some]
-        return cls(
-            width=layout.width,
-            begin=blocks.start,
-            by_component=by_component.reshape(count, slots * COMPONENTS, places),
-            covariances=covariances.reshape(count, (slots + 2 * SHARING) * COMPONENTS, places),
-        )
-
-    def whole(self, errors: StripErrors) -> Self:
-        """Add covariances of the components, so that they are those of the whole rows."""
-        blocks, slots = len(self.by_component), self.by_component.shape[1] // COMPONENTS
-        first = (self.begin + np.arange(blocks)) * self.width
-        around = around_models(errors.component_covariances, first, SHARING, slots + SHARING)
-        result = np.zeros_like(self.covariances)
-        for slot in range(slots):
-            by_component = self.by_component[:, slot * COMPONENTS : (slot + 1) * COMPONENTS]
-            for apart in range(-SHARING, SHARING + 1):
-                mixed = around[:, slot + SHARING + min(apart, 0), abs(apart)]
-                mixed = mixed.transpose(0, 2, 1) if apart >= 0 else mixed
-                start = (slot + apart + SHARING) * COMPONENTS
-                result[:, start : start + COMPONENTS] += mixed @ by_component
-        result += self.covariances
-        return replace(self, covariances=result)
-
-
-def products(whole: PaddedRows, images: PaddedRows, blocks: range, apart: int, out: Floats) -> None:
-    """Find covariances (m, r, r') of rows of blocks with rows of blocks apart.
-
-    Products of image coordinates that both use directly are left out; ``same_images`` gives them.
-
-    whole, images: the ones with covariances of whole rows, the others with those of image coordinates.
-    """
-    own = slice(blocks.start - whole.begin, blocks.stop - whole.begin)
-    other = slice(blocks.start + apart - images.begin, blocks.stop + apart - images.begin)
-    models = apart * whole.width
-    np.matmul(*_over_same_models(whole.covariances[own], images.by_component[other], models + SHARING), out=out)
-    out += np.matmul(*_over_same_models(whole.by_component[own], images.covariances[other], models - SHARING))
-
-
-def _over_same_models(first: Floats, second: Floats, later: int) -> tuple[Floats, Floats]:
-    """Cut (m, 6 t, r), transposed, and (m, 6 t', r'), whose models begin so much later, to the models of both."""
-    skip_first, skip_second = COMPONENTS * max(later, 0), COMPONENTS * max(-later, 0)
-    length = max(min(first.shape[1] - skip_first, second.shape[1] - skip_second), 0)
-    left, right = first[:, skip_first : skip_first + length], second[:, skip_second : skip_second + length]
-    return left.transpose(0, 2, 1), right
+AT_A_TIME = 4096  # rows whose windows are made together, in whole models
 
 
 class SameImages(NamedTuple):
@@ -116,159 +46,241 @@ def same_images(a: ErrorRows, b: ErrorRows) -> SameImages:
     return SameImages(a.item[of_a], b.item[of_b], a.by_image[of_a] @ b.by_image[of_b].transpose(0, 2, 1))
 
 
-@dataclass(frozen=True, eq=False)
-class SystemLayout:
-    """Where conditions and unknowns stand."""
+def sections(base: Numbers, size: int = 1) -> Iterator[slice]:
+    """Cut rows of so many coordinates, ordered by their models, into parts of bounded memory, models left whole."""
+    ends = np.append(np.flatnonzero(np.diff(base, prepend=-1)), len(base))
+    while len(ends) > 1:
+        last = max(int(np.searchsorted(ends, ends[0] + AT_A_TIME // size, side="right")) - 1, 1)
+        yield slice(int(ends[0]), int(ends[last]))
+        ends = ends[last:]
 
-    width: int  # models in a block
-    slots: int  # models over which any row reaches
-    heights: Numbers  # (g,): places that the conditions and unknowns of each block take
-    # block, position: (n,): block of each condition, and its place there
-    block: Numbers
-    position: Numbers
-    # start, unknown: (p,): place in its block of each model's first condition, and of its first unknown
-    start: Numbers
-    unknown: Numbers
+
+@dataclass(frozen=True, eq=False)
+class PointRoots:
+    """Own covariances D = E E^T + noise of the conditions of each point, as L^-1 with D = L L^T."""
+
+    start: Numbers  # (n,): first condition of the point of each condition
+    root: Floats  # (n, k): each row of L^-1, from that condition on
 
     @classmethod
-    def of(cls, first: Numbers, models: int, slots: int) -> Self:
-        """Lay out conditions that are ordered by their first models."""
-        width = min(slots, models)
-        counts = np.bincount(first, minlength=models)
-        begins = np.cumsum(counts + SIMILARITY_PARAMETERS) - counts - SIMILARITY_PARAMETERS
-        numbers = np.arange(models)
-        start = begins - begins[numbers // width * width]
-        unknown = start + counts
-        return cls(
-            width=width,
-            slots=slots,
-            heights=np.append(unknown[width - 1 : -1 : width], unknown[-1]) + SIMILARITY_PARAMETERS,
-            block=first // width,
-            position=start[first] + np.arange(len(first)) - (np.cumsum(counts) - counts)[first],
-            start=start,
-            unknown=unknown,
-        )
+    def of(cls, rows: ErrorRows, point: Numbers, noise: Floats) -> Self:
+        """Factorise them, conditions of a point one after the other.
 
-    @property
-    def blocks(self) -> int:
-        return len(self.heights)
+        Raises numpy.linalg.LinAlgError where two of a point's conditions are the same.
+        """
+        start = np.flatnonzero(np.diff(point, prepend=-1))
+        counts = np.diff(np.append(start, len(point)))
+        result = cls(np.repeat(start, counts), np.zeros((len(point), int(counts.max(initial=0)))))
+        place = np.arange(len(point)) - result.start
+        for size in distinct(counts).tolist():
+            some = start[counts == size][:, None] + np.arange(size)
+            number = np.full(len(point), -1)
+            number[some] = np.arange(len(some))[:, None]
+            own = np.zeros((len(some), size, size))
+            chosen = rows.take(some.ravel())
+            shared = same_images(chosen, chosen)  # every pair in both orders
+            first, second = (some.ravel()[each] for each in (shared.first, shared.second))
+            np.add.at(own, (number[first], place[first], place[second]), shared.value[:, 0, 0])
+            own[:, np.arange(size), np.arange(size)] += noise[some]
+            result.root[some, :size] = np.linalg.inv(np.linalg.cholesky(own))
+        return result
 
-    @property
-    def height(self) -> int:
-        """Places in a block: those that the largest takes."""
-        return int(self.heights.max())
+    def of_points(self, starts: Numbers) -> Numbers:
+        """All conditions of points, given by the first of each."""
+        return ranges(starts, np.searchsorted(self.start, starts, side="right"))[1]
 
-    @property
-    def cuts(self) -> list[list[int]]:
-        """Places in each block where its models begin, but for the first."""
-        return [self.start[low + 1 : low + self.width].tolist() for low in range(0, len(self.start), self.width)]
+    def take(self, some: slice | Numbers) -> PointRoots:
+        """Those of some conditions, of whole points."""
+        place = (np.arange(len(self.start)) - self.start)[some]
+        return PointRoots(np.arange(len(place)) - place, self.root[some])
+
+    def whitened(self, values: Floats) -> Floats:
+        """Multiply values (n, ...) of the conditions by L^-1."""
+        return self._multiplied(values, transposed=False)
+
+    def weighted(self, values: Floats) -> Floats:
+        """Multiply whitened values (n, ...) by L^-T."""
+        return self._multiplied(values, transposed=True)
+
+    def _multiplied(self, values: Floats, *, transposed: bool) -> Floats:
+        """Multiply by the diagonal, and by what stands before it in rows of points with several conditions."""
+        every, tail = np.arange(len(self.start)), [1] * (values.ndim - 1)
+        place = every - self.start
+        result: Floats = values * self.root[every, place].reshape(-1, *tail)
+        for row in range(1, self.root.shape[1]):
+            here = np.flatnonzero(place == row)
+            for column in range(row):
+                there, factor = self.start[here] + column, self.root[here, column].reshape(-1, *tail)
+                if transposed:
+                    result[there] += factor * values[here]
+                else:
+                    result[here] += factor * values[there]
+        return result
 
 
 @dataclass(frozen=True, eq=False)
 class System:
+    """An eliminated and solved system; its photos begin with two that have no part in it."""
+
     errors: StripErrors
     conditions: Conditions
-    layout: SystemLayout
-    padded: PaddedRows  # the conditions, with covariances of the whole rows
+    components: Floats  # (p, 6): what the error components are known to be already
+    roots: PointRoots
+    width: int  # photos of a block
     factors: block_tridiagonal.Factors
-    solution: Floats  # (g, b): correlates of the conditions, and unknowns
+    solution: Floats  # (g, b): correlates of the components, and unknowns
 
     @property
-    def correlates(self) -> Floats:
-        """Correlates lambda of the conditions, shape (n,)."""
-        return np.asarray(self.solution[self.layout.block, self.layout.position], float)
+    def similarities(self) -> PhotoSimilarities:
+        return self.conditions.similarities
 
-    @property
-    def cofactors(self) -> Floats:
-        """Cofactors of the correlates, shape (n,)."""
-        squares = np.concatenate([np.diagonal(block) for block in self.factors.diagonal_of_inverse])
-        begin = np.cumsum(self.layout.heights) - self.layout.heights
-        return np.asarray(squares[begin[self.layout.block] + self.layout.position], float)
-
-    def columns_of_inverse(self, rows: Numbers) -> Floats:
-        """Columns K^-1 e of conditions (c,), by blocks: shape (g, b, c)."""
-        right = np.zeros((self.layout.blocks, self.layout.height, len(rows)))
-        right[self.layout.block[rows], self.layout.position[rows], np.arange(len(rows))] = 1.0
-        return self.factors.solve(right)
-
-    def part_of_inverse(self, rows: Numbers) -> Floats:
-        """Entries (c, c) of K^-1 between conditions."""
-        return self.factors.part_of_inverse(self.layout.block[rows], self.layout.position[rows])
+    @cached_property
+    def by_photo(self) -> Floats:
+        """The solution (p + 1, 14) photo by photo."""
+        every = self.solution.reshape(-1, PLACES)
+        return every[SHARING : SHARING + self.errors.models + 1]
 
     @property
     def unknowns(self) -> Floats:
-        """Small similarities y of the models, shape (p, 7)."""
-        models = np.arange(len(self.layout.start))
-        columns = self.layout.unknown[:, None] + np.arange(SIMILARITY_PARAMETERS)
-        return np.asarray(self.solution[(models // self.layout.width)[:, None], columns], float)
+        """Small similarities y of the photos, shape (p + 1, 7)."""
+        return self.by_photo[:, UNKNOWN]
+
+    @cached_property
+    def correlates(self) -> Floats:
+        """Correlates lambda of the conditions, shape (n,)."""
+        found, result = self.solution.reshape(-1, PLACES), np.empty(len(self.conditions.value))
+        around = np.arange(self.width + 1)
+        for part in sections(self.conditions.base):
+            photos = np.minimum(self.conditions.base[part, None] + around, len(found) - 1)  # beyond it windows are 0
+            said = np.einsum("nwc,nwc->n", self.windows(part), found[photos])
+            roots = self.roots.take(part)
+            result[part] = roots.weighted(roots.whitened(self.conditions.value[part]) - said)
+        return result
+
+    @property
+    def squares(self) -> float:
+        """Weighted sum of squares of all misclosures, w^T lambda."""
+        of_components = self.by_photo[:-1, :COMPONENTS] / self.similarities.size
+        known = float((self.components * of_components).sum())
+        return float(self.conditions.value @ self.correlates) - known
+
+    def windows(self, some: slice | Numbers) -> Floats:
+        """Whitened windows (n, w, 14) of some conditions, of whole points."""
+        return _windows(self.errors, self.conditions, self.roots, some, self.width + 1)
 
 
-def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
+def system(errors: StripErrors, wanted: Conditions, factor: float, components: Floats | None = None) -> System:
     """Build, eliminate and solve K = [Q A; A^T 0], Q = H H^T + noise / factor (eq. 7).
 
-    ``factor`` is the variance factor of the image coordinates.
+    ``factor`` is the variance factor of the image coordinates, ``components`` (p, 6) what the error components are
+    known to be already.
     """
-    rows = wanted.rows
-    slots = max(rows.by_component.shape[1], errors.points.by_component.shape[1], SHARING)
-    layout = SystemLayout.of(rows.first, errors.models, slots)
-    near = NearImages.of(errors, rows).with_components
-    images = PaddedRows.of(layout, rows, near, layout.position[:, None], range(layout.blocks), layout.height)
-    whole = images.whole(errors)
-    diagonal, beside = _covariances(layout, rows, whole, images)
-    _add_design(layout, wanted, diagonal, beside)
-    diagonal[layout.block, layout.position, layout.position] += wanted.noise / factor
-    block, empty = np.nonzero(np.arange(layout.height) >= layout.heights[:, None])
-    diagonal[block, empty, empty] = 1.0
-    factors = block_tridiagonal.eliminate(diagonal, beside, layout.cuts, layout.heights.tolist())
+    reach = max(wanted.rows.by_component.shape[1], errors.points.by_component.shape[1], SHARING)
+    width, photos = reach + SHARING, SHARING + errors.models + 1
+    blocks = -(-photos // width)
+    roots = PointRoots.of(wanted.rows, wanted.point, wanted.noise / factor)
+    diagonal, beside = np.zeros((2, blocks, width * PLACES, width * PLACES))
+    _add_models(errors, wanted.similarities, diagonal, beside)
+    right = np.zeros((blocks * width + reach + 1, PLACES))
+    for part in sections(wanted.base):
+        found = _windows(errors, wanted, roots, part, width + 1)
+        _subtract_points(wanted.base[part], found.reshape(len(found), -1), diagonal, beside)
+        whitened = roots.take(part).whitened(wanted.value[part])
+        _subtract_right(wanted.base[part], found, whitened, right)
+    known = np.zeros((errors.models, COMPONENTS)) if components is None else components
+    factors = block_tridiagonal.eliminate(diagonal, beside)
     return System(
         errors=errors,
         conditions=wanted,
-        layout=layout,
-        padded=whole,
+        components=known,
+        roots=roots,
+        width=width,
         factors=factors,
-        solution=_solution(layout, factors, wanted.value),
+        solution=_solution(factors, wanted.similarities, right, known),
     )
 
 
-def solved_for(found: System, wanted: Conditions) -> System:
-    """Solve the eliminated system for other misclosures of the same conditions."""
-    solution = _solution(found.layout, found.factors, wanted.value)
-    return replace(found, conditions=wanted, solution=solution)
+def solved_for(found: System, value: Floats, components: Floats | None = None) -> System:
+    """Solve the eliminated system for other misclosures (n,) of the same conditions."""
+    conditions = replace(found.conditions, value=value)
+    right = np.zeros((len(found.solution) * found.width + found.width, PLACES))
+    for part in sections(conditions.base):
+        whitened = found.roots.take(part).whitened(value[part])
+        _subtract_right(conditions.base[part], found.windows(part), whitened, right)
+    known = np.zeros_like(found.components) if components is None else components
+    solution = _solution(found.factors, found.similarities, right, known)
+    return replace(found, conditions=conditions, components=known, solution=solution)
 
 
-def _solution(layout: SystemLayout, factors: block_tridiagonal.Factors, value: Floats) -> Floats:
-    right = np.zeros((layout.blocks, layout.height, 1))
-    right[layout.block, layout.position, 0] = value
-    return np.asarray(factors.solve(right)[:, :, 0], float)
+def _windows(errors: StripErrors, wanted: Conditions, roots: PointRoots, some: slice | Numbers, photos: int) -> Floats:
+    """Whitened windows (n, w, 14) of some conditions, of whole points."""
+    rows = wanted.rows.part(some.start, some.stop) if isinstance(some, slice) else wanted.rows.take(some)
+    images = NearImages.of(errors, rows).with_components
+    plain = windows(wanted.similarities, rows, images, wanted.base[some], photos)
+    return roots.take(some).whitened(plain[:, 0])
 
 
-def _covariances(layout: SystemLayout, rows: ErrorRows, whole: PaddedRows, images: PaddedRows) -> tuple[Floats, Floats]:
-    """Make Q, the covariances of the conditions: blocks (g, b, b) on the diagonal and to the right of them."""
-    diagonal, beside = np.zeros((2, layout.blocks, layout.height, layout.height))
-    for low in range(0, layout.blocks, AT_A_TIME):
-        for apart, blocks in enumerate((diagonal, beside)):
-            some = range(low, min(low + AT_A_TIME, layout.blocks - apart))
-            products(whole, images, some, apart, blocks[some.start : some.stop])
-    for block, cuts in zip(diagonal, layout.cuts, strict=True):
-        for cut in cuts:
-            block[cut:, :cut] = block[:cut, cut:].T  # rounding makes it different
-    shared = same_images(rows, rows)  # every pair in both orders
-    block, position = ((each[shared.first], each[shared.second]) for each in (layout.block, layout.position))
-    place = np.ravel_multi_index((block[0], *position), diagonal.shape)
-    for apart, blocks in enumerate((diagonal, beside)):
-        there = np.flatnonzero(block[1] == block[0] + apart)
-        np.add.at(blocks.reshape(-1), place[there], shared.value[there, 0, 0])
-    return diagonal, beside
+def _solution(
+    factors: block_tridiagonal.Factors, similarities: PhotoSimilarities, right: Floats, components: Floats
+) -> Floats:
+    count, height = factors.inverses.shape[:2]
+    models = slice(SHARING, SHARING + len(components))
+    right[models, :COMPONENTS] -= components / similarities.size
+    return factors.solve(right[: count * height // PLACES].reshape(count, height, 1))[:, :, 0]
 
 
-def _add_design(layout: SystemLayout, wanted: Conditions, diagonal: Floats, beside: Floats) -> None:
-    """Add A: the unknowns of each condition's own model, and of the next one."""
-    rows = wanted.rows
-    for model, values in ((rows.first, rows.by_similarity[:, 0]), (rows.first + 1, wanted.following)):
-        known = np.flatnonzero(values.any(axis=1) & (model < len(layout.unknown)))  # none follows the last
-        columns = layout.unknown[model[known]][:, None] + np.arange(SIMILARITY_PARAMETERS)
-        apart = model[known] // layout.width > layout.block[known]
-        block, position = layout.block[known, None], layout.position[known, None]
-        beside[block[apart], position[apart], columns[apart]] = values[known][apart]
-        own = block[~apart], position[~apart], columns[~apart]
-        diagonal[own] = diagonal[own[0], own[2], own[1]] = values[known][~apart]
+def _add_models(errors: StripErrors, similarities: PhotoSimilarities, diagonal: Floats, beside: Floats) -> None:
+    """Add covariances of the components, and what they are by the unknowns; a unit matrix where no photo is."""
+    blocks, height, _ = diagonal.shape
+    width, models = height // PLACES, errors.models
+    shape = blocks, width, PLACES, width, PLACES
+    diagonal, beside = diagonal.reshape(shape), beside.reshape(shape)
+
+    def put(first: Numbers, apart: int, rows: slice, columns: slice, values: Floats) -> None:
+        block, place = np.divmod(first, width)
+        next_block, other = np.divmod(first + apart, width)
+        for blocks_, some in ((diagonal, next_block == block), (beside, next_block > block)):
+            blocks_[block[some], place[some], rows, other[some], columns] = values[some]
+        own = np.flatnonzero(next_block == block)
+        diagonal[block[own], other[own], columns, place[own], rows] = values[own].transpose(0, 2, 1)
+
+    photos = SHARING + np.arange(models)
+    components = slice(0, COMPONENTS)
+    for apart in range(min(SPAN, models)):
+        size = similarities.size[: models - apart, :, None] * similarities.size[apart:, None]
+        values = errors.component_covariances[: models - apart, apart] / size
+        put(photos[: models - apart], apart, components, components, values)
+    put(photos, 0, STEP, UNKNOWN, similarities.own)
+    put(photos, 1, STEP, UNKNOWN, similarities.following)
+    last = photos[-1:] + 1
+    none = np.append(np.arange(SHARING), np.arange(int(last[0]) + 1, blocks * width))
+    for empty, places in ((none, slice(0, PLACES)), (last, STEP)):
+        unit = np.eye(places.stop - places.start)
+        put(empty, 0, places, places, np.broadcast_to(unit, (len(empty), *unit.shape)))
+
+
+def _subtract_points(base: Numbers, found: Floats, diagonal: Floats, beside: Floats) -> None:
+    """Subtract Z^T D^-1 Z of conditions with whitened windows (n, w 14)."""
+    blocks, height, _ = diagonal.shape
+    width = height // PLACES
+    starts = np.flatnonzero(np.diff(base, prepend=-1))
+    for start, stop in pairwise([*starts.tolist(), len(base)]):
+        block, place = divmod(int(base[start]), width)
+        squares = found[start:stop].T @ found[start:stop]
+        first = place * PLACES
+        inside = height - first  # places of the window in its first block; the others are in the next
+        diagonal[block, first:, first:] -= squares[:inside, :inside]
+        if block + 1 < blocks:
+            rest = len(squares) - inside
+            beside[block, first:, :rest] -= squares[:inside, inside:]
+            diagonal[block + 1, :rest, :rest] -= squares[inside:, inside:]
+
+
+def _subtract_right(base: Numbers, found: Floats, whitened: Floats, right: Floats) -> None:
+    """Subtract Z^T D^-1 w of conditions with whitened windows (n, w, 14) from the right side, photo by photo."""
+    starts = np.flatnonzero(np.diff(base, prepend=-1))
+    if not len(starts):
+        return
+    sums = np.add.reduceat(found * whitened[:, None, None], starts, axis=0)
+    for photo in range(found.shape[1]):
+        right[base[starts] + photo] -= sums[:, photo]

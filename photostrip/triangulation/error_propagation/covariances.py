@@ -15,7 +15,7 @@ from typing import Self
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers, distinct, pieces
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
@@ -76,12 +76,6 @@ class ParameterCovariances:
     along: SimilarityCovariances  # of the formed strip
 
 
-def none_along(errors: StripErrors) -> SimilarityCovariances:
-    """Take the similarities of the models as known."""
-    zero = np.zeros((errors.models + 1, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
-    return SimilarityCovariances(zero, np.zeros((errors.models + 1, SHARING, SIMILARITY_PARAMETERS, COMPONENTS)))
-
-
 def along_strip(errors: StripErrors) -> SimilarityCovariances:
     """Add up the steps from model to model (eq. 4): they correlate over two models, not one.
 
@@ -120,17 +114,15 @@ def of_parameters(
     )
 
 
-def by_images(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
-    """Coefficients (k, 2) of all image coordinates in a weighted sum of rows with d = 1."""
-    images, coefficients = errors.images, by_model(rows)[:, 0]
-    by_first = np.zeros((errors.models + 1, coefficients.shape[1]))
-    add_rows(by_first, rows.first, coefficients * weights[:, None])
-    by_component = _summed_components(errors, by_first[:, :, None])[:, :, 0]
+def by_components(errors: StripErrors, weights: Floats) -> Floats:
+    """Coefficients (k, 2) of all image coordinates in a weighted sum of error components (p, 6)."""
     none = np.zeros((SHARING, COMPONENTS))
-    padded = np.concatenate([none, by_component, none])
+    padded = np.concatenate([none, weights, none])
     around = np.concatenate([padded[slot : slot + errors.models + 1] for slot in range(SPAN)], axis=1)
-    result: Floats = np.einsum("nic,nc->ni", images.components, around[images.photo, MOVED])
-    add_rows(result, rows.image, rows.by_image[:, 0] * weights[rows.item][:, None])
+    result = np.empty((len(errors.images.row), 2))
+    for piece in pieces(len(result)):
+        photos = errors.images.photo[piece]
+        np.einsum("nic,nc->ni", errors.images.components[piece], around[photos, MOVED], out=result[piece])
     return result
 
 
@@ -272,22 +264,6 @@ class NearImages(NamedTuple):
             by_image.reshape(n, 2 * photos * most, size).transpose(0, 2, 1),
             with_components.reshape(n, size, photos + SHARING + 1, COMPONENTS),
         )
-
-
-def local_covariances(errors: StripErrors, rows: ErrorRows, near: NearImages) -> Floats:
-    """Covariances (n, d, d) of rows, ordered by their first models, without the similarities of these."""
-    count, slots, size, _ = rows.by_component.shape
-    result, along = np.empty((count, size, size)), none_along(errors)
-    for some in _slices(rows):
-        part, images = rows.part(some.start, some.stop), near.by_image[some]
-        by = _coefficients(part.without_similarity(), NearImages(images, near.with_components[some]))
-        models = distinct(part.first)
-        matrices = np.zeros((len(models), by.shape[2], SIMILARITY_PARAMETERS + slots * COMPONENTS))
-        _put_halves(matrices, errors, along, models, slots)
-        half = _by_model(by, part.first, matrices)
-        found = half @ by[:, :, : half.shape[2]].transpose(0, 2, 1) + images @ images.transpose(0, 2, 1) / 2
-        result[some] = found + found.transpose(0, 2, 1)
-    return result
 
 
 def _put_halves(

@@ -62,8 +62,8 @@ class StripErrors:
     steps: Floats
     component_covariances: Floats  # (p, 3, 6, 6): Q, of each model with itself, the next and the one after
     points: PointRows
-    # finds errors inside the pairs again: as much memory as a quarter of all else, and not always asked for
-    make_pairs: Callable[[], PairErrors]
+    # finds errors inside the pairs again, section by section: not always asked for
+    sections: Callable[[], Iterator[tuple[Section, PairErrors]]]
     origin: Floats  # (3,): common origin of all similarities
 
     @property
@@ -109,11 +109,9 @@ def differentiate_strip(
     )
     points = _PointsInMaking.of(strip)
     of_scale = np.zeros((2, len(scale), 5))
-    for section in _sections(orientation, formed.junctions):
+    sections = partial(_differentiated, orientation, formed.junctions, rotations, scale, across)
+    for section, part in sections():
         own = section.numbers
-        part = pair_errors.differentiate_pairs(
-            section.orientation, rotations[own], scale[own], None if across is None else across[own]
-        )
         strip.steps[own] = _steps(part, strip.centers[1:][own])
         _add_components(strip.images, section, part, of_scale[:, own])
         points.add(section, part)
@@ -127,22 +125,23 @@ def differentiate_strip(
         steps=strip.steps,
         component_covariances=_component_covariances(strip.images, len(strip.steps)),
         points=rows,
-        make_pairs=partial(pair_errors.differentiate_pairs, orientation, rotations[:-1], scale, across),
+        sections=sections,
         origin=origin,
     )
 
 
-class _Section(NamedTuple):
+class Section(NamedTuple):
     """Some neighbouring pairs, and the one behind them, which shares their last junction and opens the next section."""
 
     numbers: slice  # of these pairs in the strip
     orientation: Orientation  # of these pairs, renumbered
     rows: slice  # in the table of the strip's pairs, of the points of these pairs
     own: int  # how many of these rows belong to the pairs without the one behind
-    junctions: Junctions  # between these pairs; rows and junctions renumbered
+    passes: Numbers  # (t,): rows of the strip's pass points that lie between these pairs
+    junctions: Junctions  # made of these; rows and junctions renumbered
 
 
-def _sections(orientation: Orientation, junctions: Junctions) -> Iterator[_Section]:
+def _sections(orientation: Orientation, junctions: Junctions) -> Iterator[Section]:
     """Cut a strip into sections."""
     ends = np.append(orientation.pairs.starts, len(orientation.pairs.pair))
     for first, stop in runs(ends, SECTION):
@@ -150,16 +149,31 @@ def _sections(orientation: Orientation, junctions: Junctions) -> Iterator[_Secti
         rows = slice(int(ends[first]), int(ends[last]))
         inside = np.flatnonzero((junctions.junction >= first) & (junctions.junction < last - 1))
         joined = take_rows(junctions, inside, JUNCTION_ROWS)
-        yield _Section(
+        yield Section(
             numbers=slice(first, last),
             orientation=orientation.take(np.arange(first, last)),
             rows=rows,
             own=int(ends[stop]) - rows.start,
+            passes=inside,
             junctions=replace(
                 joined,
                 junction=joined.junction - first,
                 before=joined.before - rows.start,
                 after=joined.after - rows.start,
+            ),
+        )
+
+
+def _differentiated(
+    orientation: Orientation, junctions: Junctions, rotations: Floats, scale: Floats, across: Floats | None
+) -> Iterator[tuple[Section, PairErrors]]:
+    """Differentiate a strip section by section; rotations (p + 1, 3, 3) and scales (p,) are those of its pairs."""
+    for section in _sections(orientation, junctions):
+        own = section.numbers
+        yield (
+            section,
+            pair_errors.differentiate_pairs(
+                section.orientation, rotations[own], scale[own], None if across is None else across[own]
             ),
         )
 
@@ -180,7 +194,7 @@ def scale_shares(joined: Junctions, pairs: PairErrors) -> tuple[Floats, Floats]:
     return before, after
 
 
-def _add_components(images: ImagePoints, section: _Section, pairs: PairErrors, of_scale: Floats) -> None:
+def _add_components(images: ImagePoints, section: Section, pairs: PairErrors, of_scale: Floats) -> None:
     """Put in what the image points of a section do to the error components.
 
     A point on photo i enters the elements of the models i - 1 and i directly, and the scale of the models i - 2 to i:
@@ -293,7 +307,7 @@ class _PointsInMaking:
             entry=entry,
         )
 
-    def add(self, section: _Section, pairs: PairErrors) -> None:
+    def add(self, section: Section, pairs: PairErrors) -> None:
         """Put in what the models of a section do to their points."""
         start = section.rows.start
         some = slice(*np.searchsorted(self.rows, [start, start + section.own]).tolist())

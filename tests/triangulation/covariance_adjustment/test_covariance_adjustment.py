@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -20,13 +20,12 @@ from photostrip.triangulation.covariance_adjustment import (
     adjust,
     block_tridiagonal,
     conditions,
-    dense_models,
     prediction,
     relinearisation,
     system,
 )
-from photostrip.triangulation.covariance_adjustment.columns import Columns
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.polynomial import correction
 from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
 from tests.draws import orthogonal_normal
@@ -66,99 +65,182 @@ def prepared(result: Result, *, distances: bool) -> Prepared:
     return found.errors, wanted
 
 
+@dataclass(frozen=True, eq=False)
+class WrittenOut:
+    """The system [Q A; A^T 0] of a strip with everything written out.
+
+    Its conditions are the steps from model to model, without an error of their own, then those of the program.
+    """
+
+    errors: StripErrors
+    to_common: Floats  # (p + 1, 7, 7)
+    steps: int  # conditions that are steps
+    by_images: Floats  # (c, i): all conditions by all image coordinates
+    solution: Floats
+    inverse: Floats
+
+    @classmethod
+    def of(cls, errors: StripErrors, wanted: conditions.Conditions, factor: float) -> WrittenOut:
+        """Build, solve and invert it."""
+        n, rows, to_common = errors.models, wanted.rows, wanted.similarities.to_common
+        count, from_common = 7 * (n - 1), np.linalg.inv(to_common)
+        components = np.broadcast_to(np.eye(6), (n, 1, 6, 6))
+        of_components = written_out(ErrorRows.without_images(np.arange(n), np.zeros((n, 6, 7)), components), errors)
+        by_steps = -from_common[1:n] @ errors.steps[: n - 1] @ of_components[: n - 1]
+        own = written_out(rows.without_similarity(), errors)[:, 0]
+        by_images = np.concatenate([by_steps.reshape(count, own.shape[1]), own])
+        design = np.zeros((len(by_images), 7 * n))
+        for junction in range(n - 1):
+            there = slice(7 * junction, 7 * junction + 7)
+            design[there, there] = -from_common[junction + 1] @ to_common[junction]
+            design[there, there.stop : there.stop + 7] = np.eye(7)
+        for row, model in enumerate(rows.first.tolist()):
+            design[count + row, 7 * model : 7 * model + 7] = rows.by_similarity[row, 0] @ to_common[model]
+        noise = np.concatenate([np.zeros(count), wanted.noise / factor])
+        corner = np.zeros((7 * n, 7 * n))
+        whole = np.block([[by_images @ by_images.T + np.diag(noise), design], [design.T, corner]])
+        solution = np.linalg.solve(whole, np.concatenate([np.zeros(count), wanted.value, np.zeros(7 * n)]))
+        return cls(errors, to_common, count, by_images, solution, np.linalg.inv(whole))
+
+    @property
+    def of_conditions(self) -> slice:
+        return slice(self.steps, len(self.by_images))
+
+    @property
+    def images(self) -> Floats:
+        """Errors of all image coordinates, H^T lambda."""
+        return np.asarray(self.by_images.T @ self.solution[: len(self.by_images)], float)
+
+    def columns(self, rows: ErrorRows) -> tuple[Floats, Floats]:
+        """Rows by all image coordinates, similarities left out, (n, d, i), and their columns b, (n, k, d)."""
+        own = written_out(rows.without_similarity(), self.errors)
+        result = np.zeros((len(rows.first), len(self.solution), own.shape[1]))
+        result[:, : len(self.by_images)] = self.by_images @ own.transpose(0, 2, 1)
+        for row, model in enumerate(rows.first.tolist()):
+            start = len(self.by_images) + 7 * model
+            result[row, start : start + 7] = (rows.by_similarity[row] @ self.to_common[model]).T
+        return own, result
+
+
+every_strip = pytest.mark.parametrize(("photos", "lap"), [(2, 62.0), (3, 60.0), (4, 62.0), (8, 62.0), (9, 80.0)])
+FACTOR = 1.3
+
+
+@cache
+def solved_twice(photos: int, lap: float, *, distances: bool) -> tuple[system.System, WrittenOut]:
+    errors, wanted = prepared(noisy(photos, lap, min(3, photos)), distances=distances)
+    return system.system(errors, wanted, FACTOR), WrittenOut.of(errors, wanted, FACTOR)
+
+
 @pytest.mark.parametrize("distances", [False, True])
-@pytest.mark.parametrize(("photos", "lap"), [(2, 62.0), (3, 60.0), (4, 62.0), (8, 62.0), (9, 80.0)])
+@every_strip
 def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, distances: bool) -> None:
-    """Coordinates, covariances and test values against K [lambda; y] = [w; 0] with everything written out."""
-    result = noisy(photos, lap, min(3, photos))
-    errors, wanted = prepared(result, distances=distances)
-    factor, n = 1.3, errors.models
+    """Correlates, errors of images and entries of the inverse against K [lambda; y] = [w; 0] written out."""
+    solved, whole = solved_twice(photos, lap, distances=distances)
+    result, wanted = noisy(photos, lap, min(3, photos)), solved.conditions
     (strip,), found = result.strips, errors_of(result)
     control = strip.absolute.misclosures[found.control.point, found.control.axis]
     again = conditions.misclosures_at(wanted, strip.of_photos.formed, strip.absolute.similarity, control)
     assert again == pytest.approx(wanted.value, abs=1e-9)
-    solved = system.system(errors, wanted, factor)
-    tables = [errors.points.whole(), prediction.photo_rows(solved)]
-
-    by_images = written_out(wanted.rows.without_similarity(), errors)[:, 0]
-    design = np.zeros((len(wanted.value), 7 * (n + 1)))
-    for row, model in enumerate(wanted.rows.first.tolist()):
-        design[row, 7 * model : 7 * model + 7] = wanted.rows.by_similarity[row, 0]
-        design[row, 7 * model + 7 : 7 * model + 14] = wanted.following[row]
-    design = design[:, : 7 * n]
-    corner = np.zeros((7 * n, 7 * n))
-    whole = np.block([[by_images @ by_images.T + np.diag(wanted.noise / factor), design], [design.T, corner]])
-    solution = np.linalg.solve(whole, np.concatenate([wanted.value, np.zeros(7 * n)]))
-    inverse = np.linalg.inv(whole)
-    cofactors = solved.cofactors
-    assert cofactors == pytest.approx(np.diag(inverse)[: len(cofactors)], abs=1e-8 * np.abs(inverse).max())
-    images = relinearisation.image_errors(solved)
-    expected = by_images.T @ solution[: len(by_images)]
-    assert images.ravel() == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
-    for rows in nonempty(tables):
-        predicted = prediction.errors(solved, rows, images)
-        covariances = prediction.covariances(solved, rows)
-        own = written_out(rows.without_similarity(), errors)
-        size = rows.by_similarity.shape[1]
-        for thing in range(len(rows.first)):
-            column = np.zeros((len(whole), size))
-            column[: len(by_images)] = by_images @ own[thing].T
-            start = len(by_images) + 7 * rows.first[thing]
-            column[start : start + 7] = (rows.by_similarity[thing] @ wanted.local.to_common[rows.first[thing]]).T
-            assert predicted[thing] == pytest.approx(column.T @ solution, abs=1e-9)
-            moved = relinearisation.displacements(errors, rows, images)[thing]
-            assert moved == pytest.approx(own[thing] @ images.ravel(), abs=1e-9)
-            covariance = own[thing] @ own[thing].T - column.T @ inverse @ column
-            assert covariances[thing] == pytest.approx(covariance, abs=1e-8 * np.abs(covariance).max())
-    some = np.random.default_rng(1).permutation(len(errors.points.first))
-    rows = errors.points.take(some).along(np.full((len(some), 3), 3**-0.5))
-    own = written_out(rows.without_similarity(), errors)[:, 0]
-    columns = np.zeros((len(whole), len(some)))
-    columns[: len(by_images)] = by_images @ own.T
-    for thing, model in enumerate(rows.first.tolist()):
-        columns[len(by_images) + 7 * model :, thing][:7] = rows.by_similarity[thing, 0] @ wanted.local.to_common[model]
-    expected = own @ own.T - columns.T @ inverse @ columns
-    joint = prediction.joint_covariance(solved, rows)
-    assert joint == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
+    correlates, largest = whole.solution[whole.of_conditions], np.abs(whole.inverse).max()
+    assert solved.correlates == pytest.approx(correlates, abs=1e-8 * np.abs(correlates).max())
+    assert solved.squares == pytest.approx(wanted.value @ correlates)
+    images = relinearisation.image_errors(solved).ravel()
+    assert images == pytest.approx(whole.images, abs=1e-8 * np.abs(images).max())
+    cofactors = whole.inverse[whole.of_conditions, whole.of_conditions]
+    every = np.arange(len(wanted.value))
+    assert prediction.cofactors_of(solved, every) == pytest.approx(np.diag(cofactors), abs=1e-8 * largest)
+    mixed = np.random.default_rng(2).permutation(every)
+    part = prediction.part_of_inverse(solved, mixed)
+    assert part == pytest.approx(cofactors[np.ix_(mixed, mixed)], abs=1e-8 * largest)
 
 
-@pytest.mark.parametrize("large", [1, 100])
-def test_blocks_are_eliminated_like_any_system(large: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Indefinite blocks of random numbers, some with places left, inverted by parts and at once: as the dense one."""
-    monkeypatch.setattr(block_tridiagonal, "LARGE", large)
+@pytest.mark.parametrize("distances", [False, True])
+@every_strip
+def test_points_and_photos_are_predicted_as_by_the_whole_matrix(photos: int, lap: float, *, distances: bool) -> None:
+    solved, whole = solved_twice(photos, lap, distances=distances)
+    errors, images = solved.errors, relinearisation.image_errors(solved)
+    components = relinearisation.component_errors(errors, images)
+    of_points = prediction.errors(solved, errors.points, images), prediction.covariances(solved, errors.points)
+    of_photos = prediction.photo_errors(solved), prediction.photo_covariances(solved)
+    tables = (errors.points.whole(), of_points), (photo_rows(errors, solved.conditions), of_photos)
+    for rows, (predicted, covariances) in nonempty(tables):
+        own, columns = whole.columns(rows)
+        moved = relinearisation.displacements(components, rows, images)
+        for row in range(len(rows.first)):
+            assert predicted[row] == pytest.approx(columns[row].T @ whole.solution, abs=1e-9)
+            assert moved[row] == pytest.approx(own[row] @ images.ravel(), abs=1e-9)
+            covariance = own[row] @ own[row].T - columns[row].T @ whole.inverse @ columns[row]
+            assert covariances[row] == pytest.approx(covariance, abs=1e-8 * np.abs(covariance).max())
+
+
+@pytest.mark.parametrize("distances", [False, True])
+@every_strip
+def test_points_go_together_as_by_the_whole_matrix(photos: int, lap: float, *, distances: bool) -> None:
+    """Joint covariances of coordinates, and what misclosures do to them."""
+    solved, whole = solved_twice(photos, lap, distances=distances)
+    points, rng = solved.errors.points, np.random.default_rng(1)
+    some = rng.permutation(len(points.first))
+    rows = points.take(some).along(np.full((len(some), 3), 3**-0.5))
+    own, columns = (each.reshape(len(some), -1) for each in whole.columns(rows))
+    expected = own @ own.T - columns @ whole.inverse @ columns.T
+    assert prediction.joint_covariance(solved, rows) == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
+    every = rng.permutation(len(solved.conditions.value))
+    for chosen in nonempty((every[:2], every)):  # the system is solved for these, or for the rows
+        by_conditions = columns @ whole.inverse[:, whole.steps + chosen]
+        for part in (np.arange(1), np.arange(len(some))):
+            found = prediction.influence(solved, rows.take(part), chosen)[:, 0]
+            assert found == pytest.approx(by_conditions[part], abs=1e-8 * np.abs(by_conditions).max())
+
+
+@pytest.mark.parametrize("sigma", [1e-4, 100.0])
+def test_control_of_any_precision_leaves_the_digits_of_points(sigma: float) -> None:
+    """Of 0.1 mm, and 1000 times as uncertain as the strip: conditions of points are eliminated by their squares."""
+    errors, wanted = prepared(noisy(9, 80.0), distances=True)
+    wanted = replace(wanted, noise=np.where(wanted.kind == conditions.CONTROL, sigma**2, 0.0))
+    solved, whole = system.system(errors, wanted, 1.0), WrittenOut.of(errors, wanted, 1.0)
+    own, columns = whole.columns(errors.points.whole())
+    expected = own @ own.transpose(0, 2, 1) - columns.transpose(0, 2, 1) @ whole.inverse @ columns
+    stated, found = (
+        np.sqrt(np.diagonal(each, axis1=1, axis2=2))
+        for each in (expected, prediction.covariances(solved, errors.points))
+    )
+    assert found == pytest.approx(stated, rel=1e-5)
+    predicted = prediction.errors(solved, errors.points, relinearisation.image_errors(solved))
+    assert predicted == pytest.approx(columns.transpose(0, 2, 1) @ whole.solution, abs=1e-6)
+
+
+def photo_rows(errors: StripErrors, wanted: conditions.Conditions) -> ErrorRows:
+    """Rows of the photos, centre and small rotation: each moves with the model on its right, the last with a step."""
+    n = errors.models
+    turn = wanted.similarities.turn  # unknowns are turned and scaled by it, about centres C
+    by_similarity = np.zeros((n + 1, 6, 7))
+    by_similarity[:, :3, :3] = by_similarity[:, 3:, 3:6] = np.eye(3)
+    by_similarity[:, :3, 3:] = -wanted.similarities.to_common[:, :3, 3:] / turn
+    by_component = np.zeros((n + 1, 1, 6, 6))
+    by_component[-1, 0] = by_similarity[-1] @ errors.steps[-1]
+    return ErrorRows.without_images(np.append(np.arange(n), n - 1), by_similarity, by_component)
+
+
+def test_blocks_are_eliminated_like_any_system() -> None:
+    """Indefinite blocks of random numbers: as the dense one."""
     rng, count, height = np.random.default_rng(8), 5, 6
     diagonal, beside = rng.normal(size=(count, height, height)), rng.normal(size=(count, height, height))
     diagonal = diagonal + diagonal.transpose(0, 2, 1) + np.diag([9.0, 9.0, -9.0, 9.0, -9.0, -9.0])
-    beside[-1] = 0.0
-    heights = [6, 5, 6, 6, 4]
-    for number in nonempty((1, 4)):
-        diagonal[number, heights[number] :], diagonal[number, :, heights[number] :] = 0.0, 0.0
-        diagonal[number, range(heights[number], height), range(heights[number], height)] = 1.0
-        beside[number, heights[number] :], beside[number - 1, :, heights[number] :] = 0.0, 0.0
     dense = np.zeros((count, height, count, height))
     for number in range(count):
         dense[number, :, number] = diagonal[number]
         if number + 1 < count:
             dense[number, :, number + 1], dense[number + 1, :, number] = beside[number], beside[number].T
     whole = dense.reshape(count * height, count * height)
-    inverse = np.linalg.inv(whole).reshape(dense.shape)
-    factors = block_tridiagonal.eliminate(diagonal, beside, [[], [1], [2, 3], [1, 2, 5], [3]], heights)
-
+    inverse = np.linalg.inv(whole)
+    factors = block_tridiagonal.eliminate(diagonal, beside)
     right = rng.normal(size=(count, height, 3))
-    for number, rows in enumerate(heights):
-        right[number, rows:] = 0.0
     expected = np.linalg.solve(whole, right.reshape(-1, 3)).reshape(right.shape)
     assert factors.solve(right) == pytest.approx(expected, rel=1e-9)
-    for number, block in nonempty(enumerate(factors.diagonal_of_inverse)):
-        rows = heights[number]
-        assert block == pytest.approx(inverse[number, :rows, number, :rows], abs=1e-9)
-    for number in nonempty(range(1, count - 1)):
-        near = slice(number - 1, number + 2)
-        expected = np.einsum("iajb,jbk->iak", inverse[near, :, near], right[near])
-        assert factors.solve_near(number, right[near]) == pytest.approx(expected, abs=1e-9)
-    block, position = np.array([[0, 1, 0], [4, 4, 4], [3, 2, 2]]), np.array([[3, 0, 1], [3, 3, 0], [2, 2, 4]])
-    entries = inverse[block[:, :, None], position[:, :, None], block[:, None], position[:, None]]
-    assert factors.entries_of_inverse(block, position) == pytest.approx(entries, abs=1e-9)
+    for number in nonempty(range(count)):
+        near = slice(number * height, (number + 2) * height)
+        assert factors.near_diagonal(number) == pytest.approx(inverse[near, near], abs=1e-9)
 
 
 @pytest.mark.parametrize("lap", [60.0, 80.0])
@@ -181,7 +263,7 @@ def bent(photos: int, sigma: float) -> Inputs:
 
 def formed_from_what_is_taken_for_true(result: Result) -> Floats:
     """Lay the strip of the corrected image coordinates on what the adjustment gives the control: all points."""
-    inputs, own = result.inputs, result.strips[0].of_photos.covariance
+    inputs, own = result.inputs, result.strips[0].of_photos.solved
     assert own is not None
     xy, images = inputs.observations.xy.copy(), own.system.errors.images
     xy[images.row] -= relinearisation.image_errors(own.system) * images.sigma
@@ -340,55 +422,3 @@ def test_repetitions_scatter_as_stated() -> None:
         factor = (0.005 / precision.sigma[0]) ** 2 if precision.basis[0] == "a-posteriori" else 1.0
         stated = np.sqrt(factor * np.diagonal(precision.points, axis1=1, axis2=2).mean(axis=0))
         assert stated / np.sqrt(squares[name].mean(axis=0) / 60) == pytest.approx(np.ones(3), abs=0.1)
-
-
-def test_points_on_many_photos_leave_so_many_distances_to_each_junction(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those that are left lie from one side of the strip to the other; nothing else changes; it is said."""
-    whole = prepared(noisy(8, 80.0), distances=True)[1]
-    monkeypatch.setattr(conditions, "MOST_DISTANCES", 20)
-    result = noisy(8, 80.0)
-    errors, wanted = prepared(result, distances=True)
-    most = 20 // errors.points.by_component.shape[1]
-    (strip,) = result.strips
-    joined, every = strip.of_photos.formed.junctions, set(whole.source[whole.kind == conditions.DISTANCE].tolist())
-    left = wanted.source[wanted.kind == conditions.DISTANCE]
-    assert set(left.tolist()) < every
-    for junction in nonempty(np.unique(joined.junction[sorted(every)]).tolist()):
-        of_junction = np.array([each for each in sorted(every) if joined.junction[each] == junction])
-        across = errors.make_pairs().point[joined.after[of_junction], 1]
-        chosen = np.isin(of_junction, left)
-        assert chosen.sum() == min(most, len(of_junction))
-        assert across[chosen].min() == across.min()
-        assert np.ptp(across[chosen]) > 0.5 * np.ptp(across)
-    notes = triangulate(result.inputs, COVARIANCE).notes
-    (note,) = (each for each in notes if each.code == "distances-left-out")
-    assert f"{len(left)} of {len(every)} distances" in note.message
-    auto = Settings(relative=UNSCREENED)
-    compared = triangulate(result.inputs, auto)
-    assert [each for each in compared.notes if each.code == note.code] == [note]
-    monkeypatch.setattr("photostrip.pipeline.strips.choosing.method_of", lambda _: "polynomial")
-    taken = triangulate(result.inputs, auto)
-    choice = taken.strips[0].choice
-    assert choice is not None
-    assert choice.taken == "polynomial"
-    assert [each for each in taken.notes if each.code == note.code] == [note]
-    monkeypatch.undo()
-    assert note.code not in {each.code for each in triangulate(result.inputs, COVARIANCE).notes}
-
-
-@pytest.mark.parametrize(("photos", "lap"), [(2, 62.0), (9, 62.0), (9, 80.0)])
-def test_many_points_of_a_model_get_their_covariances_together(photos: int, lap: float) -> None:
-    """A strip of 2000 points a photo took 41 s and 3.2 GB, a product with the inverse for each coordinate."""
-    errors, wanted = prepared(noisy(photos, lap, min(3, photos)), distances=True)
-    solved = system.system(errors, wanted, 1.3)
-    some = errors.points.take(np.random.default_rng(1).permutation(len(errors.points.first))[::2])
-    one_by_one = prediction.covariances(solved, some)
-    copies = errors.points.take(np.repeat(np.arange(len(errors.points.first)), 40))
-    assert dense_models.are_dense(Columns.of(solved, copies))
-    assert not dense_models.are_dense(Columns.of(solved, some))
-    columns = Columns.of(solved, some.take(np.argsort(some.first, kind="stable")))
-    direct, together = prediction._explained(columns), dense_models.explained(columns)
-    assert together == pytest.approx(direct, abs=1e-12 * np.abs(direct).max())
-    assert prediction.covariances(solved, copies)[::40] == pytest.approx(
-        prediction.covariances(solved, errors.points.whole()), abs=1e-12 * np.abs(one_by_one).max()
-    )

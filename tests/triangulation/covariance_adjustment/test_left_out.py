@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from photostrip.triangulation.covariance_adjustment import (
-    block_tridiagonal,
-    columns,
     conditions,
     prediction,
     relinearisation,
@@ -36,7 +34,9 @@ def test_groups_are_predicted_as_without_them(photos: int, lap: float) -> None:
         without = conditions.conditions(*parts, control.take(rest), given[rest])
         rest_alone, there = system.system(found.errors, without, FACTOR), control.take(rows).rows
         images = relinearisation.image_errors(rest_alone)
-        error = given[rows] - prediction.errors(rest_alone, there, images)[:, 0]
+        predicted = prediction.errors(rest_alone, rest_alone.errors.points, images)[strip.control_rows]
+        along = np.einsum("wi,wi->w", control.direction[rows], predicted[control.point[rows]])
+        error = given[rows] - along
         assert left_out.errors == pytest.approx(error, abs=1e-7)
         variance = prediction.covariances(rest_alone, there)[:, 0, 0] + control.variance[rows] / FACTOR
         if len(rows) == 1:
@@ -55,8 +55,13 @@ def test_a_strip_predicts_the_same_in_parts_of_which_some_hold_no_wanted_coordin
     solved = system.system(found.errors, conditions.conditions(*parts, found.control, given), FACTOR)
     wanted = found.control.take(np.arange(3)).rows
     at_once = prediction.joint_covariance(solved, wanted)
-    monkeypatch.setattr(columns, "AT_A_TIME", 1)
+    every = found.errors.points
+    covariances = prediction.covariances(solved, every)
+    monkeypatch.setattr(system, "AT_A_TIME", 1)
     assert prediction.joint_covariance(solved, wanted) == pytest.approx(at_once)
+    assert prediction.covariances(solved, every) == pytest.approx(covariances)
+    again = system.system(found.errors, solved.conditions, FACTOR)
+    assert again.solution == pytest.approx(solved.solution)
 
 
 def test_control_that_alone_holds_the_strip_cannot_be_predicted() -> None:
@@ -94,25 +99,5 @@ def test_points_that_take_no_part_have_the_covariances_of_an_adjustment_without_
     assert along.reshape(6, 6) == pytest.approx(prediction.joint_covariance(alone, there.rows), rel=1e-6, abs=1e-9)
     of_height = Without.of(solved, np.flatnonzero((control.point == 4) & (control.axis == 2)))
     assert of_height.points(control, FACTOR).covariance.shape == (0, 3, 0, 3)
-    assert left_out.change.solution == pytest.approx(
-        -np.einsum("gbc,cd,d->gb", left_out.columns, left_out.inverse, solved.correlates[left_out.rows]), abs=1e-9
-    )
-
-
-@pytest.mark.parametrize("blocks", [[0], [0, 1, 1, 3], [3, 0, 3, 2]])
-def test_a_part_of_the_inverse_is_that_of_the_whole_inverse(blocks: list[int]) -> None:
-    rng, n, b = np.random.default_rng(5), 4, 3
-    whole = np.zeros((n * b, n * b))
-    diagonal, beside = rng.normal(size=(n, b, b)), rng.normal(size=(n, b, b))
-    diagonal += diagonal.transpose(0, 2, 1) + 6 * np.eye(b)
-    for number in range(n):
-        own = slice(number * b, (number + 1) * b)
-        whole[own, own] = diagonal[number]
-        if number + 1 < n:
-            after = slice(own.stop, own.stop + b)
-            whole[own, after], whole[after, own] = beside[number], beside[number].T
-    block, position = np.array(blocks), np.array([1, 0, 2, 2])[: len(blocks)]
-    place = block * b + position
-    expected = np.linalg.inv(whole)[np.ix_(place, place)]
-    factors = block_tridiagonal.eliminate(diagonal, beside, [[]] * n, [b] * n)
-    assert factors.part_of_inverse(block, position) == pytest.approx(expected)
+    change = left_out.columns.columns @ left_out.inverse @ solved.correlates[left_out.rows]
+    assert left_out.change.solution.ravel() == pytest.approx(-change, abs=1e-9)

@@ -1,0 +1,187 @@
+"""Rows after the conditions of their points were eliminated: products with the inverse of the whole system.
+
+The column b of a row has its covariances with the conditions of its own point, and its window. With the own covariances
+D = L L^T of these conditions and their windows Z, b^T K^-1 b' = s^T s' + z^T S^-1 z' where s = L^-1 of the covariances,
+z = window - s^T L^-1 Z, and S is what is left of K. A condition itself is a row of which b is a unit vector.
+
+Source: derived; see docs/precision.md, eq. 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.frozen import NamedTuple, dataclass
+from photostrip.triangulation.covariance_adjustment.system import System, same_images
+from photostrip.triangulation.covariance_adjustment.windows import PLACES, windows
+from photostrip.triangulation.error_propagation.covariances import NearImages
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows, ranges
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """Rows of d coordinates, ordered by the first models of their points."""
+
+    base: Numbers  # (n,): first model
+    window: Floats  # (n, d, w, 14): z
+    condition: Numbers  # (n,): first condition of their points; of points without any, of another
+    own: Floats  # (n, k, d): s, of the conditions from there on
+
+    @property
+    def by_coordinate(self) -> Reduced:
+        """Each coordinate as a row of its own."""
+        size = self.own.shape[2]
+        return Reduced(
+            base=np.repeat(self.base, size),
+            window=self.window.reshape(-1, 1, *self.window.shape[2:]),
+            condition=np.repeat(self.condition, size),
+            own=self.own.transpose(0, 2, 1).reshape(len(self.base) * size, -1, 1),
+        )
+
+    @property
+    def starts(self) -> Iterator[tuple[int, slice]]:
+        """Go through their models: number, and rows."""
+        begins = np.flatnonzero(np.diff(self.base, prepend=-1)).tolist()
+        for start, stop in pairwise([*begins, len(self.base)]):
+            yield int(self.base[start]), slice(start, stop)
+
+
+class Solved(NamedTuple):
+    """Rows of one coordinate, and S^-1 z of them."""
+
+    rows: Reduced
+    columns: Floats  # (g b, c)
+
+
+def of_rows(found: System, rows: ErrorRows, near: NearImages) -> Reduced:
+    """Reduce rows that are ordered by the first models of their points."""
+    conditions, count, size = found.conditions, *rows.by_similarity.shape[:2]
+    result = Reduced(
+        base=rows.first,
+        window=windows(found.similarities, rows, near.with_components, rows.first, found.width + 1),
+        condition=np.full(count, -1),
+        own=np.zeros((count, found.roots.root.shape[1], size)),
+    )
+    begin, end = np.searchsorted(conditions.base, rows.first[[0, -1]] + [0, 1]).tolist() if count else (0, 0)
+    shared = same_images(rows, conditions.rows.part(begin, end))
+    first = found.roots.start[shared.second + begin]
+    result.condition[shared.first] = first
+    np.add.at(result.own, (shared.first, shared.second + begin - first), shared.value[:, :, 0])
+    _reduce(found, result)
+    return result
+
+
+def of_conditions(found: System, chosen: Numbers) -> Reduced:
+    """Reduce the unit vectors of some conditions, which are in the order of all."""
+    count, start = len(chosen), found.roots.start[chosen]
+    result = Reduced(
+        base=found.conditions.base[chosen],
+        window=np.zeros((count, 1, found.width + 1, PLACES)),
+        condition=start,
+        own=np.zeros((count, found.roots.root.shape[1], 1)),
+    )
+    result.own[np.arange(count), chosen - start] = 1.0
+    _reduce(found, result)
+    return result
+
+
+def _reduce(found: System, result: Reduced) -> None:
+    """Multiply s of rows by L^-1, and subtract s^T L^-1 Z from their windows."""
+    rows = np.flatnonzero(result.condition >= 0)
+    chosen = found.roots.of_points(distinct(result.condition[rows]))
+    roots, whitened = found.roots.take(chosen), found.windows(chosen)
+    first, plain = np.searchsorted(chosen, result.condition[rows]), result.own[rows]
+    for place in range(roots.root.shape[1]):
+        row = np.minimum(first + place, len(chosen) - 1)
+        here = np.flatnonzero((row == first + place) & (roots.start[row] == first))
+        own = (roots.root[row[here], None] @ plain[here])[:, 0]
+        result.own[rows[here], place] = own
+        result.window[rows[here]] -= own[:, :, None, None] * whitened[row[here], None]
+
+
+def solved(found: System, rows: Reduced) -> Solved:
+    """Solve for the windows of rows of one coordinate."""
+    blocks, height = found.solution.shape
+    right = np.zeros((blocks * found.width + found.width + 1, PLACES, len(rows.base)))
+    number = np.arange(len(rows.base))
+    for photo in range(found.width + 1):
+        right[rows.base + photo, :, number] = rows.window[:, 0, photo]
+    columns = found.factors.solve(right[: blocks * found.width].reshape(blocks, height, -1))
+    return Solved(rows, columns.reshape(blocks * height, -1))
+
+
+def products(rows: Reduced, others: Solved) -> Floats:
+    """Give b^T K^-1 b' of rows with others, shape (n, d, c)."""
+    result = _own_products(rows, others.rows)
+    count, size, photos, _ = rows.window.shape
+    window = rows.window.reshape(count, size, photos * PLACES)
+    for base, some in rows.starts:
+        columns = others.columns[base * PLACES :][: photos * PLACES]
+        result[some] += window[some, :, : len(columns)] @ columns
+    return result
+
+
+def squares(found: System, rows: Reduced) -> Floats:
+    """Give b^T K^-1 b of each row, shape (n, d, d)."""
+    count, size, photos, _ = rows.window.shape
+    window = rows.window.reshape(count * size, photos * PLACES)
+    through, number, inverse = np.empty_like(window), -1, np.zeros((0, 0))
+    for base, some in rows.starts:
+        block, place = divmod(base, found.width)
+        if block > number:
+            number, inverse = block, found.factors.near_diagonal(block)
+        near = inverse[place * PLACES :, place * PLACES :][: photos * PLACES, : photos * PLACES]
+        own = slice(some.start * size, some.stop * size)  # beyond the last photo windows are 0
+        np.matmul(window[own, : len(near)], near, out=through[own, : len(near)])
+        through[own, len(near) :] = 0.0
+    result = rows.own.transpose(0, 2, 1) @ rows.own
+    result += window.reshape(count, size, -1) @ through.reshape(count, size, -1).transpose(0, 2, 1)
+    return np.asarray(result, float)
+
+
+def squares_and_products(found: System, rows: Reduced) -> Floats:
+    """Give b^T K^-1 b' of rows of one coordinate with each other, shape (n, n).
+
+    With S eliminated from the first block on, a window becomes r in its two blocks and all later ones, and z^T S^-1 z'
+    = sum r^T P^-1 r'. What blocks behind both windows add to it is said by the inverse on the diagonal.
+    """
+    factors, count, height = found.factors, len(rows.base), found.solution.shape[1]
+    own = _own_products(rows, rows)[:, 0]
+    by_photo = np.zeros((count, 2 * found.width, PLACES))
+    place = rows.base % found.width
+    for photo in range(found.width + 1):
+        by_photo[np.arange(count), place + photo] = rows.window[:, 0, photo]
+    columns = by_photo.reshape(count, 2, height)
+    ends = np.searchsorted(rows.base // found.width, np.arange(len(factors.inverses) + 1))
+    reduced = np.zeros((height, 0))
+    for number, (start, stop) in enumerate(pairwise(ends.tolist())):
+        before = int(ends[max(number - 1, 0)])
+        right = np.zeros((height, stop))
+        right[:, before:start] = columns[before:start, 1].T
+        right[:, start:] = columns[start:stop, 0].T
+        if number:
+            right[:, :start] -= factors.shares[number - 1].T @ reduced
+        reduced = right
+        for weight, some in (
+            (factors.diagonal_of_inverse[number], slice(before, start)),
+            (factors.inverses[number], slice(start, stop)),
+        ):
+            own[: some.stop, some] += reduced[:, : some.stop].T @ (weight @ reduced[:, some])
+    upper = np.triu(own)
+    return np.asarray(upper + np.triu(upper, 1).T, float)
+
+
+def _own_products(rows: Reduced, others: Reduced) -> Floats:
+    """Give s^T s' of rows with others of one coordinate, shape (n, d, c): of the same points."""
+    result = np.zeros((len(rows.base), rows.own.shape[2], len(others.base)))
+    some, order = np.flatnonzero(rows.condition >= 0), np.argsort(others.condition, kind="stable")
+    condition = others.condition[order]
+    wanted = rows.condition[some]
+    first, place = ranges(np.searchsorted(condition, wanted), np.searchsorted(condition, wanted, side="right"))
+    row, other = some[first], order[place]
+    result[row, :, other] = (rows.own[row].transpose(0, 2, 1) @ others.own[other])[:, :, 0]
+    return result
