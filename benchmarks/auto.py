@@ -5,10 +5,13 @@ overlap, control (corners, or bands of two or three points) and in what no stand
 error of 5 µm that all photos share, or a film error of 5 µm of each photo by itself, both smooth over the photo. Errors
 are those of all points that are not control, the geometric mean of plan and height. Printed are the best of similarity,
 polynomial and covariance in the cell, auto divided by it, the same in the worst single strip, and how often auto took
-the polynomial; at the end the same with other limits of what left-out errors may exceed.
+the polynomial; at the end the same with other limits of what left-out errors may exceed, and of how far the results of
+two methods that predict the same may be apart.
+
+With --dense there are ten more new points in each model, and a band of three or five control points on every photo.
 
 Usage: python benchmarks/auto.py [--seeds N] [--photos N ...] [--overlap PERCENT ...] [--errors none lens film]
-       [--undescribed MICROMETRES]
+       [--undescribed MICROMETRES] [--dense]
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +41,7 @@ from photostrip.pipeline.strips.forming import form_strips  # noqa: E402
 from photostrip.pipeline.strips.stages import Stages  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
+from photostrip.triangulation.covariance_adjustment.settings import BETTER  # noqa: E402
 from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:
@@ -55,12 +60,14 @@ AUTO = "auto"
 METHODS = ("similarity", "polynomial", "covariance")
 PHOTOS, OVERLAPS, ERRORS = (6, 10), (60.0, 80.0), ("none", "lens", "film")
 BANDS, PER_BAND = (2, 3, 4, 6, 12), (3, 2)
+DENSE_PER_BAND, DENSE_EXTRA = (3, 5), 10
 LONG = 50  # photos from which on one overlap and fewer strips do
 UNDESCRIBED = 5.0  # micrometres, rms over a photo
 HALF = 115.0  # mm, half a photo
 IN_MEAN, IN_ONE = 1.05, 1.2  # times the errors of the best method that auto may have, in a cell and in a strip
 CENTIMETRES = 100.0
 LIMITS = (MOST_EXCESS / 2, MOST_EXCESS, 2 * MOST_EXCESS, np.inf)  # of the excess of left-out errors
+LEAST = (0.0, 2 * BETTER - 1, BETTER, (1 + BETTER) / 2)  # ratio of errors with which results are taken to agree
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,7 @@ class Cell:
     per_band: int
     error: str
     undescribed: float = UNDESCRIBED  # micrometres
+    extra: int = 2  # new points of a model beside those of the rows
 
     @property
     def control(self) -> str:
@@ -85,7 +93,7 @@ class Cell:
             seed=seed,
             camera=replace(FILM, principal_distance=153.0),
             flight=Flight(photos=self.photos, end_lap_percent=self.overlap),
-            points=Points(rows=5, reach_percent=75.0, extra_per_model=2),
+            points=Points(rows=5, reach_percent=75.0, extra_per_model=self.extra),
             control=Control(
                 bands=self.bands,
                 per_band=self.per_band,
@@ -113,12 +121,14 @@ class Row:
         """What auto took in each strip."""
         return tuple("polynomial" if choice is None else choice.taken for choice in self.choices)
 
-    def at(self, most: float) -> Row:
-        """Give the cell as it were with another limit of what left-out errors may exceed."""
+    def at(self, most: float = MOST_EXCESS, least: float = BETTER) -> Row:
+        """Give the cell as it were with other limits of what left-out errors may exceed and of results that agree."""
         cell = self.cell
 
         def decided(choice: Choice) -> Choice:
-            taken = decide(choice.predicted, choice.left_out, choice.excess, cell.bands, cell.photos - 1, most)
+            agree = choice.predicted.for_polynomial and not choice.expected.ratio < least
+            by_both = "polynomial" if agree else "covariance"
+            taken = decide(by_both, choice.left_out, choice.excess, cell.bands, cell.photos - 1, most)
             return replace(choice, taken=taken)
 
         row = replace(self, choices=tuple(choice and decided(choice) for choice in self.choices))
@@ -151,6 +161,14 @@ def cells(
             for bands, per_band in layouts:
                 if bands <= count:
                     yield from (Cell(count, overlap, bands, per_band, error, undescribed) for error in errors)
+
+
+def dense_cells(
+    photos: Sequence[int], overlaps: Sequence[float], errors: Sequence[str], undescribed: float = UNDESCRIBED
+) -> Iterator[Cell]:
+    """Give cells with a band on every photo."""
+    for count, overlap, per_band, error in product(photos, overlaps, DENSE_PER_BAND, errors):
+        yield Cell(count, overlap, count, per_band, error, undescribed, DENSE_EXTRA)
 
 
 def smooth_error(xy: Floats, rng: np.random.Generator, size: float) -> Floats:
@@ -246,18 +264,19 @@ def summary_of(rows: Sequence[Row]) -> str:
 
 
 def limits_of(rows: Sequence[Row]) -> str:
-    """Say what other limits of the excess of left-out errors would have brought."""
-    lines = [
-        "| most excess | auto / best, mean | worst cell | worst strip | polynomial taken |",
-        "|---|---|---|---|---|",
-    ]
-    for most in LIMITS:
-        found = [row.at(most) for row in rows]
-        ratios = [row.ratio for row in found]
-        mean, taken = np.exp(np.log(ratios).mean()), sum(row.taken.count("polynomial") for row in found)
-        worst = max(row.worst for row in found)
-        lines.append(f"| {most:g} | {mean:.3f} | {max(ratios):.2f} | {worst:.2f} | {taken} |")
-    return "\n".join(lines)
+    """Say what other limits of the excess of left-out errors, and of results that agree, would have brought."""
+    by_most = [_at(f"{most:g}", [row.at(most) for row in rows]) for most in LIMITS]
+    by_least = [_at(f"{least:g}", [row.at(least=least) for row in rows]) for least in LEAST]
+    heads = "auto / best, mean | worst cell | worst strip | polynomial taken |\n|---|---|---|---|---|"
+    tables = (("most excess", by_most), ("least ratio with the results", by_least))
+    return "\n\n".join("\n".join((f"| {name} | {heads}", *lines)) for name, lines in tables)
+
+
+def _at(limit: str, rows: Sequence[Row]) -> str:
+    """Give what all cells come to as a line of the table of a limit."""
+    ratios = [row.ratio for row in rows]
+    mean, taken = np.exp(np.log(ratios).mean()), sum(row.taken.count("polynomial") for row in rows)
+    return f"| {limit} | {mean:.3f} | {max(ratios):.2f} | {max(row.worst for row in rows):.2f} | {taken} |"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -268,10 +287,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--overlap", type=float, nargs="+", default=OVERLAPS)
     parser.add_argument("--errors", nargs="+", choices=ERRORS, default=ERRORS)
     parser.add_argument("--undescribed", type=float, default=UNDESCRIBED, help="rms over a photo, micrometres")
+    parser.add_argument("--dense", action="store_true", help="a band on every photo, and more new points")
     asked = parser.parse_args(arguments)
     sys.stdout.write(f"| {' | '.join(HEADS)} |\n|{'---|' * len(HEADS)}\n")
     rows = []
-    for cell in cells(asked.photos, asked.overlap, asked.errors, asked.undescribed):
+    every = dense_cells if asked.dense else cells
+    for cell in every(asked.photos, asked.overlap, asked.errors, asked.undescribed):
         rows.append(row_of(cell, max(1, asked.seeds // 5) if cell.photos > LONG else asked.seeds))
         sys.stdout.write(line_of(rows[-1]) + "\n")
         sys.stdout.flush()

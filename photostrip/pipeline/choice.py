@@ -32,6 +32,11 @@ class Witness:
         known = logs[~np.isnan(logs)]
         return float(np.exp(known.mean())) if len(known) else float("nan")
 
+    @property
+    def for_polynomial(self) -> bool:
+        """Whether the covariance does not do better, so that the polynomial of the textbook may stay."""
+        return not self.ratio < BETTER
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -39,15 +44,27 @@ class Choice:
 
     taken: str  # ``"polynomial"`` or ``"covariance"``
     predicted: Witness  # standard deviations of new points
+    # difference: of both results at these points, rms in plan (of one coordinate) and in height, metres
+    difference: tuple[float, float]
     left_out: Witness | None  # errors at control left out; None where the rest determines none of it
     left_out_by: str  # ``"band"`` or ``"point"``: what was left out at a time
     excess: float  # those of the covariance over what it lets expect; NaN without any
     distances: int  # that the adjustment with the covariance used
 
     @property
+    def expected(self) -> Witness:
+        """Errors to be expected of new points, both results being known."""
+        return expected_of(self.predicted, self.difference)
+
+    @property
+    def apart(self) -> bool:
+        """Whether the results differ by more than standard deviations that agree let expect."""
+        return self.predicted.for_polynomial and not self.expected.for_polynomial
+
+    @property
     def contradicted(self) -> bool:
         """Whether the errors at left-out control decided against the standard deviations."""
-        return self.taken != method_of(self.predicted.ratio)
+        return self.taken != method_of(self.predicted, self.expected)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +81,20 @@ class Deformation:
         return self.polynomial if self.covariance is None else None
 
 
-def method_of(ratio: float) -> str:
-    """Give the method that the ratio of its standard deviations or errors speaks for."""
-    return COVARIANCE if ratio < BETTER else POLYNOMIAL
+def expected_of(predicted: Witness, difference: tuple[float, float]) -> Witness:
+    """Give the errors to be expected of both methods once their results are known.
+
+    The covariance gives the best linear unbiased estimate: by how much any other differs from it is independent of its
+    error. So what is to be expected of the polynomial is that error and the difference as it is.
+
+    difference: of the results, rms in plan (of one coordinate) and in height, metres.
+
+    Source: derived; docs/method.md.
+    """
+    plan, height = np.hypot(predicted.covariance, difference).tolist()
+    return Witness((plan, height), predicted.covariance, predicted.count)
+
+
+def method_of(predicted: Witness, expected: Witness) -> str:
+    """Give the polynomial where the methods agree before their results are known, and with them."""
+    return POLYNOMIAL if predicted.for_polynomial and expected.for_polynomial else COVARIANCE

@@ -8,13 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from photostrip.pipeline.choice import POLYNOMIAL, Witness, method_of
+from benchmarks.auto import Cell, errors_of
+from photostrip.pipeline.choice import COVARIANCE, POLYNOMIAL, Witness, expected_of, method_of
 from photostrip.pipeline.inputs import AUTO, METHODS
 from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips import choosing
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import sections_of
+from photostrip.report.sections.decisions import choices_in_short
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
@@ -37,6 +39,7 @@ USUAL = Spec(
 )
 SPECS = {
     "dense": DENSE,
+    "apart": replace(DENSE, seed=35),
     "usual": USUAL,
     "corners": replace(USUAL, control=replace(USUAL.control, bands=2, per_band=2)),
     "long": replace(USUAL, flight=Flight(photos=300), control=replace(USUAL.control, every=20)),
@@ -62,8 +65,32 @@ def test_a_short_strip_with_dense_control_keeps_its_polynomial() -> None:
     assert strip.choice is not None
     assert strip.choice.taken == "polynomial"
     assert strip.choice.predicted.ratio > BETTER
+    assert strip.choice.expected.ratio > BETTER
     assert strip.of_photos.covariance is None
     assert points_of(adjusted("dense")) == points_of(adjusted("dense", "polynomial"))
+
+
+def test_most_short_strips_with_dense_control_keep_their_polynomial() -> None:
+    taken = []
+    for seed in nonempty(range(1, 21)):
+        simulation = simulate(replace(DENSE, seed=seed))
+        settings = replace(settings_of(simulation), precision=False)
+        choice = triangulate(inputs_of(simulation), settings).strips[0].choice
+        assert choice is not None
+        assert choice.predicted.for_polynomial
+        taken.append(choice.taken)
+    assert 14 <= taken.count(POLYNOMIAL) < len(taken)  # 16
+
+
+def test_a_strip_whose_results_are_apart_gets_its_covariance() -> None:
+    """Control at both ends of 100 photos alone: 125 m by the polynomial, 96 m by the covariance."""
+    errors, choice = errors_of(Cell(100, 60.0, 2, 3, "lens"), 77)
+    assert choice is not None
+    assert choice.predicted.ratio > BETTER > choice.expected.ratio
+    assert (choice.taken, choice.apart, choice.contradicted) == (COVARIANCE, True, False)
+    assert errors["auto"].tolist() == errors["covariance"].tolist()
+    by_polynomial, by_covariance = (np.sqrt(errors[each].prod()) for each in ("polynomial", "covariance"))
+    assert by_polynomial > 1.25 * by_covariance > 100.0
 
 
 @pytest.mark.parametrize("name", ["usual", "corners", pytest.param("long", marks=pytest.mark.slow)])
@@ -105,8 +132,40 @@ def test_a_lens_error_that_no_calibration_knows_brings_the_polynomial_back() -> 
 def test_left_out_errors_decide_where_they_exceed_what_is_to_be_expected_between_bands(
     models: int, bands: int, excess: float, covariance: float, taken: str
 ) -> None:
-    predicted, left_out = Witness((1.0, 1.0), (0.5, 0.5), 100), Witness((1.0, 1.0), (covariance, covariance), 1)
-    assert choosing.decide(predicted, left_out, excess, bands, models) == taken
+    left_out = Witness((1.0, 1.0), (covariance, covariance), 1)
+    assert choosing.decide(COVARIANCE, left_out, excess, bands, models) == taken
+    assert choosing.decide(POLYNOMIAL, left_out, excess, bands, models) == POLYNOMIAL
+
+
+@pytest.mark.parametrize(
+    ("predicted", "difference", "taken"),
+    [
+        (0.91, (0.0, 0.0), "polynomial"),
+        (0.89, (0.0, 0.0), "covariance"),  # it does better, however near the results are
+        (0.91, (0.48, 0.48), "polynomial"),  # 1 / hypot(1, 0.48) = 0.902
+        (0.91, (0.49, 0.49), "covariance"),  # 0.898
+        (0.91, (0.0, 0.70), "polynomial"),  # the geometric mean of plan and height counts: 0.905
+        (0.91, (0.0, 0.75), "covariance"),  # 0.894
+    ],
+)
+def test_the_polynomial_stays_where_predictions_and_results_agree(
+    predicted: float, difference: tuple[float, float], taken: str
+) -> None:
+    before = Witness((1.0 / predicted, 1.0 / predicted), (1.0, 1.0), 100)
+    assert method_of(before, expected_of(before, difference)) == taken
+
+
+def test_the_error_of_the_covariance_and_the_difference_of_the_results_are_independent() -> None:
+    """So their squares add: what the ratio with the results says is what the errors come to, in the mean of strips."""
+    cell, ratios, realised = Cell(6, 60.0, 2, 3, "none"), [], []
+    for seed in nonempty(range(1, 41)):
+        errors, choice = errors_of(cell, seed)
+        assert choice is not None
+        ratios.append(choice.expected.ratio)
+        realised.append(np.sqrt((errors["covariance"] / errors["polynomial"]).prod()))
+    expected, found = np.exp(np.log([ratios, realised]).mean(axis=1))
+    assert found == pytest.approx(expected, rel=0.1)
+    assert np.corrcoef(np.log(ratios), np.log(realised))[0, 1] > 0.3  # standard deviations alone tell strips not apart
 
 
 def test_standard_deviations_are_those_that_either_run_states() -> None:
@@ -124,6 +183,19 @@ def test_standard_deviations_are_those_that_either_run_states() -> None:
         stated = np.sqrt([mean[:2].mean(), mean[2]])
         assert getattr(choice.predicted, method) == pytest.approx(tuple(stated), rel=1e-9)
     assert choice.predicted.count == len(new)
+
+
+def test_the_difference_is_that_of_both_results() -> None:
+    choice = adjusted("usual").strips[0].choice
+    first, second = (adjusted("usual", method) for method in ("polynomial", "covariance"))
+    assert choice is not None
+    new = np.setdiff1d(np.arange(len(first.points.number)), first.control_rows)
+    apart = (first.points.cartesian - second.points.cartesian)[new] @ first.strips[0].intermediate.axes
+    mean = (apart**2).mean(axis=0)
+    assert choice.difference == pytest.approx((np.sqrt(mean[:2].mean()), np.sqrt(mean[2])), rel=1e-6)
+    of_covariance = np.array(choice.predicted.covariance)
+    both = of_covariance / np.hypot(of_covariance, choice.difference)
+    assert choice.expected.ratio == pytest.approx(np.sqrt(both.prod()))
 
 
 @pytest.mark.parametrize("method", [each for each in METHODS if each != "bundle"])
@@ -152,13 +224,33 @@ def test_the_result_says_what_was_taken_and_why() -> None:
     first, second = (f"{each['plan']:.3f}/{each['height']:.3f} m" for each in figures)
     assert f"standard deviations of new points {first} with the polynomial, {second} with the covariance" in text
     assert "weighed and not taken: the strip was adjusted with its covariance" in text
+    difference = choice["difference"]
+    assert difference["ratio"] < 1
+    apart = f"{difference['plan']:.3f}/{difference['height']:.3f} m (ratio with that {difference['ratio']:.2f})"
+    assert f"; the results differ by {apart}; errors at" in text
     assert document_of(adjusted.__wrapped__("usual")) == document
+
+
+def test_the_result_says_that_the_results_are_apart() -> None:
+    document = document_of(adjusted("apart"))
+    (choice,) = document["choices"]
+    assert (choice["taken"], choice["apart"], choice["contradicted"]) == ("covariance", True, False)
+    assert choice["predicted"]["ratio"] > BETTER > choice["difference"]["ratio"]
+    text = " ".join(to_text("", sections_of(document), 100).split())
+    assert "covariance, because the results differ by more than predictions that agree within 10 % let expect:" in text
+    ratios = [f"{choice[each]['ratio']:.2f}" for each in ("predicted", "difference", "left_out")]
+    ((_, line),) = choices_in_short(document)
+    first, known, left_out = ratios
+    assert line.endswith(f"polynomial: σ {first}, with the results {known}, left-out errors {left_out}")
+    (near,) = document_of(adjusted("dense"))["choices"]
+    assert (near["taken"], near["apart"]) == ("polynomial", False)
 
 
 def test_witnesses_that_tell_nothing_leave_the_polynomial() -> None:
     nothing = (float("nan"), float("nan"))
     assert np.isnan(Witness(nothing, nothing, 0).ratio)
-    assert method_of(Witness(nothing, nothing, 0).ratio) == POLYNOMIAL
+    silent = Witness(nothing, nothing, 0)
+    assert method_of(silent, expected_of(silent, (1.0, 1.0))) == POLYNOMIAL
     assert Witness((2.0, float("nan")), (1.0, 3.0), 1).ratio == pytest.approx(0.5)
 
 

@@ -6,6 +6,9 @@ turn, the same for both, tell what no standard deviation knows. They are few, an
 differ, so the standard deviations decide, as long as the left-out errors are such as these let expect. A lens that is
 not what its calibration says makes them many times larger; then the errors decide.
 
+Standard deviations that agree are those of many strips; in the one at hand the two results can be far apart all the
+same. So the polynomial stays only where the results agree too.
+
 Source: derived; docs/method.md.
 """
 
@@ -17,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.pipeline.choice import POLYNOMIAL, Choice, Witness, method_of
+from photostrip.pipeline.choice import POLYNOMIAL, Choice, Witness, expected_of, method_of
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
@@ -39,12 +42,16 @@ MOST_POINTS = 300  # new points whose standard deviations are compared, spread l
 
 def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Choice:
     """Decide between the polynomial of a strip and its adjustment with its own covariance."""
-    predicted = _predicted(oriented, polynomial, covariance)
+    points = _compared(oriented)
+    predicted = _predicted(oriented, polynomial, covariance, points)
+    difference = _difference(oriented, polynomial, covariance, points)
+    by_both = method_of(predicted, expected_of(predicted, difference))
     groups, by = _groups(oriented, polynomial)
     left_out, excess = _left_out(oriented, polynomial, covariance, groups)
     return Choice(
-        taken=decide(predicted, left_out, excess, len(distinct(_bands(oriented))), oriented.errors.models),
+        taken=decide(by_both, left_out, excess, len(distinct(_bands(oriented))), oriented.errors.models),
         predicted=predicted,
+        difference=difference,
         left_out=left_out,
         left_out_by=by,
         excess=excess,
@@ -53,26 +60,35 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
 
 
 def decide(
-    predicted: Witness,
+    by_both: str,
     left_out: Witness | None,
     excess: float,
     bands: int,
     models: int,
     most_excess: float = MOST_EXCESS,
 ) -> str:
-    """Name the method that both witnesses speak for, in a strip of so many models with so many bands of control."""
+    """Name the method that both witnesses speak for, in a strip of so many models with so many bands of control.
+
+    by_both: the method that standard deviations and results speak for.
+    """
     if left_out is not None and bands >= TELLING and left_out.ratio > 1 / BETTER:
         apart = models / (bands - 1)
         if excess > most_excess * np.sqrt(max(apart / NEAR_BANDS, 1.0)):
             return POLYNOMIAL
-    return method_of(predicted.ratio)
+    return by_both
 
 
-def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment) -> Witness:
-    """Compare the standard deviations of new points; of control where there are no others."""
+def _compared(oriented: Oriented) -> Numbers:
+    """Take the new points at which the methods are compared; control where there are no others."""
+    new = np.delete(np.arange(len(oriented.xyz)), oriented.control_rows[oriented.misclosures.point])
+    return _spread(new if len(new) else np.arange(len(oriented.xyz)), MOST_POINTS)
+
+
+def _predicted(
+    oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment, points: Numbers
+) -> Witness:
+    """Compare the standard deviations of points."""
     errors, found = oriented.errors, oriented.misclosures
-    new = np.delete(np.arange(len(oriented.xyz)), oriented.control_rows[found.point])
-    points = _spread(new if len(new) else np.arange(len(oriented.xyz)), MOST_POINTS)
     fit = _fit(oriented, polynomial, np.arange(len(found.point)))
     parameters = covariances.of_parameters(errors, found, fit.operator, covariance.figures.factor)
     influence = fit.influence(oriented.xyz[points]).__getitem__
@@ -83,6 +99,14 @@ def _predicted(oriented: Oriented, polynomial: Polynomial, covariance: Covarianc
     ]
     first, second = ((_root(v[:2].mean()), _root(v[2])) for v in both)
     return Witness(first, second, len(points))
+
+
+def _difference(
+    oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdjustment, points: Numbers
+) -> tuple[float, float]:
+    """By how much both results differ at points: rms in plan (of one coordinate) and in height, metres."""
+    squares = (polynomial(oriented.xyz[points]) - covariance.xyz[points]) ** 2
+    return _root(squares[:, :2].mean()), _root(squares[:, 2].mean())
 
 
 def _root(variance: float) -> float:

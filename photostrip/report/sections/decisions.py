@@ -12,7 +12,7 @@ from photostrip.report.sections.strip import elsewhere
 
 WEIGHED = ("polynomial", "covariance")
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
-AGREEING = 0.10  # methods that differ by less are said to agree
+AGREEING = "10 %"  # methods that differ by less are said to agree
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
 
 
@@ -63,7 +63,8 @@ def choices_in_short(document: Document) -> Iterator[tuple[str, str]]:
     blocks = document.get("choices", [])
     for block in blocks:
         left_out = "" if block["left_out"] is None else f", left-out errors {ratio(block['left_out']['ratio'])}"
-        text = f"{block['taken']}; covariance over polynomial: σ {ratio(block['predicted']['ratio'])}{left_out}"
+        known = f", with the results {ratio(block['difference']['ratio'])}" if block["apart"] else ""
+        text = f"{block['taken']}; covariance over polynomial: σ {ratio(block['predicted']['ratio'])}{known}{left_out}"
         yield "chosen adjustment" if len(blocks) == 1 else f"adjustment of {block['strip']}", text
 
 
@@ -71,6 +72,9 @@ def choice_line(block: Document) -> str:
     """Say what was taken, why, and what both witnesses say of both methods."""
     predicted, left_out = block["predicted"], block["left_out"]
     text = f"{block['taken']}, {_why(block)}: standard deviations of new points {_figures(predicted)}"
+    apart = block["difference"]
+    text += f"; the results differ by {metres(apart['plan'])}/{metres(apart['height'])} m"
+    text += f" (ratio with that {ratio(apart['ratio'])})"
     if left_out is None:
         return f"{text}; no control can be left out"
     excess = f"; those of the covariance are {ratio(block['excess'])} times what it lets expect"
@@ -82,7 +86,9 @@ def _why(block: Document) -> str:
     if block["contradicted"]:
         return "because left-out control contradicts the standard deviations of the covariance"
     if block["taken"] == "polynomial":
-        return f"which the covariance of the strip betters by less than {100 * AGREEING:.0f} %"
+        return f"which the covariance of the strip betters by less than {AGREEING}"
+    if block["apart"]:
+        return f"because the results differ by more than predictions that agree within {AGREEING} let expect"
     return f"which betters the polynomial by {fixed(100 * (1 - block['predicted']['ratio']), 0)} %"
 
 

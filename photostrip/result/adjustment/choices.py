@@ -29,12 +29,19 @@ def _choice(strip: StripResult, choice: Choice) -> Document:
         "strip": strip.strip.id,
         "taken": choice.taken,
         "predicted": _witness(choice.predicted),
+        "difference": _difference(choice),
         "left_out": None if choice.left_out is None else _witness(choice.left_out),
         "left_out_by": choice.left_out_by,
         "excess": choice.excess,
+        "apart": choice.apart,
         "contradicted": choice.contradicted,
     }
     return record("choices", values)
+
+
+def _difference(choice: Choice) -> Document:
+    plan, height = choice.difference
+    return {"ratio": choice.expected.ratio, "plan": plan, "height": height}
 
 
 def _witness(found: Witness) -> Document:
