@@ -430,6 +430,14 @@ def test_too_little_control_stands_in_the_table(capsys: pytest.CaptureFixture[st
     assert "cannot orient a strip" in answer(capsys, "plan", "strip", *options)
 
 
+def test_that_auto_takes_a_polynomial_hangs_on_the_results_too(capsys: pytest.CaptureFixture[str]) -> None:
+    layouts = ("--control", "every=1", "--models", "2", "--control-sigma", "0.2,0.2,0.2")
+    text = " ".join(answer(capsys, "plan", "strip", *layouts).split())
+    assert "every 1: `auto` would take the polynomial if the results agree as well; standard deviations" in text
+    long = " ".join(answer(capsys, "plan", "strip", "--models", "10", "--control", "corners").split())
+    assert "corners: `auto` would take the covariance; standard deviations" in long
+
+
 def test_a_rule_for_make(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file, target, rule = tmp_path / "s.yaml", tmp_path / "s.json", tmp_path / "s.d"
     file.write_text(STRIP)

@@ -124,11 +124,16 @@ def _chosen(document: Document) -> tuple[Words, ...]:
     """Say what `adjustment: auto` would take for each layout."""
     return tuple(
         Words(
-            f"{row['layout']}: `auto` would take the {row['adjustment']}; standard deviations with the covariance are "
-            f"{fixed(row['ratio'], 2)} times those with the best polynomial, {row['polynomial']}."
+            f"{row['layout']}: `auto` would take the {row['adjustment']}{_if_results(row)}; standard deviations with "
+            f"the covariance are {fixed(row['ratio'], 2)} times those with the best polynomial, {row['polynomial']}."
         )
         for row in document["chosen"]
     )
+
+
+def _if_results(row: Document) -> str:
+    """Say what a design cannot know: how far the results of two methods will be apart."""
+    return " if the results agree as well" if row["adjustment"] == "polynomial" else ""
 
 
 def _along(document: Document, name: str) -> Table:
