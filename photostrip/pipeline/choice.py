@@ -49,7 +49,6 @@ class Choice:
     left_out: Witness | None  # errors at control left out; None where the rest determines none of it
     left_out_by: str  # ``"band"`` or ``"point"``: what was left out at a time
     excess: float  # those of the covariance over what it lets expect; NaN without any
-    distances: int  # that the adjustment with the covariance used
 
     @property
     def expected(self) -> Witness:

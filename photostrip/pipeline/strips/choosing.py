@@ -55,7 +55,6 @@ def choose(oriented: Oriented, polynomial: Polynomial, covariance: CovarianceAdj
         left_out=left_out,
         left_out_by=by,
         excess=excess,
-        distances=covariance.figures.tested.distances,
     )
 
 
