@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import pickle
+from copy import deepcopy
 from random import Random
 
 import pytest
 
 from photostrip.result.description import described
-from photostrip.result.reading import _blocks_right, _wrong
+from photostrip.result.reading import _blocks_right, _wrong, located
 from tests.edited_results import edited
 from tests.reports import saved
 
@@ -49,6 +51,16 @@ def test_columns_of_edited_results_are_right_where_their_values_are() -> None:
         ('{"points": [{"id": []}, {"id": null}]}', False),
         ('{"control": [{"measured": true}, {"measured": null}]}', True),
         ('{"control": [{"measured": true}, {"measured": 1}]}', False),
+        ('{"control": [{"measured": true, "dx": 1.0}, {"dx": 1.0, "measured": true}]}', True),
+        ('{"control": [{"measured": true, "dx": 1.0}, {"dx": true, "measured": 1.0}]}', False),
+        ('{"control": [{"dx": 1.0, "dy": 1.0}, {"dx": 1.0}, {"dy": true}]}', False),
+        ('{"control": [{"dx": 1.0}, {"dx": false}]}', False),
+        ('{"points": [{"x": -Infinity}, {"x": NaN}, {"x": null}]}', False),
+        ('{"points": [{"rays": 1000000000000001}, {"rays": 1}]}', False),
+        ('{"points": [{}, {}]}', True),
+        ('{"points": [[], [{"x": 1.0}]]}', False),
+        ('{"photos": [{"rotation": []}, {"rotation": []}]}', True),
+        ('{"photos": [{"rotation": []}, {"rotation": 1.0}]}', False),
         ('{"photos": [{"rotation": [1.0, null]}, {"rotation": []}]}', True),
         ('{"photos": [{"rotation": [[1.0], [2.0]]}]}', True),
         ('{"photos": [{"rotation": [[1.0], ["2"]]}]}', False),
@@ -60,3 +72,18 @@ def test_columns_of_edited_results_are_right_where_their_values_are() -> None:
 )
 def test_columns_are_right_where_their_values_are(text: str, right: bool) -> None:
     assert looks_right(text) is right
+
+
+def test_a_key_that_is_missing_is_told_after_a_copy_too() -> None:
+    document = located(
+        lambda block: json.loads('{"summary": {"check": {}}, "points": [{"x": 1.0}]}', object_hook=block)
+    )
+    other = located(lambda block: json.loads('{"check": {}}', object_hook=block))
+    for found in (document, deepcopy(document), pickle.loads(pickle.dumps(document))):  # noqa: S301 (our own)
+        assert found == document
+        for block, path in ((found["summary"]["check"], "summary.check.rms"), (found["points"][0], "points[0].rms")):
+            with pytest.raises(KeyError, match=path.replace("[", r"\[")):
+                block["rms"]
+    with pytest.raises(KeyError, match=r"'check\.rms'"):  # each document has blocks of its own
+        other["check"]["rms"]
+    assert type(deepcopy(document["points"])[0]) is dict
