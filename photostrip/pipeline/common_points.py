@@ -89,6 +89,8 @@ def mean_points(strips: Sequence[StripResult], strangers: Mapping[str, AbstractS
 
     strangers: points by strip that do not count there.
     """
+    if len(strips) == 1 and not strangers:  # no copy of the points
+        return StripMeans(strips[0].formed.point, strips[0].cartesian)
     none: AbstractSet[int] = frozenset()
     held = [~np.isin(each.formed.point, list((strangers or {}).get(each.strip.id, none))) for each in strips]
     point = np.concatenate([strip.formed.point[rows] for strip, rows in zip(strips, held, strict=True)])
@@ -129,6 +131,8 @@ def _joined(strips: Sequence[StripResult], point_ids: Sequence[str], output: Gro
 
 
 def _ties(strips: Sequence[StripResult], output: GroundFrame) -> Ties:
+    if len(strips) == 1:
+        return Ties(np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 3)))
     strip = np.concatenate([np.full(len(each.formed.point), number) for number, each in enumerate(strips)])
     point = np.concatenate([each.formed.point for each in strips])
     cartesian = np.concatenate([each.cartesian for each in strips])

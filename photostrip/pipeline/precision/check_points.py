@@ -42,8 +42,9 @@ class Propagation:
 
     def photos(self) -> Iterator[PhotoErrors]:
         """Rows of the photos that could be oriented, some at a time."""
-        terms = self.fit.polynomial_columns(self.xyz)
-        return differentiate_photos(self.errors, self.sightings, self.resection, terms)
+        return differentiate_photos(
+            self.errors, self.sightings, self.resection, lambda point: self.fit.polynomial_columns(self.xyz[point])
+        )
 
 
 class CheckPoints(NamedTuple):

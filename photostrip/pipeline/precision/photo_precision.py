@@ -45,18 +45,20 @@ def of_photos(
     factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
     compared = check_points.compare_with_checks(strip, errors, checks.spread(), oriented.frames)
+    wanted = checks.rows if of_checks else None
+    del checks  # of tens of thousands a hundred are compared
     check = None if compared is None else check_points.by_fit(found, compared, parameters, factor)
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
-    for some in () if of_checks else found.photos():
+    for some in () if wanted is not None else found.photos():
         of_some = covariances.covariances(errors, some.rows, parameters, some.influence.__getitem__)
         photos[some.photos] = of_some * factor
     del found  # with the rays of all photos: the largest table comes last, when what the others take is free again
-    table, at = (errors.points.take(checks.rows), xyz[checks.rows]) if of_checks else (errors.points, xyz)
+    table, at = (errors.points, xyz) if wanted is None else (errors.points.take(wanted), xyz[wanted])
     points = covariances.covariances(errors, table, parameters, lambda rows: fit.influence(at[rows]))
     points *= factor
-    if of_checks:
+    if wanted is not None:
         of_checked, points = points, np.full((len(xyz), 3, 3), np.nan)
-        points[checks.rows] = of_checked
+        points[wanted] = of_checked
     axes = strip.intermediate.axes
     for piece in pieces(len(points)):  # all at once take twice as much again
         points[piece] = axes @ points[piece] @ axes.T
@@ -114,11 +116,11 @@ def propagation(strip: StripResult, oriented: OrientedStrip[StripErrors], observ
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
     fit = control_errors.fit_operator(found, oriented.weights, oriented.at_control, terms, errors.origin)
     rows, flown = strip.of_photos.rows, strip.of_photos.strip
-    point = np.searchsorted(strip.formed.point, observations.point[rows])
     sightings = photo_errors.UsedRays(
         photo=flown.positions(observations)[rows],
-        point=point,
         image=rows,
+        numbers=observations.point,
+        known=strip.formed.point,
         points=strip.xyz,
         focal=flown.camera.principal_distance,
     )

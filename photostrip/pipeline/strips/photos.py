@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct, median, quantile
+from photostrip.arrays import Floats, Numbers, distinct, median, pieces, quantile
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
@@ -161,7 +161,6 @@ class FormedPhotos:
         else:
             photos = strip.oriented(covariance.centers, covariance.rotations)
             resection = with_residuals(self.observations.xy[rows], xyz[points], photo, photos)
-        arm = xyz[points] - resection.centers[photo]
         return StripResult(
             precision=oriented.precision,
             intermediate=oriented.intermediate,
@@ -173,7 +172,7 @@ class FormedPhotos:
             xyz=xyz,
             cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
             rays=np.bincount(points, minlength=len(formed.point)),
-            depth=float(-(arm * resection.rotations[:, :, 2][photo]).sum(axis=1).mean()),
+            depth=_mean_depth(xyz, points, photo, resection),
             notes=(
                 *overruling.notes(settings.relative, strip.id, strip.photos),
                 *notes.screening_notes(strip, self.screened, self.sigma),
@@ -235,10 +234,8 @@ class FormedPhotos:
         """Orient every photo on its adjusted points, so that orientations and points belong together."""
         strip, formed, similarity = self.strip, self.formed, oriented.absolute.similarity
         # A polynomial can move a long strip by much: a photo starts where its points went, on the average.
-        moved = adjusted - similarity(formed.xyz)
-        count = np.maximum(np.bincount(photo, minlength=len(strip.photos)), 1)
-        shift = [np.bincount(photo, moved[points, axis], len(strip.photos)) / count for axis in range(3)]
-        centers = similarity(formed.centers) + np.column_stack(shift)
+        shift = _mean_shifts(adjusted - similarity(formed.xyz), points, photo, len(strip.photos))
+        centers = similarity(formed.centers) + shift
         start = strip.oriented(centers, similarity.rotation @ formed.rotations)
         resection = resect(self.observations.xy[self._rays_in_use], adjusted[points], photo, start)
         if not resection.solved.any():
@@ -248,6 +245,21 @@ class FormedPhotos:
             )
             raise GeometryError(msg, photos=strip.photos, code="no-photo-oriented")
         return resection
+
+
+def _mean_shifts(moved: Floats, points: Numbers, photo: Numbers, photos: int) -> Floats:
+    """Mean shifts (photos, 3) of the points on each photo, 0 where it has none; moved: (q, 3), shifts of points."""
+    count = np.maximum(np.bincount(photo, minlength=photos), 1)
+    return np.column_stack([np.bincount(photo, moved[points, axis], photos) / count for axis in range(3)])
+
+
+def _mean_depth(xyz: Floats, points: Numbers, photo: Numbers, resection: Resection) -> float:
+    """Mean depth of points below the photos, metres; points, photo: (m,), of each image point."""
+    axes, depth = resection.rotations[:, :, 2], np.empty(len(photo))
+    for rows in pieces(len(photo)):  # all at once take 100 bytes an image point
+        some = photo[rows]
+        depth[rows] = ((xyz[points[rows]] - resection.centers[some]) * axes[some]).sum(axis=1)
+    return float(-depth.mean())
 
 
 def screened_pairs(

@@ -10,7 +10,7 @@ from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
 from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
 from photostrip.report.sections.points import AXES, DIFFERENCES, IDS_NAMED, given_table, largest
-from photostrip.report.sections.strip import ALL_SHOWN, column_of, worst_first
+from photostrip.report.sections.strip import ALL_SHOWN, column_of, only, worst_first
 
 PARTS = "plan", "height"
 UNKNOWN = dict.fromkeys(("plan", "height", "p_plan", "p_height", "sigma_x", "sigma_y", "sigma_z"))
@@ -42,9 +42,7 @@ def check_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
 
 def _tested(document: Document, given: Sequence[Document], *, everything: bool, most: int) -> Table:
     check = document["precision"]["check"]
-    unlikely = {row["id"]: _unlikely(row) for row in check["points"]}
-    where = ("points", "check", "control")
-    worst, note = worst_first(given, lambda row: unlikely.get(row["id"], -1.0), where, everything=everything, most=most)
+    worst, note = _least_likely(check["points"], given, everything=everything, most=most)
     names = {row["id"] for row in worst}
     points, tested = (
         {name: rows[place] for place, name in enumerate(column_of(rows, "id")) if name in names}
@@ -145,6 +143,15 @@ def _table(
 def _rms_and_mean(values: Sequence[float]) -> tuple[float | None, float | None]:
     count = len(values)
     return ((sum(value**2 for value in values) / count) ** 0.5, sum(values) / count) if values else (None, None)
+
+
+def _least_likely(
+    tested: Sequence[Document], given: Sequence[Document], *, everything: bool, most: int
+) -> tuple[list[Document], str]:
+    """Choose the points that are shown, the least likely first; the chances of all go again."""
+    unlikely = {row["id"]: _unlikely(row) for row in only(tested, "id", "p_plan", "p_height")}
+    where = ("points", "check", "control")
+    return worst_first(given, lambda row: unlikely.get(row["id"], -1.0), where, everything=everything, most=most)
 
 
 def _unlikely(row: Document) -> float:

@@ -55,6 +55,11 @@ def rows_of(rows: Sequence[Document]) -> Sequence[Document]:
     return rows.rows() if hasattr(rows, "rows") and len(rows) > MOST_MADE else list(rows)
 
 
+def only(rows: Sequence[Document], *keys: str) -> Sequence[Document]:
+    """Return rows to be gone through for some keys, of those that are kept as columns these columns alone."""
+    return rows.only(*keys) if hasattr(rows, "only") else rows
+
+
 def elsewhere(rest: int, what: str, section: str, block: str) -> str:
     """Say how many things are not shown, and where they are."""
     return f"{rest} more {what}: --section {section}, or `{block}` in result.json"

@@ -5,13 +5,12 @@ Source: derived; see docs/precision.md, eq. 3.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
-from photostrip.frozen import NamedTuple, dataclass
-from photostrip.points import take_rows
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, entries, ranges
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.resection.collinearity import distances, partials
@@ -25,18 +24,24 @@ class UsedRays:
     """Image points on which photos were oriented, ordered by photo."""
 
     photo: Numbers  # (e,): place of the photo in the strip, ascending
-    point: Numbers  # (e,): row of the point in the strip's points
     image: Numbers  # (e,): row in the table of image points
-    points: Floats  # (q, 3): adjusted points, metres
+    numbers: Numbers  # (k,): number of the point of each row of that table
+    known: Numbers  # (q,): numbers of the strip's points, ascending
+    points: Floats  # (q, 3): these, adjusted, metres
     focal: float  # principal distance, mm
+
+    @property
+    def point(self) -> Numbers:
+        """Row of the point (e,) of each in the strip's points: of all at once not worth keeping."""
+        return np.searchsorted(self.known, self.numbers[self.image])
 
     @property
     def xyz(self) -> Floats:
         """Adjusted point (e, 3) of each."""
         return self.points[self.point]
 
-    def take(self, rows: Numbers | Flags) -> UsedRays:
-        return take_rows(self, rows, ("photo", "point", "image"))
+    def take(self, rows: Numbers | Flags | slice) -> UsedRays:
+        return replace(self, photo=self.photo[rows], image=self.image[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,28 +54,35 @@ class PhotoErrors:
 
 
 def differentiate_photos(
-    errors: StripErrors, sightings: UsedRays, resection: Resection, terms: Sequence[Floats]
+    errors: StripErrors,
+    sightings: UsedRays,
+    resection: Resection,
+    terms: Callable[[Numbers], Sequence[Floats]],
 ) -> Iterator[PhotoErrors]:
     """Differentiate the resections, some photos at a time: all their rows together are the largest table of a run.
 
-    terms: (q, t) for X, Y and Z: terms of the polynomials at all points.
+    terms: gives terms of the polynomials (n, t) for X, Y and Z at some points.
 
     The points carry the photo with them, and its measurements move it once more: do = sum by_point dX + by_image dl.
     """
     if not resection.solved.all():
         sightings = sightings.take(resection.solved[sightings.photo])
-    distance = float(distances(sightings.xyz, resection.centers, sightings.photo).mean())
     ends = np.searchsorted(sightings.photo, np.arange(len(resection.centers) + 1))
-    for low, high in runs(ends, SIGHTINGS):
-        some = sightings.take(np.arange(ends[low], ends[high]))
-        yield _some_photos(errors, some, resection, terms, distance)
+    parts = [slice(ends[low], ends[high]) for low, high in runs(ends, SIGHTINGS)]
+    distance = np.concatenate([_distances(sightings.take(part), resection) for part in parts]).mean()
+    for part in parts:
+        yield _some_photos(errors, sightings.take(part), resection, terms, float(distance))
+
+
+def _distances(sightings: UsedRays, resection: Resection) -> Floats:
+    return distances(sightings.xyz, resection.centers, sightings.photo)
 
 
 def _some_photos(
     errors: StripErrors,
     sightings: UsedRays,
     resection: Resection,
-    terms: Sequence[Floats],
+    terms: Callable[[Numbers], Sequence[Floats]],
     distance: float,
 ) -> PhotoErrors:
     """Differentiate the resections of photos that have sightings: o = sum over their points of by.point times its row.
@@ -82,8 +94,8 @@ def _some_photos(
     place = np.arange(len(item)) - starts[item]  # among the sightings of the photo
     count, most = len(photos), int(place.max()) + 1
     by = _resected(sightings, resection, item, place, distance)
-    points, images = errors.points, errors.images
-    sighting, entry = ranges(*entries(points.item, sightings.point))
+    points, images, of_sighting = errors.points, errors.images, sightings.point
+    sighting, entry = ranges(*entries(points.item, of_sighting))
     beside = item * most + place
     by_image = points.by_image[entry].transpose(0, 2, 1) @ by.point.reshape(-1, 3, 6)[beside[sighting]]
     image = points.image[entry]
@@ -91,11 +103,9 @@ def _some_photos(
     directly = by.image.reshape(-1, 2, 6)[beside[sighting[once_more]]]
     by_image[once_more] += directly * images.stated[images.row[image[once_more]]][:, :, None]
 
-    first = np.minimum.reduceat(points.first[sightings.point], starts)
+    first = np.minimum.reduceat(points.first[of_sighting], starts)
     # where a photo has fewer points, the last again, with derivatives of zero
-    point = sightings.point[
-        np.minimum(starts[:, None] + np.arange(most), np.append(starts[1:], len(item))[:, None] - 1)
-    ]
+    point = of_sighting[np.minimum(starts[:, None] + np.arange(most), np.append(starts[1:], len(item))[:, None] - 1)]
     similar, along = points.by_similarity(point), points.by_component[point]
     shift, slots = points.first[point] - first[:, None], along.shape[2]
     farthest, all_similar = int(shift.max()), similar.reshape(count, 3 * most, -1)
@@ -117,7 +127,10 @@ def _some_photos(
         by_image=by_image.transpose(0, 2, 1),
     )
     # a similarity of the whole strip moves a photo as that of its first model does
-    by_terms = [by.point[:, :, axis].transpose(0, 2, 1) @ of_axis[point] for axis, of_axis in enumerate(terms)]
+    by_terms = [
+        by.point[:, :, axis].transpose(0, 2, 1) @ of_axis.reshape(count, most, -1)
+        for axis, of_axis in enumerate(terms(point.ravel()))
+    ]
     return PhotoErrors(rows, np.concatenate([by_similarity, *by_terms], axis=2), photos)
 
 

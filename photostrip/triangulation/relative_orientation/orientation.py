@@ -101,6 +101,8 @@ class Orientation:
 
     def with_pairs(self, numbers: Numbers, part: Orientation) -> Orientation:
         """Put pairs that were taken, and oriented in another way, back in their places."""
+        if not len(numbers):
+            return replace(self)  # shares the columns, but not the rays that were found
         rows = self.pairs.rows_of(numbers)
         by_pair = {name: _put(getattr(self, name), numbers, getattr(part, name)) for name in BY_PAIR}
         by_row = {name: _put(getattr(self, name), rows, getattr(part, name)) for name in BY_ROW}

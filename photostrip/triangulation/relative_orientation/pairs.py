@@ -14,7 +14,7 @@ from photostrip.arrays import Flags, Floats, Numbers, distinct, median
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.notes import counted
-from photostrip.points import PhotoPoints, take_rows
+from photostrip.points import PhotoPoints, frozen_alike, take_rows
 
 MINIMUM_POINTS = 5  # as many as elements
 BY_ROW = ("pair", "left", "right", "weight", "point", "rows")
@@ -52,6 +52,8 @@ class Pairs:
 
     def without(self, gone: Flags) -> Pairs:
         """Leave out rows; each pair must keep one."""
+        if not gone.any():
+            return self
         left = take_rows(self, ~gone, BY_ROW)
         return replace(left, starts=np.searchsorted(left.pair, np.arange(self.size)))
 
@@ -93,7 +95,7 @@ def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float
         pair=pair,
         left=observations.xy[rows[:, 0]],
         right=observations.xy[rows[:, 1]],
-        weight=2 * median(variance[inside]) / variance[rows].sum(axis=1),
+        weight=frozen_alike(2 * median(variance[inside]) / variance[rows].sum(axis=1), float, (len(rows),)),
         focal=focal,
         point=observations.point[rows[:, 0]],
         rows=rows,

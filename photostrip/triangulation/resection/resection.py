@@ -44,8 +44,9 @@ def with_residuals(xy: Floats, points: Floats, photo: Numbers, photos: KnownPhot
     """
     centers, rotations, _ = photos
     count = len(centers)
-    residuals = xy - project(points, photos, photo)
-    squares = np.bincount(photo, (residuals**2).sum(axis=1), count)
+    residuals = project(points, photos, photo)
+    np.subtract(xy, residuals, out=residuals)
+    squares = np.bincount(photo, residuals[:, 0] ** 2 + residuals[:, 1] ** 2, count)
     rms = np.sqrt(squares / np.maximum(2 * np.bincount(photo, minlength=count), 1))
     return Resection(centers=centers, rotations=rotations, residuals=residuals, rms=rms, solved=np.ones(count, bool))
 
