@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from itertools import combinations
-from typing import Any
+from functools import partial
+from itertools import combinations, zip_longest
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
 from photostrip.pipeline.strips.notes import precision_beyond_control
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips
+
+if TYPE_CHECKING:
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
 
 def join_strips(
@@ -39,19 +43,20 @@ def join_strips(
     of_checks: whether the precision of check points alone is wanted.
     """
     points = _joined(strips, observations.point_ids, output)
-    precision = None
-    notes: list[Note] = []
-    for strip in strips:
-        notes += strip.notes
-        covariance = None if strip.photo_stages is None else strip.photo_stages.solved
-        if covariance is not None and not of_checks:
-            notes += precision_beyond_control(strip.of_photos.strip, strip.control_rows, covariance)
+    each: list[strip_precision.StripPrecision] = []
     if settings.precision:
         each = [
             _precision_of(strip, before.oriented, observations, given, of_checks=of_checks)
             for strip, before in zip(strips, screened, strict=True)
         ]
-        precision = strip_precision.joined(each, strips, points)
+    notes: list[Note] = []
+    for strip, found in zip_longest(strips, each):
+        notes += strip.notes
+        solved = None if strip.photo_stages is None else strip.photo_stages.solved
+        if solved is not None and not of_checks:
+            variances = partial(_variances, strip, solved, found)
+            notes += precision_beyond_control(strip.of_photos.strip, strip.control_rows, solved, variances)
+    precision = strip_precision.joined(each, strips, points) if each else None
     return AdjustedStrips(
         strips=strips,
         points=points,
@@ -60,6 +65,16 @@ def join_strips(
         precision=precision,
         notes=tuple(notes),
     )
+
+
+def _variances(
+    strip: StripResult, solved: CovarianceAdjustment, found: strip_precision.StripPrecision | None
+) -> Floats:
+    """Variances (q, 3) of the points of a strip along the axes of its intermediate frame, metres^2."""
+    if found is None:
+        return np.diagonal(solved.points, axis1=1, axis2=2)
+    axes = strip.intermediate.axes
+    return np.asarray(np.einsum("ia,nij,ja->na", axes, found.points, axes), float)
 
 
 def _precision_of(

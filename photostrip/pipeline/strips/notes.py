@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -170,17 +170,20 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
             yield Note("little-redundancy", text, strip=strip.id)
 
 
-def precision_beyond_control(strip: Strip, rows: Numbers, adjusted: CovarianceAdjustment) -> Iterator[Note]:
+def precision_beyond_control(
+    strip: Strip, rows: Numbers, adjusted: CovarianceAdjustment, variances: Callable[[], Floats]
+) -> Iterator[Note]:
     """Say what standard deviations grow to where points lie far beyond the control.
 
     rows: the control in the points of the strip.
+    variances: gives those of the points (q, 3), intermediate frame, metres^2.
     """
     along, at = adjusted.xyz[:, 0], adjusted.xyz[rows, 0]
     beyond = np.maximum(at.min() - along, along - at.max())
     base = np.linalg.norm(np.diff(adjusted.centers, axis=0), axis=1).mean()
     if beyond.max() <= max(BEYOND_COVARIANCE * np.ptp(at), base):
         return
-    variance = np.diagonal(adjusted.points, axis1=1, axis2=2)
+    variance = variances()
     sigma = np.sqrt(np.column_stack([variance[:, :2].mean(axis=1), variance[:, 2]]))
     inside, largest = column_medians(sigma[beyond <= 0]), sigma[beyond > 0].max(axis=0)
     if (largest > WORSE_BEYOND * inside).any():

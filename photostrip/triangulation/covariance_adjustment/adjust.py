@@ -58,12 +58,14 @@ class CovarianceAdjustment:
     left_out: Without | None = None
     whole: CovarianceAdjustment | None = None
 
-    @cached_property
+    @property
     def points(self) -> Floats:
         """Covariances (q, 3, 3) of the points, metres^2."""
-        if self.left_out is None:
-            return prediction.covariances(self.system, self.system.errors.points) * self.figures.factor
-        return self.of_points(np.arange(len(self.xyz)))
+        if self.left_out is not None:
+            return self.of_points(np.arange(len(self.xyz)))
+        found = prediction.covariances(self.system, self.system.errors.points)
+        found *= self.figures.factor
+        return found
 
     def of_points(self, points: Numbers) -> Floats:
         """Covariances (n, 3, 3) of some of the points, metres^2."""
@@ -75,7 +77,7 @@ class CovarianceAdjustment:
             at = np.arange(len(points))
             return predicted[at, :, at]
         explained = self.left_out.explained(rows)
-        return self.whole.points[points] + explained @ explained.transpose(0, 2, 1) * self.figures.factor
+        return self.whole.of_points(points) + explained @ explained.transpose(0, 2, 1) * self.figures.factor
 
     def joint_covariance(self, rows: ErrorRows) -> Floats:
         """Covariances (n, n) of rows with d = 1, metres^2."""

@@ -71,19 +71,20 @@ def conditions(
         parts += [_distances(errors, *section) for section in errors.sections()]
     rows = ErrorRows.joined([part.rows for part in parts])
     kind = np.where(np.arange(len(rows.first)) < count, CONTROL, DISTANCE)
+    value, noise, source = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("value", "noise", "source")
+    )
+    del parts  # before all of it is put in order
     point, base = _points(errors, orientation, formed, rows)
     order = np.lexsort((point, base))
-    value, noise, source = (
-        np.concatenate([getattr(part, name) for part in parts])[order] for name in ("value", "noise", "source")
-    )
     return Conditions(
         rows=rows.take(order),
         point=point[order],
         base=base[order],
-        value=value,
-        noise=noise,
+        value=value[order],
+        noise=noise[order],
         kind=kind[order],
-        source=source,
+        source=source[order],
         similarities=PhotoSimilarities.of(errors),
     )
 

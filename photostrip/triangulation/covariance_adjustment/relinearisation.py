@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.arrays import Floats
+from photostrip.arrays import Floats, pieces
 from photostrip.frozen import replace
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.covariance_adjustment.system import System
@@ -45,7 +45,8 @@ def component_errors(errors: StripErrors, images: Floats) -> Floats:
     points, photos = errors.images, errors.models + 1
     moved = np.zeros((photos, SPAN, COMPONENTS))
     flat = moved.reshape(photos, -1)
-    add_rows(flat[:, MOVED], points.photo, np.einsum("ni,nic->nc", images, points.components))
+    for piece in pieces(len(images)):
+        add_rows(flat[:, MOVED], points.photo[piece], np.einsum("ni,nic->nc", images[piece], points.components[piece]))
     components = np.zeros((SHARING + photos, COMPONENTS))  # from model -SHARING on
     for slot in range(SPAN):
         components[slot : slot + photos] += moved[:, slot]

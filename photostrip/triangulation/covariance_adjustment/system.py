@@ -26,7 +26,7 @@ from photostrip.triangulation.error_propagation.covariances import NearImages
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows, ranges
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-AT_A_TIME = 4096  # rows whose windows are made together, in whole models
+AT_A_TIME = 2048  # rows whose windows are made together, in whole models
 
 
 class SameImages(NamedTuple):

@@ -115,6 +115,7 @@ def differentiate_strip(
         strip.steps[own] = _steps(part, strip.centers[1:][own])
         _add_components(strip.images, section, part, of_scale[:, own])
         points.add(section, part)
+        del section, part  # before the next are made
     rows = points.finished()
     if len(formed.bridging):
         from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
