@@ -121,6 +121,7 @@ BLOCK = Spec(
     gnss=Gnss(use=True),
 )
 DENSE, SPARSE = strip_spec(1000, 5), strip_spec(1000, 200)
+LIDAR = {count: strip_spec(300, 60, check=count, extra=extra) for count, extra in ((10_000, 40), (50_000, 180))}
 ROWS = {
     "short": Row("20 photos", strip_spec(20, 5), 1.8),
     "dense": Row("1000 photos, band every 5 models, polynomial", DENSE, 6.0, 200.0),
@@ -132,13 +133,11 @@ ROWS = {
     "long": Row("3000 photos, band every 600 models", strip_spec(3000, 600), 16.0, 400.0),
     "block": Row("bundle block 10 x 40 with GNSS", BLOCK, adjustment="bundle"),
     "check": Row("check of 1000 photos", DENSE, 2.0, command="check"),
-    "lidar-10000": Row("300 photos, 10 000 check points", strip_spec(300, 60, check=10_000, extra=40)),
-    "lidar-50000": Row("300 photos, 50 000 check points", strip_spec(300, 60, check=50_000, extra=180)),
-    "lidar-covariance": Row(
-        "300 photos, 50 000 check points, covariance",
-        strip_spec(300, 60, check=50_000, extra=180),
-        adjustment="covariance",
-    ),
+    **{
+        f"lidar-{count}-{method}": Row(f"300 photos, {count} check points, {method}", spec, adjustment=method)
+        for method in ("polynomial", "auto")
+        for count, spec in LIDAR.items()
+    },
 }
 
 
@@ -395,13 +394,20 @@ def print_rows(folder: Path, names: Sequence[str], repeat: int) -> dict[str, Spe
         numbers = f"{spent.computing:>9.2f}{spent.units:>8.1f}{most:>9}{spent.megabytes:>7.0f}{megabytes:>9}"
         print(f"{row.title:<50}{numbers}", flush=True)
     print(f"{'L: ' + UNIT:<50}{min(spent.unit for spent in found.values()):>9.2f}\n", flush=True)
-    if {"lidar-10000", "lidar-50000"} <= set(found):
-        more = found["lidar-50000"].megabytes - found["lidar-10000"].megabytes
-        each = more * MEGABYTE / 40_000
-        line("memory of one more check point", f"{each:.2f} KB", f"{POINT_KB} KB", each / POINT_KB)
-        few, many = found["lidar-10000"], found["lidar-50000"]
-        line("exponent from 10 000 to 50 000 check points", f"{exponent((1, 5), (few.units, many.units)):.2f}")
+    for method in ("polynomial", "auto"):
+        taken = [found.get(f"lidar-{count}-{method}") for count in LIDAR]
+        if None not in taken:
+            print_check_points(method, *(spent for spent in taken if spent is not None))
     return found
+
+
+def print_check_points(method: str, few: Spent, many: Spent) -> None:
+    """Print what one more check point takes."""
+    first, last = LIDAR
+    each = (many.megabytes - few.megabytes) * MEGABYTE / (last - first)
+    line(f"memory of one more check point, {method}", f"{each:.2f} KB", f"{POINT_KB} KB", each / POINT_KB)
+    growth = exponent((first, last), (few.units, many.units))
+    line(f"exponent from {first} to {last} check points, {method}", f"{growth:.2f}")
 
 
 def print_parts(found: dict[str, float], limits: dict[str, float], photos: int) -> None:
