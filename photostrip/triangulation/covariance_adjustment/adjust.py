@@ -112,7 +112,7 @@ class CovarianceAdjustment:
     @cached_property
     def photos(self) -> Floats:
         """Covariances (m, 6, 6) of centre and small rotation of the photos, metres^2 and radians^2."""
-        return prediction.photo_covariances(self.system) * self.figures.factor
+        return prediction.covariances(self.system, prediction.photo_rows(self.system)) * self.figures.factor
 
     def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
         """Return what errors of control coordinates subtract from points.

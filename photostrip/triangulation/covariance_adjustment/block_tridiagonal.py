@@ -38,17 +38,17 @@ class Factors:
             result[number] += self.shares[number] @ result[number + 1] @ self.shares[number].T
         return result
 
-    def near_diagonal(self, number: int) -> Floats:
-        """Part (2 b, 2 b) of the inverse that belongs to a block and the next; of the last, (b, b) its own."""
-        own = self.diagonal_of_inverse[number]
+    def near_diagonal(self, number: int, own: slice, later: slice) -> Floats:
+        """Part of the inverse that belongs to some rows of a block and of the next; of the last, to its own."""
+        result = self.diagonal_of_inverse[number][own, own]
         if number + 1 == len(self.inverses):
-            return own
-        size, later = len(own), self.diagonal_of_inverse[number + 1]
-        result = np.empty((2 * size, 2 * size))
-        result[:size, :size], result[size:, size:] = own, later
-        result[:size, size:] = beside = -self.shares[number] @ later
-        result[size:, :size] = beside.T
-        return result
+            return result
+        of_later, size = self.diagonal_of_inverse[number + 1][:, later], len(result)
+        near = np.empty((size + of_later.shape[1],) * 2)
+        near[:size, :size], near[size:, size:] = result, of_later[later]
+        near[:size, size:] = beside = -self.shares[number][own] @ of_later
+        near[size:, :size] = beside.T
+        return near
 
 
 def eliminate(diagonal: Floats, beside: Floats) -> Factors:

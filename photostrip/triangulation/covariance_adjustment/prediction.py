@@ -11,13 +11,12 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers, pieces
 from photostrip.frozen import NamedTuple, dataclass
-from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import gamma_cdf, normal_quantile
 from photostrip.triangulation.covariance_adjustment import reduced, relinearisation, system
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE
-from photostrip.triangulation.covariance_adjustment.windows import UNKNOWN
 from photostrip.triangulation.error_propagation.covariances import NearImages
-from photostrip.triangulation.error_propagation.derivatives import SHARING, ErrorRows, PointRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SCALE, ErrorRows, PointRows
 
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
 
@@ -62,15 +61,9 @@ def errors(found: system.System, rows: PointRows, images: Floats) -> Floats:
     components, result = relinearisation.component_errors(found.errors, images), np.empty((len(rows.first), 3))
     for piece in pieces(len(rows.first)):
         some = rows.take(np.arange(piece.start, piece.stop))
-        similarity = found.similarities.to_common[some.first] @ found.unknowns[some.first, :, None]
         result[piece] = relinearisation.displacements(components, some, images)
-        result[piece] += (some.by_similarity @ similarity)[:, :, 0]
+        result[piece] += (some.by_similarity @ found.unknowns[some.first, :, None])[:, :, 0]
     return result
-
-
-def photo_errors(found: system.System) -> Floats:
-    """Predict the errors (p + 1, 6) of the photos, centre and small rotation: their unknowns."""
-    return found.unknowns[:, :6] * _units(found)
 
 
 def covariances(found: system.System, rows: ErrorRows | PointRows) -> Floats:
@@ -103,20 +96,25 @@ def _reduced(found: system.System, rows: ErrorRows | PointRows) -> Iterator[_Sec
         yield _Section(order[section], reduced.of_rows(found, some, near), near.by_image)
 
 
-def photo_covariances(found: system.System) -> Floats:
-    """Covariances (p + 1, 6, 6) of centre and small rotation of the photos: of their unknowns."""
-    number = SHARING + np.arange(found.errors.models + 1)
-    block, place = np.divmod(number, found.width)
-    inverse = found.factors.diagonal_of_inverse
-    places = inverse.reshape(len(inverse), found.width, -1, found.width, inverse.shape[1] // found.width)
-    cofactors = places[block, place, UNKNOWN, place, UNKNOWN][:, :6, :6]
-    units = _units(found)
-    return np.asarray(-cofactors * units * units[:, None], float)
+def photo_rows(found: system.System) -> ErrorRows:
+    """Rows of the photos of a strip: centre and small rotation, d = 6.
+
+    Each photo moves with the model on its right, the last with its own and the step behind it.
+    """
+    errors, models = found.errors, found.errors.models
+    next_centers = -errors.steps[:, :3, SCALE]
+    centers = np.concatenate([-next_centers.sum(axis=0)[None], next_centers])  # the origin is the mean of all
+    by_similarity = np.zeros((models + 1, 6, SIMILARITY_PARAMETERS))
+    by_similarity[:, :3] = similarity_derivatives(centers, np.zeros(3))
+    by_similarity[:, 3:, 3:6] = np.eye(3)
+    by_component = np.zeros((models + 1, 1, 6, COMPONENTS))
+    by_component[-1, 0] = by_similarity[-1] @ errors.steps[-1]
+    return ErrorRows.without_images(np.append(np.arange(models), models - 1), by_similarity, by_component)
 
 
-def _units(found: system.System) -> Floats:
-    """Units of the unknowns that are centre and small rotation of a photo, metres and radians."""
-    return np.repeat([found.similarities.shift, found.similarities.turn], 3)
+def photo_errors(found: system.System) -> Floats:
+    """Predict the errors (p + 1, 6) of the photos, centre and small rotation."""
+    return np.asarray((photo_rows(found).by_similarity @ found.unknowns[:, :, None])[:, :, 0], float)
 
 
 def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
@@ -131,16 +129,16 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
         result[:, :, order] = with_columns(found, rows, reduced.solved(found, units))
         return result
     for section in _reduced(found, rows):
-        by_rows = reduced.products(units, reduced.solved(found, section.rows.by_coordinate))[:, 0]
+        by_rows = reduced.products(found, units, reduced.solved(found, section.rows.by_coordinate))[:, 0]
         result[section.part[:, None, None], np.arange(size)[:, None], order] = by_rows.T.reshape(-1, size, len(order))
     return result
 
 
 def with_columns(found: system.System, rows: ErrorRows, columns: reduced.Solved) -> Floats:
     """Give b^T K^-1 b' of rows with others, shape (n, d, c)."""
-    result = np.zeros((*rows.by_similarity.shape[:2], columns.columns.shape[1]))
+    result = np.zeros((*rows.by_similarity.shape[:2], columns.columns.shape[2]))
     for part, some, _ in _reduced(found, rows):
-        result[part] = reduced.products(some, columns)
+        result[part] = reduced.products(found, some, columns)
     return result
 
 
@@ -189,8 +187,8 @@ def cofactors_of(found: system.System, conditions: Numbers) -> Floats:
 def conditions_with_columns(found: system.System, conditions: Numbers, columns: reduced.Solved) -> Floats:
     """Give e^T K^-1 b' of some conditions with others, shape (n, c)."""
     order = np.argsort(conditions, kind="stable")
-    result = np.empty((len(order), columns.columns.shape[1]))
-    result[order] = reduced.products(reduced.of_conditions(found, conditions[order]), columns)[:, 0]
+    result = np.empty((len(order), columns.columns.shape[2]))
+    result[order] = reduced.products(found, reduced.of_conditions(found, conditions[order]), columns)[:, 0]
     return result
 
 

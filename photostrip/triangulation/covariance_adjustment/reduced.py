@@ -9,15 +9,15 @@ Source: derived; see docs/precision.md, eq. 7.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers, distinct, runs_of
 from photostrip.frozen import NamedTuple, dataclass
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment.system import System, same_images
-from photostrip.triangulation.covariance_adjustment.windows import PLACES, windows
+from photostrip.triangulation.covariance_adjustment.windows import ANCHOR, MODEL, MODELS, windows
 from photostrip.triangulation.error_propagation.covariances import NearImages
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows, ranges
 
@@ -27,7 +27,7 @@ class Reduced:
     """Rows of d coordinates, ordered by the first models of their points."""
 
     base: Numbers  # (n,): first model
-    window: Floats  # (n, d, w, 14): z
+    window: Floats  # (n, d, 7 + 24 w): z
     condition: Numbers  # (n,): first condition of their points; of points without any, of another
     own: Floats  # (n, k, d): s, of the conditions from there on
 
@@ -37,24 +37,17 @@ class Reduced:
         size = self.own.shape[2]
         return Reduced(
             base=np.repeat(self.base, size),
-            window=self.window.reshape(-1, 1, *self.window.shape[2:]),
+            window=self.window.reshape(len(self.base) * size, 1, -1),
             condition=np.repeat(self.condition, size),
             own=self.own.transpose(0, 2, 1).reshape(len(self.base) * size, -1, 1),
         )
-
-    @property
-    def starts(self) -> Iterator[tuple[int, slice]]:
-        """Go through their models: number, and rows."""
-        begins = np.flatnonzero(np.diff(self.base, prepend=-1)).tolist()
-        for start, stop in pairwise([*begins, len(self.base)]):
-            yield int(self.base[start]), slice(start, stop)
 
 
 class Solved(NamedTuple):
     """Rows of one coordinate, and S^-1 z of them."""
 
     rows: Reduced
-    columns: Floats  # (g b, c)
+    columns: Floats  # (g, b, c)
 
 
 def of_rows(found: System, rows: ErrorRows, near: NearImages) -> Reduced:
@@ -62,7 +55,7 @@ def of_rows(found: System, rows: ErrorRows, near: NearImages) -> Reduced:
     conditions, count, size = found.conditions, *rows.by_similarity.shape[:2]
     result = Reduced(
         base=rows.first,
-        window=windows(found.similarities, rows, near.with_components, rows.first, found.width + 1),
+        window=windows(found.blocks, conditions.similarities, rows, near.with_components, rows.first),
         condition=np.full(count, -1),
         own=np.zeros((count, found.roots.root.shape[1], size)),
     )
@@ -80,7 +73,7 @@ def of_conditions(found: System, chosen: Numbers) -> Reduced:
     count, start = len(chosen), found.roots.start[chosen]
     result = Reduced(
         base=found.conditions.base[chosen],
-        window=np.zeros((count, 1, found.width + 1, PLACES)),
+        window=np.zeros((count, 1, SIMILARITY_PARAMETERS + 2 * found.blocks.width * MODEL)),
         condition=start,
         own=np.zeros((count, found.roots.root.shape[1], 1)),
     )
@@ -100,46 +93,39 @@ def _reduce(found: System, result: Reduced) -> None:
         here = np.flatnonzero((row == first + place) & (roots.start[row] == first))
         own = (roots.root[row[here], None] @ plain[here])[:, 0]
         result.own[rows[here], place] = own
-        result.window[rows[here]] -= own[:, :, None, None] * whitened[row[here], None]
+        result.window[rows[here]] -= own[:, :, None] * whitened[row[here], None]
 
 
 def solved(found: System, rows: Reduced) -> Solved:
     """Solve for the windows of rows of one coordinate."""
-    blocks, height = found.solution.shape
-    right = np.zeros((blocks * found.width + found.width + 1, PLACES, len(rows.base)))
-    number = np.arange(len(rows.base))
-    for photo in range(found.width + 1):
-        right[rows.base + photo, :, number] = rows.window[:, 0, photo]
-    columns = found.factors.solve(right[: blocks * found.width].reshape(blocks, height, -1))
-    return Solved(rows, columns.reshape(blocks * height, -1))
+    right, own = np.zeros((*found.solution.shape, len(rows.base))), found.blocks.height - ANCHOR.start
+    number, block = np.arange(len(rows.base)), rows.base // found.blocks.width
+    right[block, ANCHOR.start :, number] = rows.window[:, 0, :own]
+    inside = np.flatnonzero(block + 1 < len(right))
+    right[block[inside] + 1, MODELS:, number[inside]] = rows.window[inside, 0, own:]
+    return Solved(rows, found.factors.solve(right))
 
 
-def products(rows: Reduced, others: Solved) -> Floats:
+def products(found: System, rows: Reduced, others: Solved) -> Floats:
     """Give b^T K^-1 b' of rows with others, shape (n, d, c)."""
     result = _own_products(rows, others.rows)
-    count, size, photos, _ = rows.window.shape
-    window = rows.window.reshape(count, size, photos * PLACES)
-    for base, some in rows.starts:
-        columns = others.columns[base * PLACES :][: photos * PLACES]
-        result[some] += window[some, :, : len(columns)] @ columns
+    for block, some in runs_of(rows.base // found.blocks.width):
+        near = [others.columns[block, ANCHOR.start :], *others.columns[block + 1 : block + 2, MODELS:]]
+        columns = np.concatenate(near)
+        result[some] += rows.window[some, :, : len(columns)] @ columns
     return result
 
 
 def squares(found: System, rows: Reduced) -> Floats:
     """Give b^T K^-1 b of each row, shape (n, d, d)."""
-    count, size, photos, _ = rows.window.shape
-    window = rows.window.reshape(count * size, photos * PLACES)
-    through, number, inverse = np.empty_like(window), -1, np.zeros((0, 0))
-    for base, some in rows.starts:
-        block, place = divmod(base, found.width)
-        if block > number:
-            number, inverse = block, found.factors.near_diagonal(block)
-        near = inverse[place * PLACES :, place * PLACES :][: photos * PLACES, : photos * PLACES]
-        own = slice(some.start * size, some.stop * size)  # beyond the last photo windows are 0
-        np.matmul(window[own, : len(near)], near, out=through[own, : len(near)])
-        through[own, len(near) :] = 0.0
+    count, size, length = rows.window.shape
+    window, own, later = rows.window.reshape(count * size, length), slice(ANCHOR.start, None), slice(MODELS, None)
+    through = np.zeros_like(window)
+    for block, some in runs_of(rows.base // found.blocks.width):
+        near, part = found.factors.near_diagonal(block, own, later), slice(some.start * size, some.stop * size)
+        np.matmul(window[part, : len(near)], near, out=through[part, : len(near)])  # behind the last are zeros
     result = rows.own.transpose(0, 2, 1) @ rows.own
-    result += window.reshape(count, size, -1) @ through.reshape(count, size, -1).transpose(0, 2, 1)
+    result += rows.window @ through.reshape(rows.window.shape).transpose(0, 2, 1)
     return np.asarray(result, float)
 
 
@@ -149,14 +135,11 @@ def squares_and_products(found: System, rows: Reduced) -> Floats:
     With S eliminated from the first block on, a window becomes r in its two blocks and all later ones, and z^T S^-1 z'
     = sum r^T P^-1 r'. What blocks behind both windows add to it is said by the inverse on the diagonal.
     """
-    factors, count, height = found.factors, len(rows.base), found.solution.shape[1]
-    own = _own_products(rows, rows)[:, 0]
-    by_photo = np.zeros((count, 2 * found.width, PLACES))
-    place = rows.base % found.width
-    for photo in range(found.width + 1):
-        by_photo[np.arange(count), place + photo] = rows.window[:, 0, photo]
-    columns = by_photo.reshape(count, 2, height)
-    ends = np.searchsorted(rows.base // found.width, np.arange(len(factors.inverses) + 1))
+    factors, count, height = found.factors, len(rows.base), found.blocks.height
+    result, columns = _own_products(rows, rows)[:, 0], np.zeros((count, 2, height))
+    columns[:, 0, ANCHOR.start :] = rows.window[:, 0, : height - ANCHOR.start]
+    columns[:, 1, MODELS:] = rows.window[:, 0, height - ANCHOR.start :]
+    ends = np.searchsorted(rows.base // found.blocks.width, np.arange(found.blocks.count + 1))
     reduced = np.zeros((height, 0))
     for number, (start, stop) in enumerate(pairwise(ends.tolist())):
         before = int(ends[max(number - 1, 0)])
@@ -170,8 +153,8 @@ def squares_and_products(found: System, rows: Reduced) -> Floats:
             (factors.diagonal_of_inverse[number], slice(before, start)),
             (factors.inverses[number], slice(start, stop)),
         ):
-            own[: some.stop, some] += reduced[:, : some.stop].T @ (weight @ reduced[:, some])
-    upper = np.triu(own)
+            result[: some.stop, some] += reduced[:, : some.stop].T @ (weight @ reduced[:, some])
+    upper = np.triu(result)
     return np.asarray(upper + np.triu(upper, 1).T, float)
 
 

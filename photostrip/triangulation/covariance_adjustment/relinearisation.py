@@ -35,7 +35,7 @@ def image_errors(found: System) -> Floats:
     In their stated standard deviations, in the order of ``errors.images``.
     """
     rows = found.conditions.rows
-    result = by_components(found.errors, -found.by_photo[:-1, :COMPONENTS] / found.similarities.size)
+    result = by_components(found.errors, -found.component_correlates)
     add_rows(result, rows.image, rows.by_image[:, 0] * found.correlates[rows.item][:, None])
     return result
 
@@ -75,8 +75,7 @@ def displacements(components: Floats, rows: ErrorRows, images: Floats) -> Floats
 
 def largest_turn(found: System) -> float:
     """Largest turn and change of scale of a model: root of the sum of their squares, radians."""
-    turns = found.unknowns[:, 3:] * found.similarities.turn
-    return float(np.sqrt(np.square(turns).sum(axis=1).max()))
+    return float(np.sqrt(np.square(found.unknowns[:, 3:]).sum(axis=1).max()))
 
 
 def oriented_again(orientation: Orientation, xy: Floats) -> Orientation:

@@ -1,8 +1,9 @@
-"""The unknowns of an adjusted strip: a small similarity at every photo, and what two neighbours say of their model.
+"""The unknowns of an adjusted strip: the error components of its models, and small similarities of some of its photos.
 
-Each is taken about the perspective centre of its photo, turns and scale by what they move at the distance of a base, so
-that a strip of any length makes a system of the same condition. Those of a model's two photos differ by seven numbers:
-six are its error components u, and the seventh, how the length of the base changes beside its scale, is zero.
+From photo to photo the similarity changes by the step of their model, six error components. Adding up steps over a
+whole strip would make everything depend on everything; so every few photos one, the *anchor* of a block, has its
+similarity as an unknown, too. It is taken about the photo's perspective centre, turns and scale by what they move at
+the distance of a base, so that a strip of any length makes a system of the same condition.
 
 Source: derived; see docs/precision.md, eq. 7.
 """
@@ -23,17 +24,14 @@ from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 @dataclass(frozen=True, eq=False)
 class PhotoSimilarities:
-    """Similarities of the models about their left photos, and of the last photo about itself."""
+    """How unknowns of photos and models make similarities about the common origin."""
 
-    to_common: Floats  # (p + 1, 7, 7): from the unknowns of each photo to the similarity about the common origin
-    # shift, turn: by which unknowns are multiplied, metres; radians, and logarithms of scales
-    shift: float
-    turn: float
-    # size: (p, 6): standard deviations of the error components
-    # own, following: (p, 7, 7): [u / size; 0] = own y(i) + following y(i + 1)
-    size: Floats
-    own: Floats
-    following: Floats
+    # to_common, from_common: (p + 1, 7, 7): from the unknowns of a photo to its similarity about the common origin, and
+    # back
+    to_common: Floats
+    from_common: Floats
+    size: Floats  # (p, 6): standard deviations of the error components, in which these are unknowns
+    steps: Floats  # (p, 7, 6): step from the similarity of a photo to that of the next by these unknowns
 
     @classmethod
     def of(cls, errors: StripErrors) -> Self:
@@ -41,21 +39,15 @@ class PhotoSimilarities:
         # the step's scale column is minus the centre that joins its model to the next; the origin is the mean of all
         next_centers = -errors.steps[:, :3, SCALE]
         centers = np.concatenate([-next_centers.sum(axis=0)[None], next_centers])
-        base = np.diff(centers, axis=0)
-        length = float(np.linalg.norm(base, axis=1).mean())
+        length = float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean())
         to_common, from_common = np.tile(np.eye(SIMILARITY_PARAMETERS), (2, len(centers), 1, 1))
         to_common[:, :3, 3:6], to_common[:, :3, 6] = cross_matrix(centers), -centers
         from_common[:, :3, 3:6], from_common[:, :3, 6] = -cross_matrix(centers), centers
         size = np.sqrt(np.diagonal(errors.component_covariances[:, 0], axis1=1, axis2=2))
         size = np.where(size > 0, size, 1.0)  # the last model hands no scale on
+        steps = errors.steps * size[:, None]
         metres = np.array([1.0] * 3 + [length] * 4)
-        steps = from_common[1:] @ errors.steps * size[:, None] * metres[:, None]
-        # one unit is what a component of standard size moves: control of any precision leaves the system well scaled
-        unit = float(np.sqrt(np.square(steps[:, :, ELEMENTS]).sum(axis=1).mean()))
-        metres /= unit
-        to_common, from_common = to_common / metres, from_common * metres[:, None]
-        along_base = np.zeros((len(base), SIMILARITY_PARAMETERS, 1))
-        along_base[:, :3, 0] = base / np.linalg.norm(base, axis=1)[:, None]
-        following = np.linalg.inv(np.concatenate([steps / unit, along_base], axis=2))
-        own = -following @ from_common[1:] @ to_common[:-1]
-        return cls(to_common=to_common, shift=unit, turn=unit / length, size=size, own=own, following=following)
+        moved = from_common[1:] @ steps[:, :, ELEMENTS] * metres[:, None]
+        # one unit is what an element of standard size moves: control of any precision leaves the system well scaled
+        metres /= np.sqrt(np.square(moved).sum(axis=1).mean())
+        return cls(to_common=to_common / metres, from_common=from_common * metres[:, None], size=size, steps=steps)

@@ -1,8 +1,9 @@
-"""The banded system of a strip: the unknowns of all photos, what models and points say of them, and its elimination.
+"""The banded system of a strip: what models and points say of its unknowns, block by block, and its elimination.
 
 Conditions of a point share its image points and nothing else with other conditions but error components and unknowns.
-So they are eliminated first, point by point, whatever their number; what is left are 14 rows for each photo. Photos are
-taken in blocks of as many as a point reaches over, so that only neighbouring blocks have anything in common.
+So they are eliminated first, point by point, whatever their number; what is left are the unknowns of the models and of
+an anchor for each block, with the correlates of what defines them. A block takes as many models as a point reaches
+over, so that only neighbouring blocks have anything in common.
 
 Source: derived; see docs/precision.md, eq. 7.
 """
@@ -11,17 +12,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from itertools import pairwise
 from typing import Self
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers, distinct, runs_of
 from photostrip.frozen import NamedTuple, dataclass, replace
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
 from photostrip.triangulation.covariance_adjustment.conditions import Conditions
 from photostrip.triangulation.covariance_adjustment.similarities import PhotoSimilarities
-from photostrip.triangulation.covariance_adjustment.windows import PLACES, STEP, UNKNOWN, windows
+from photostrip.triangulation.covariance_adjustment.windows import (
+    ANCHOR,
+    COMPONENT,
+    CORRELATE,
+    LINK,
+    MODEL,
+    MODELS,
+    Blocks,
+    windows,
+)
 from photostrip.triangulation.error_propagation.covariances import NearImages
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows, ranges
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
@@ -120,53 +130,61 @@ class PointRoots:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """An eliminated and solved system; its photos begin with two that have no part in it."""
+    """An eliminated and solved system."""
 
     errors: StripErrors
     conditions: Conditions
     components: Floats  # (p, 6): what the error components are known to be already
     roots: PointRoots
-    width: int  # photos of a block
+    blocks: Blocks
     factors: block_tridiagonal.Factors
-    solution: Floats  # (g, b): correlates of the components, and unknowns
-
-    @property
-    def similarities(self) -> PhotoSimilarities:
-        return self.conditions.similarities
-
-    @cached_property
-    def by_photo(self) -> Floats:
-        """The solution (p + 1, 14) photo by photo."""
-        every = self.solution.reshape(-1, PLACES)
-        return every[SHARING : SHARING + self.errors.models + 1]
-
-    @property
-    def unknowns(self) -> Floats:
-        """Small similarities y of the photos, shape (p + 1, 7)."""
-        return self.by_photo[:, UNKNOWN]
+    solution: Floats  # (g, b): correlates and unknowns
 
     @cached_property
     def correlates(self) -> Floats:
         """Correlates lambda of the conditions, shape (n,)."""
-        found, result = self.solution.reshape(-1, PLACES), np.empty(len(self.conditions.value))
-        around = np.arange(self.width + 1)
-        for part in sections(self.conditions.base):
-            photos = np.minimum(self.conditions.base[part, None] + around, len(found) - 1)  # beyond it windows are 0
-            said = np.einsum("nwc,nwc->n", self.windows(part), found[photos])
+        base, result = self.conditions.base, np.empty(len(self.conditions.value))
+        following = np.concatenate([self.solution[1:, MODELS:], np.zeros((1, self.blocks.height - MODELS))])
+        of_windows = np.concatenate([self.solution[:, ANCHOR.start :], following], axis=1)
+        for part in sections(base):
+            said = np.einsum("nc,nc->n", self.windows(part), of_windows[base[part] // self.blocks.width])
             roots = self.roots.take(part)
             result[part] = roots.weighted(roots.whitened(self.conditions.value[part]) - said)
         return result
 
     @property
+    def component_correlates(self) -> Floats:
+        """Correlates (p, 6) of the error components."""
+        return self._of_models[:, CORRELATE] / self.conditions.similarities.size
+
+    @cached_property
+    def unknowns(self) -> Floats:
+        """Small similarities (p + 1, 7) of the photos about the common origin: of anchors, and the steps behind."""
+        similarities, (blocks, width) = self.conditions.similarities, (len(self.solution), self.blocks.width)
+        moved = np.zeros((blocks * width, SIMILARITY_PARAMETERS))
+        models = slice(SHARING, SHARING + self.errors.models)
+        moved[models] = (similarities.steps @ self._of_models[:, COMPONENT, None])[:, :, 0]
+        before = np.cumsum(moved.reshape(blocks, width, -1), axis=1)[:, :-1]
+        anchors = similarities.to_common[self.blocks.anchors] @ self.solution[:, ANCHOR, None]
+        result = np.repeat(anchors[:, None, :, 0], width, axis=1)
+        result[:, 1:] += before
+        return result.reshape(blocks * width, -1)[SHARING : SHARING + self.errors.models + 1]
+
+    @property
     def squares(self) -> float:
         """Weighted sum of squares of all misclosures, w^T lambda."""
-        of_components = self.by_photo[:-1, :COMPONENTS] / self.similarities.size
-        known = float((self.components * of_components).sum())
+        known = float((self.components * self.component_correlates).sum())
         return float(self.conditions.value @ self.correlates) - known
 
+    @property
+    def _of_models(self) -> Floats:
+        """The solution (p, 12) model by model."""
+        every = self.solution[:, MODELS:].reshape(-1, MODEL)
+        return every[SHARING : SHARING + self.errors.models]
+
     def windows(self, some: slice | Numbers) -> Floats:
-        """Whitened windows (n, w, 14) of some conditions, of whole points."""
-        return _windows(self.errors, self.conditions, self.roots, some, self.width + 1)
+        """Whitened windows (n, 7 + 24 w) of some conditions, of whole points."""
+        return _windows(self.errors, self.conditions, self.roots, self.blocks, some)
 
 
 def system(errors: StripErrors, wanted: Conditions, factor: float, components: Floats | None = None) -> System:
@@ -176,17 +194,18 @@ def system(errors: StripErrors, wanted: Conditions, factor: float, components: F
     known to be already.
     """
     reach = max(wanted.rows.by_component.shape[1], errors.points.by_component.shape[1], SHARING)
-    width, photos = reach + SHARING, SHARING + errors.models + 1
-    blocks = -(-photos // width)
+    blocks = Blocks.of(errors.models, reach)
     roots = PointRoots.of(wanted.rows, wanted.point, wanted.noise / factor)
-    diagonal, beside = np.zeros((2, blocks, width * PLACES, width * PLACES))
-    _add_models(errors, wanted.similarities, diagonal, beside)
-    right = np.zeros((blocks * width + reach + 1, PLACES))
+    diagonal, beside = np.zeros((2, blocks.count, blocks.height, blocks.height))
+    right = np.zeros((blocks.count, blocks.height))
+    _add_models(errors, wanted.similarities, blocks, diagonal, beside)
+    _add_links(wanted.similarities, blocks, diagonal, beside)
     for part in sections(wanted.base):
-        found = _windows(errors, wanted, roots, part, width + 1)
-        _subtract_points(wanted.base[part], found.reshape(len(found), -1), diagonal, beside)
+        found = _windows(errors, wanted, roots, blocks, part)
         whitened = roots.take(part).whitened(wanted.value[part])
-        _subtract_right(wanted.base[part], found, whitened, right)
+        for block, some in runs_of(wanted.base[part] // blocks.width):
+            _subtract_squares(found[some].T @ found[some], block, diagonal, beside)
+            _subtract(found[some].T @ whitened[some], block, right)
     known = np.zeros((errors.models, COMPONENTS)) if components is None else components
     factors = block_tridiagonal.eliminate(diagonal, beside)
     return System(
@@ -194,7 +213,7 @@ def system(errors: StripErrors, wanted: Conditions, factor: float, components: F
         conditions=wanted,
         components=known,
         roots=roots,
-        width=width,
+        blocks=blocks,
         factors=factors,
         solution=_solution(factors, wanted.similarities, right, known),
     )
@@ -202,85 +221,91 @@ def system(errors: StripErrors, wanted: Conditions, factor: float, components: F
 
 def solved_for(found: System, value: Floats, components: Floats | None = None) -> System:
     """Solve the eliminated system for other misclosures (n,) of the same conditions."""
-    conditions = replace(found.conditions, value=value)
-    right = np.zeros((len(found.solution) * found.width + found.width, PLACES))
+    conditions, right = replace(found.conditions, value=value), np.zeros_like(found.solution)
     for part in sections(conditions.base):
-        whitened = found.roots.take(part).whitened(value[part])
-        _subtract_right(conditions.base[part], found.windows(part), whitened, right)
+        windows_, whitened = found.windows(part), found.roots.take(part).whitened(value[part])
+        for block, some in runs_of(conditions.base[part] // found.blocks.width):
+            _subtract(windows_[some].T @ whitened[some], block, right)
     known = np.zeros_like(found.components) if components is None else components
-    solution = _solution(found.factors, found.similarities, right, known)
+    solution = _solution(found.factors, conditions.similarities, right, known)
     return replace(found, conditions=conditions, components=known, solution=solution)
 
 
-def _windows(errors: StripErrors, wanted: Conditions, roots: PointRoots, some: slice | Numbers, photos: int) -> Floats:
-    """Whitened windows (n, w, 14) of some conditions, of whole points."""
+def _windows(
+    errors: StripErrors, wanted: Conditions, roots: PointRoots, blocks: Blocks, some: slice | Numbers
+) -> Floats:
+    """Whitened windows (n, 7 + 24 w) of some conditions, of whole points."""
     rows = wanted.rows.part(some.start, some.stop) if isinstance(some, slice) else wanted.rows.take(some)
     images = NearImages.of(errors, rows).with_components
-    plain = windows(wanted.similarities, rows, images, wanted.base[some], photos)
+    plain = windows(blocks, wanted.similarities, rows, images, wanted.base[some])
     return roots.take(some).whitened(plain[:, 0])
 
 
 def _solution(
     factors: block_tridiagonal.Factors, similarities: PhotoSimilarities, right: Floats, components: Floats
 ) -> Floats:
-    count, height = factors.inverses.shape[:2]
-    models = slice(SHARING, SHARING + len(components))
-    right[models, :COMPONENTS] -= components / similarities.size
-    return factors.solve(right[: count * height // PLACES].reshape(count, height, 1))[:, :, 0]
+    of_models = right[:, MODELS:].reshape(-1, MODEL)
+    of_models[SHARING : SHARING + len(components), CORRELATE] -= components / similarities.size
+    right[:, MODELS:] = of_models.reshape(len(right), -1)
+    return factors.solve(right[:, :, None])[:, :, 0]
 
 
-def _add_models(errors: StripErrors, similarities: PhotoSimilarities, diagonal: Floats, beside: Floats) -> None:
-    """Add covariances of the components, and what they are by the unknowns; a unit matrix where no photo is."""
-    blocks, height, _ = diagonal.shape
-    width, models = height // PLACES, errors.models
-    shape = blocks, width, PLACES, width, PLACES
-    diagonal, beside = diagonal.reshape(shape), beside.reshape(shape)
-
-    def put(first: Numbers, apart: int, rows: slice, columns: slice, values: Floats) -> None:
-        block, place = np.divmod(first, width)
-        next_block, other = np.divmod(first + apart, width)
-        for blocks_, some in ((diagonal, next_block == block), (beside, next_block > block)):
-            blocks_[block[some], place[some], rows, other[some], columns] = values[some]
-        own = np.flatnonzero(next_block == block)
-        diagonal[block[own], other[own], columns, place[own], rows] = values[own].transpose(0, 2, 1)
-
-    photos = SHARING + np.arange(models)
-    components = slice(0, COMPONENTS)
-    for apart in range(min(SPAN, models)):
-        size = similarities.size[: models - apart, :, None] * similarities.size[apart:, None]
-        values = errors.component_covariances[: models - apart, apart] / size
-        put(photos[: models - apart], apart, components, components, values)
-    put(photos, 0, STEP, UNKNOWN, similarities.own)
-    put(photos, 1, STEP, UNKNOWN, similarities.following)
-    last = photos[-1:] + 1
-    none = np.append(np.arange(SHARING), np.arange(int(last[0]) + 1, blocks * width))
-    for empty, places in ((none, slice(0, PLACES)), (last, STEP)):
-        unit = np.eye(places.stop - places.start)
-        put(empty, 0, places, places, np.broadcast_to(unit, (len(empty), *unit.shape)))
+def _add_models(
+    errors: StripErrors, similarities: PhotoSimilarities, blocks: Blocks, diagonal: Floats, beside: Floats
+) -> None:
+    """Add covariances of the error components, which unknowns they are, and a unit matrix where no model is."""
+    shape = blocks.count, blocks.width, MODEL, blocks.width, MODEL
+    on, next_to = np.zeros((2, *shape))
+    models = np.arange(errors.models)
+    for apart in range(min(SPAN, len(models))):
+        some = models[: len(models) - apart]
+        (block, place), (other_block, other) = blocks.places(some), blocks.places(some + apart)
+        size = similarities.size[some, :, None] * similarities.size[some + apart, None]
+        values = errors.component_covariances[some, apart] / size
+        for where, there in ((on, other_block == block), (next_to, other_block > block)):
+            where[block[there], place[there], CORRELATE, other[there], CORRELATE] = values[there]
+        same = other_block == block
+        on[block[same], other[same], CORRELATE, place[same], CORRELATE] = values[same].transpose(0, 2, 1)
+    block, place = blocks.places(models)
+    unit = np.eye(COMPONENTS)
+    on[block, place, COMPONENT, place, CORRELATE] = on[block, place, CORRELATE, place, COMPONENT] = unit
+    is_model = np.zeros(blocks.count * blocks.width, bool)
+    is_model[SHARING + models] = True
+    block, place = np.divmod(np.flatnonzero(~is_model), blocks.width)
+    on[block, place, :, place] = np.eye(MODEL)
+    diagonal[:, MODELS:, MODELS:] = on.reshape(blocks.count, blocks.height - MODELS, -1)
+    beside[:, MODELS:, MODELS:] = next_to.reshape(blocks.count, blocks.height - MODELS, -1)
 
 
-def _subtract_points(base: Numbers, found: Floats, diagonal: Floats, beside: Floats) -> None:
-    """Subtract Z^T D^-1 Z of conditions with whitened windows (n, w 14)."""
-    blocks, height, _ = diagonal.shape
-    width = height // PLACES
-    starts = np.flatnonzero(np.diff(base, prepend=-1))
-    for start, stop in pairwise([*starts.tolist(), len(base)]):
-        block, place = divmod(int(base[start]), width)
-        squares = found[start:stop].T @ found[start:stop]
-        first = place * PLACES
-        inside = height - first  # places of the window in its first block; the others are in the next
-        diagonal[block, first:, first:] -= squares[:inside, :inside]
-        if block + 1 < blocks:
-            rest = len(squares) - inside
-            beside[block, first:, :rest] -= squares[:inside, inside:]
-            diagonal[block + 1, :rest, :rest] -= squares[inside:, inside:]
+def _add_links(similarities: PhotoSimilarities, blocks: Blocks, diagonal: Floats, beside: Floats) -> None:
+    """Join each anchor to the next by the steps between: 0 = y(b + 1) - y(b) carried over - sum of steps."""
+    anchors, unit = blocks.anchors, np.eye(SIMILARITY_PARAMETERS)
+    from_common = similarities.from_common[anchors[1:]]
+    beside[:-1, LINK, ANCHOR] = unit
+    carried = np.zeros((blocks.count - 1, SIMILARITY_PARAMETERS, blocks.height - LINK.stop))
+    carried[:, :, :SIMILARITY_PARAMETERS] = -from_common @ similarities.to_common[anchors[:-1]]
+    of_models = carried[:, :, SIMILARITY_PARAMETERS:].reshape(len(carried), SIMILARITY_PARAMETERS, blocks.width, MODEL)
+    for place in range(blocks.width):
+        model = np.arange(len(carried)) * blocks.width + place - SHARING
+        steps = similarities.steps[np.maximum(model, 0)] * (model >= 0)[:, None, None]
+        of_models[:, :, place, COMPONENT] = -from_common @ steps
+    diagonal[:-1, LINK, ANCHOR.start :] = carried
+    diagonal[:-1, ANCHOR.start :, LINK] = carried.transpose(0, 2, 1)
+    diagonal[-1, LINK, LINK] = unit  # none follows the last
 
 
-def _subtract_right(base: Numbers, found: Floats, whitened: Floats, right: Floats) -> None:
-    """Subtract Z^T D^-1 w of conditions with whitened windows (n, w, 14) from the right side, photo by photo."""
-    starts = np.flatnonzero(np.diff(base, prepend=-1))
-    if not len(starts):
-        return
-    sums = np.add.reduceat(found * whitened[:, None, None], starts, axis=0)
-    for photo in range(found.shape[1]):
-        right[base[starts] + photo] -= sums[:, photo]
+def _subtract_squares(squares: Floats, block: int, diagonal: Floats, beside: Floats) -> None:
+    """Subtract Z^T D^-1 Z of conditions whose windows begin in a block."""
+    own = diagonal.shape[1] - ANCHOR.start
+    diagonal[block, ANCHOR.start :, ANCHOR.start :] -= squares[:own, :own]
+    if block + 1 < len(diagonal):  # behind the last there are zeros
+        beside[block, ANCHOR.start :, MODELS:] -= squares[:own, own:]
+        diagonal[block + 1, MODELS:, MODELS:] -= squares[own:, own:]
+
+
+def _subtract(values: Floats, block: int, right: Floats) -> None:
+    """Subtract what stands in a window that begins in a block from a right side (g, b)."""
+    own = right.shape[1] - ANCHOR.start
+    right[block, ANCHOR.start :] -= values[:own]
+    if block + 1 < len(right):
+        right[block + 1, MODELS:] -= values[own:]

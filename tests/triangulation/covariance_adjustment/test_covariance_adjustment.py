@@ -159,11 +159,11 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
 @every_strip
 def test_points_and_photos_are_predicted_as_by_the_whole_matrix(photos: int, lap: float, *, distances: bool) -> None:
     solved, whole = solved_twice(photos, lap, distances=distances)
-    errors, images = solved.errors, relinearisation.image_errors(solved)
+    errors, images, of_all = solved.errors, relinearisation.image_errors(solved), prediction.photo_rows(solved)
     components = relinearisation.component_errors(errors, images)
     of_points = prediction.errors(solved, errors.points, images), prediction.covariances(solved, errors.points)
-    of_photos = prediction.photo_errors(solved), prediction.photo_covariances(solved)
-    tables = (errors.points.whole(), of_points), (photo_rows(errors, solved.conditions), of_photos)
+    of_photos = prediction.photo_errors(solved), prediction.covariances(solved, of_all)
+    tables = (errors.points.whole(), of_points), (of_all, of_photos)
     for rows, (predicted, covariances) in nonempty(tables):
         own, columns = whole.columns(rows)
         moved = relinearisation.displacements(components, rows, images)
@@ -210,16 +210,24 @@ def test_control_of_any_precision_leaves_the_digits_of_points(sigma: float) -> N
     assert predicted == pytest.approx(columns.transpose(0, 2, 1) @ whole.solution, abs=1e-6)
 
 
-def photo_rows(errors: StripErrors, wanted: conditions.Conditions) -> ErrorRows:
-    """Rows of the photos, centre and small rotation: each moves with the model on its right, the last with a step."""
-    n = errors.models
-    turn = wanted.similarities.turn  # unknowns are turned and scaled by it, about centres C
-    by_similarity = np.zeros((n + 1, 6, 7))
-    by_similarity[:, :3, :3] = by_similarity[:, 3:, 3:6] = np.eye(3)
-    by_similarity[:, :3, 3:] = -wanted.similarities.to_common[:, :3, 3:] / turn
-    by_component = np.zeros((n + 1, 1, 6, 6))
-    by_component[-1, 0] = by_similarity[-1] @ errors.steps[-1]
-    return ErrorRows.without_images(np.append(np.arange(n), n - 1), by_similarity, by_component)
+@pytest.mark.slow
+def test_a_long_free_end_keeps_its_digits() -> None:
+    """Blocks of another width round otherwise; the similarity of every photo as an unknown lost five digits here."""
+    result = noisy(150, 62.0, 2)
+    errors, wanted = prepared(result, distances=True)
+    ends = errors.models // 2
+    far = (wanted.kind == conditions.CONTROL) & (wanted.rows.first > ends)
+    wanted = replace(wanted, noise=np.where(far, 1e12, wanted.noise))
+    narrow = system.system(errors, wanted, 1.0)
+    points = errors.points
+    padded = np.concatenate([points.by_component, np.zeros_like(points.by_component)], axis=1)
+    wide = system.system(replace(errors, points=replace(points, by_component=padded)), wanted, 1.0)
+    assert wide.blocks.width > narrow.blocks.width
+    stated, again = (
+        np.sqrt(np.diagonal(prediction.covariances(each, points), axis1=1, axis2=2)) for each in (narrow, wide)
+    )
+    assert stated.max() > 30.0  # metres
+    assert again == pytest.approx(stated, rel=1e-7)
 
 
 def test_blocks_are_eliminated_like_any_system() -> None:
@@ -240,7 +248,11 @@ def test_blocks_are_eliminated_like_any_system() -> None:
     assert factors.solve(right) == pytest.approx(expected, rel=1e-9)
     for number in nonempty(range(count)):
         near = slice(number * height, (number + 2) * height)
-        assert factors.near_diagonal(number) == pytest.approx(inverse[near, near], abs=1e-9)
+        assert factors.near_diagonal(number, slice(None), slice(None)) == pytest.approx(inverse[near, near], abs=1e-9)
+        rows = np.append(number * height + np.arange(1, height), (number + 1) * height + np.arange(2, height))
+        rows = rows[rows < len(inverse)]
+        part = factors.near_diagonal(number, slice(1, None), slice(2, None))
+        assert part == pytest.approx(inverse[np.ix_(rows, rows)], abs=1e-9)
 
 
 @pytest.mark.parametrize("lap", [60.0, 80.0])
