@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.precision.check_points import Propagation
     from photostrip.pipeline.results import Result
-    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows, PointRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
@@ -78,6 +78,11 @@ def oriented_of(result: Result, number: int = 0) -> OrientedStrip[StripErrors]:
         precision=strip.precision,
         settings=result.settings.absolute,
     )
+
+
+def every(points: PointRows) -> ErrorRows:
+    """Give the rows of all points."""
+    return points.take(np.arange(len(points.first)))
 
 
 def written_out(rows: ErrorRows, errors: StripErrors) -> Floats:

@@ -126,10 +126,6 @@ class ErrorRows:
             by_image=unit[self.item] @ self.by_image,
         )
 
-    def without_similarity(self) -> Self:
-        """Leave out the similarity of the first model, where that is an unknown and no error."""
-        return replace(self, by_similarity=np.zeros_like(self.by_similarity))
-
 
 @dataclass(frozen=True, eq=False)
 class PointRows:
@@ -155,17 +151,6 @@ class PointRows:
             item=item,
             image=self.image[entry],
             by_image=self.by_image[entry],
-        )
-
-    def whole(self) -> ErrorRows:
-        """Give all rows."""
-        return ErrorRows(
-            first=self.first,
-            by_similarity=self.by_similarity(np.arange(len(self.first))),
-            by_component=self.by_component,
-            item=self.item,
-            image=self.image,
-            by_image=self.by_image,
         )
 
     def by_similarity(self, rows: Numbers) -> Floats:

@@ -27,7 +27,7 @@ from photostrip.triangulation.covariance_adjustment import (
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.polynomial import correction
-from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
+from tests.derivatives import UNSCREENED, errors_of, every, spec, without_noise, written_out
 from tests.draws import orthogonal_normal
 from tests.loops import nonempty
 
@@ -65,6 +65,11 @@ def prepared(result: Result, *, distances: bool) -> Prepared:
     return found.errors, wanted
 
 
+def alone(rows: ErrorRows) -> ErrorRows:
+    """Leave out the similarities of the first models, which are unknowns and no errors."""
+    return replace(rows, by_similarity=np.zeros_like(rows.by_similarity))
+
+
 @dataclass(frozen=True, eq=False)
 class WrittenOut:
     """The system [Q A; A^T 0] of a strip with everything written out.
@@ -87,7 +92,7 @@ class WrittenOut:
         components = np.broadcast_to(np.eye(6), (n, 1, 6, 6))
         of_components = written_out(ErrorRows.without_images(np.arange(n), np.zeros((n, 6, 7)), components), errors)
         by_steps = -from_common[1:n] @ errors.steps[: n - 1] @ of_components[: n - 1]
-        own = written_out(rows.without_similarity(), errors)[:, 0]
+        own = written_out(alone(rows), errors)[:, 0]
         by_images = np.concatenate([by_steps.reshape(count, own.shape[1]), own])
         design = np.zeros((len(by_images), 7 * n))
         for junction in range(n - 1):
@@ -113,7 +118,7 @@ class WrittenOut:
 
     def columns(self, rows: ErrorRows) -> tuple[Floats, Floats]:
         """Rows by all image coordinates, similarities left out, (n, d, i), and their columns b, (n, k, d)."""
-        own = written_out(rows.without_similarity(), self.errors)
+        own = written_out(alone(rows), self.errors)
         result = np.zeros((len(rows.first), len(self.solution), own.shape[1]))
         result[:, : len(self.by_images)] = self.by_images @ own.transpose(0, 2, 1)
         for row, model in enumerate(rows.first.tolist()):
@@ -163,7 +168,7 @@ def test_points_and_photos_are_predicted_as_by_the_whole_matrix(photos: int, lap
     components = relinearisation.component_errors(errors, images)
     of_points = prediction.errors(solved, errors.points, images), prediction.covariances(solved, errors.points)
     of_photos = prediction.photo_errors(solved), prediction.covariances(solved, of_all)
-    tables = (errors.points.whole(), of_points), (of_all, of_photos)
+    tables = (every(errors.points), of_points), (of_all, of_photos)
     for rows, (predicted, covariances) in nonempty(tables):
         own, columns = whole.columns(rows)
         moved = relinearisation.displacements(components, rows, images)
@@ -199,7 +204,7 @@ def test_control_of_any_precision_leaves_the_digits_of_points(sigma: float) -> N
     errors, wanted = prepared(noisy(9, 80.0), distances=True)
     wanted = replace(wanted, noise=np.where(wanted.kind == conditions.CONTROL, sigma**2, 0.0))
     solved, whole = system.system(errors, wanted, 1.0), WrittenOut.of(errors, wanted, 1.0)
-    own, columns = whole.columns(errors.points.whole())
+    own, columns = whole.columns(every(errors.points))
     expected = own @ own.transpose(0, 2, 1) - columns.transpose(0, 2, 1) @ whole.inverse @ columns
     stated, found = (
         np.sqrt(np.diagonal(each, axis1=1, axis2=2))

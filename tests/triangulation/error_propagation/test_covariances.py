@@ -17,6 +17,7 @@ from tests.derivatives import (
     differenced,
     differenced_by_control,
     errors_of,
+    every,
     spec,
     without_noise,
     written_out,
@@ -61,7 +62,7 @@ def test_derivatives_are_those_of_the_whole_run(
     images, operator = found.errors.images, found.fit.operator
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
     points = (
-        written_out(found.errors.points.whole(), found.errors) - found.fit.influence(found.xyz) @ operator @ misclosures
+        written_out(every(found.errors.points), found.errors) - found.fit.influence(found.xyz) @ operator @ misclosures
     )
     (of_photos,) = found.photos()
     photos = written_out(of_photos.rows, found.errors) - of_photos.influence @ operator @ misclosures
@@ -103,7 +104,7 @@ def test_sums_along_the_strip_equal_the_whole_matrices(photos: int, lap: float, 
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
     (of_photos,) = found.photos()
     for rows, influence in (
-        (found.errors.points.whole(), found.fit.influence(found.xyz)),
+        (every(found.errors.points), found.fit.influence(found.xyz)),
         (of_photos.rows, of_photos.influence),
     ):
         by_control = influence @ found.fit.operator
@@ -167,7 +168,7 @@ def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
     place = int(np.searchsorted(formed.point, point))
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
     by_image = (
-        written_out(found.errors.points.whole(), found.errors)
+        written_out(every(found.errors.points), found.errors)
         - found.fit.influence(found.xyz) @ found.fit.operator @ misclosures
     )
     for row in (rows[0], rows[2], int(np.flatnonzero(observations.photo == 3)[2])):
