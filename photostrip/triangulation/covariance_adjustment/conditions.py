@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.triangulation.covariance_adjustment.similarities import PhotoSimilarities
@@ -68,14 +68,16 @@ def conditions(
     count = len(misclosures)
     parts = [_Part(rows=control.rows, value=misclosures, noise=control.variance, source=np.arange(count))]
     if distances:
-        parts += [_distances(errors, *section) for section in errors.sections()]
+        placed = np.asarray(np.isfinite(formed.model_xyz).all(axis=1), bool)
+        parts += [_distances(errors, placed[section.rows], section, pairs) for section, pairs in errors.sections()]
     rows = ErrorRows.joined([part.rows for part in parts])
     kind = np.where(np.arange(len(rows.first)) < count, CONTROL, DISTANCE)
     value, noise, source = (
         np.concatenate([getattr(part, name) for part in parts]) for name in ("value", "noise", "source")
     )
     del parts  # before all of it is put in order
-    point, base = _points(errors, orientation, formed, rows)
+    point = _points(errors, orientation, rows)
+    base = errors.points.first[np.searchsorted(formed.point, point)]
     order = np.lexsort((point, base))
     return Conditions(
         rows=rows.take(order),
@@ -89,17 +91,11 @@ def conditions(
     )
 
 
-def _points(
-    errors: StripErrors, orientation: Orientation, formed: FormedStrip, rows: ErrorRows
-) -> tuple[Numbers, Numbers]:
-    """Points (n,) of rows, and their first models: of points that only join models, those of their first condition."""
+def _points(errors: StripErrors, orientation: Orientation, rows: ErrorRows) -> Numbers:
+    """Points (n,) of rows, each of which image points of one point alone enter directly."""
     of_image = np.empty(len(errors.images.row), np.intp)
     of_image[errors.images.rows_of(orientation.rows)] = orientation.point[:, None]
-    point = of_image[rows.image[np.searchsorted(rows.item, np.arange(len(rows.first)))]]
-    first = np.full(int(orientation.point.max()) + 1, errors.models)
-    first[formed.point] = errors.points.first
-    np.minimum.at(first, point, rows.first)
-    return point, first[point]
+    return of_image[rows.image[np.searchsorted(rows.item, np.arange(len(rows.first)))]]
 
 
 def misclosures_at(wanted: Conditions, formed: FormedStrip, similarity: Similarity, control: Floats) -> Floats:
@@ -120,15 +116,18 @@ def misclosures_at(wanted: Conditions, formed: FormedStrip, similarity: Similari
     return result
 
 
-def _distances(errors: StripErrors, section: Section, pairs: PairErrors) -> _Part:
+def _distances(errors: StripErrors, placed: Flags, section: Section, pairs: PairErrors) -> _Part:
     """Distances of pass points from the common centre, after minus before the junction: w = L v.
 
     What lies across the ray is left out: its variance nearly vanishes to first order, and what is left of it would
     count as information. One point of each junction is left out too, the scale transfer having used up one of them:
     the one with the largest share in the scale.
+
+    placed: (m,), rows of the pairs' table in the section that place their points. Where nothing better joins two
+        models, points may join them whose rays contradict each other: their distances say nothing.
     """
     joined, images = section.junctions, errors.images
-    chosen = np.flatnonzero(joined.used)
+    chosen = np.flatnonzero(joined.used & placed[joined.before] & placed[joined.after])
     share, _ = scale_shares(joined, pairs)
     order = np.lexsort(((share[chosen] ** 2).sum(axis=1), joined.junction[chosen]))
     number = joined.junction[chosen][order]

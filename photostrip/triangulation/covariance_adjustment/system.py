@@ -193,7 +193,7 @@ def system(errors: StripErrors, wanted: Conditions, factor: float, components: F
     ``factor`` is the variance factor of the image coordinates, ``components`` (p, 6) what the error components are
     known to be already.
     """
-    reach = max(wanted.rows.by_component.shape[1], errors.points.by_component.shape[1], SHARING)
+    reach = max(errors.points.by_component.shape[1], SHARING)
     blocks = Blocks.of(errors.models, reach)
     roots = PointRoots.of(wanted.rows, wanted.point, wanted.noise / factor)
     diagonal, beside = np.zeros((2, blocks.count, blocks.height, blocks.height))

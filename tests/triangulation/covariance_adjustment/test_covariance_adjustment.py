@@ -13,7 +13,7 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import Result, StripResult
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.adjusting import adjust_formed
-from photostrip.pipeline.strips.photos import form_strip
+from photostrip.pipeline.strips.photos import FormedPhotos, form_strip
 from photostrip.report.sections.project import project_section
 from photostrip.result.document import document_of
 from photostrip.triangulation.covariance_adjustment import (
@@ -25,9 +25,12 @@ from photostrip.triangulation.covariance_adjustment import (
     system,
 )
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
+from photostrip.triangulation.error_propagation import strip_errors
+from photostrip.triangulation.error_propagation.control_errors import misclosures
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.polynomial import correction
-from tests.derivatives import UNSCREENED, errors_of, every, spec, without_noise, written_out
+from photostrip.triangulation.strip_formation.strip import without_rows
+from tests.derivatives import UNSCREENED, errors_of, every, oriented_of, spec, without_noise, written_out
 from tests.draws import orthogonal_normal
 from tests.loops import nonempty
 
@@ -213,6 +216,47 @@ def test_control_of_any_precision_leaves_the_digits_of_points(sigma: float) -> N
     assert found == pytest.approx(stated, rel=1e-5)
     predicted = prediction.errors(solved, errors.points, relinearisation.image_errors(solved))
     assert predicted == pytest.approx(columns.transpose(0, 2, 1) @ whole.solution, abs=1e-6)
+
+
+@pytest.mark.parametrize(("photos", "lap"), [(8, 62.0), (9, 80.0)])
+def test_points_that_join_models_and_are_set_aside_leave_no_distances(photos: int, lap: float) -> None:
+    """Of points whose rays contradict each other; that stand in later models, or in none."""
+    before = oriented_of(noisy(photos, lap))
+    stage, at_control = before.stage, before.absolute
+    assert isinstance(stage, FormedPhotos)
+    formed, orientation = stage.formed, stage.orientation
+    new = np.setdiff1d(formed.point, formed.point[before.control_rows])
+    _, earliest = np.unique(orientation.point, return_index=True)  # rows are ordered by model
+    aside = np.isin(orientation.point, new[::4])
+    aside[earliest[np.isin(orientation.point[earliest], new[1::4])]] = True
+    formed = without_rows(formed, orientation, aside)
+    errors = replace(stage, formed=formed).differentiate(at_control.similarity)
+    rows = np.searchsorted(formed.point, stage.formed.point[before.control_rows])
+    control = misclosures(errors.points, before.targets.turned(before.at_control), rows, at_control.axes)
+    given = at_control.misclosures[control.point, control.axis]
+    wanted = conditions.conditions(errors, orientation, formed, control, given)
+    joined = formed.junctions
+    assert joined.used.all()
+    good = np.flatnonzero(~aside[joined.before] & ~aside[joined.after])
+    left = wanted.source[wanted.kind == conditions.DISTANCE]
+    assert set(left.tolist()) < set(good.tolist())
+    assert len(left) == len(good) - len(np.unique(joined.junction[good]))
+    solved, whole = system.system(errors, wanted, FACTOR), WrittenOut.of(errors, wanted, FACTOR)
+    own, columns = whole.columns(every(errors.points))
+    expected = own @ own.transpose(0, 2, 1) - columns.transpose(0, 2, 1) @ whole.inverse @ columns
+    assert prediction.covariances(solved, errors.points) == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
+    predicted = prediction.errors(solved, errors.points, relinearisation.image_errors(solved))
+    assert predicted == pytest.approx(columns.transpose(0, 2, 1) @ whole.solution, abs=1e-9)
+
+
+def test_conditions_are_the_same_however_a_strip_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, at_once = prepared(noisy(9, 80.0), distances=True)
+    monkeypatch.setattr(strip_errors, "SECTION", 1)
+    _, wanted = prepared(noisy(9, 80.0), distances=True)
+    assert wanted.source.tolist() == at_once.source.tolist()
+    assert wanted.value == pytest.approx(at_once.value, abs=1e-12)
+    for name in nonempty(("by_component", "by_image", "image", "item")):
+        assert getattr(wanted.rows, name) == pytest.approx(getattr(at_once.rows, name), abs=1e-9)
 
 
 @pytest.mark.slow
