@@ -214,6 +214,9 @@ def test_where_there_are_no_joint_covariances_it_is_said(result: photostrip.Resu
     polynomial = photostrip.run(SAMPLE, processing={"adjustment": "polynomial"})
     with pytest.raises(photostrip.InputError, match="only covariance and bundle adjustments keep joint covariances"):
         polynomial.covariance_of(["K07", "K08"], joint=True)
+    forgetful = photostrip.load(SAMPLE, processing={"adjustment": "covariance"}).run(joint=False)
+    with pytest.raises(photostrip.InputError, match="the run did not keep what joint covariances are made of"):
+        forgetful.covariance_of(["K07", "K08"], joint=True)
     result.write(tmp_path)
     with pytest.raises(photostrip.InputError, match="a saved result holds no covariances between points"):
         photostrip.read_result(tmp_path).covariance_of(["K07", "K08"], joint=True)

@@ -20,7 +20,7 @@ def joint_covariance(result: Result, rows: Numbers) -> Floats:
 
     They stand along east, north and up at each point, or along the axes of a geocentric output.
     Raises InputError where the adjustment does not keep what they need: after a polynomial, of independent models, and
-        of points of several strips that are adjusted one by one.
+        of points of several strips that are adjusted one by one; or where the run was to keep nothing for them.
     """
     ascending, back = np.unique(rows, return_inverse=True)
     cartesian = result.points.cartesian[ascending]
@@ -44,6 +44,8 @@ def _of_bundle(result: Result, rows: Numbers, axes: Floats) -> Floats:
 def _of_strip(result: Result, rows: Numbers, axes: Floats) -> Floats:
     strip, places = _strip_of(result, result.points.number[rows])
     stages = strip.photo_stages
+    if stages is not None and stages.covariance is not None and stages.solved is None:
+        raise _refused("the run did not keep what joint covariances are made of", "run the project with joint=True")
     if stages is None or stages.solved is None:
         raise _refused("only covariance and bundle adjustments keep joint covariances", BUNDLE)
     adjusted = stages.solved
