@@ -17,6 +17,7 @@ from photostrip.triangulation.covariance_adjustment import reduced, relinearisat
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE
 from photostrip.triangulation.error_propagation.covariances import NearImages
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SCALE, ErrorRows, PointRows
+from photostrip.triangulation.error_propagation.joint_covariances import by_same_images
 
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
 
@@ -147,10 +148,8 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     order = np.argsort(rows.first, kind="stable")
     rows = rows.take(order)
     known = reduced.squares_and_products(found, reduced.of_rows(found, rows, NearImages.of(found.errors, rows)))
-    shared = system.same_images(rows, rows)
-    covariance, result = -known, np.empty_like(known)
-    np.add.at(covariance, (shared.first, shared.second), shared.value[:, 0, 0])
-    result[np.ix_(order, order)] = covariance
+    result = np.empty_like(known)
+    result[np.ix_(order, order)] = by_same_images(rows) - known
     return result
 
 

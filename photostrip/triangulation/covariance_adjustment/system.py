@@ -17,7 +17,7 @@ from typing import Self
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct, runs_of
-from photostrip.frozen import NamedTuple, dataclass, replace
+from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
 from photostrip.triangulation.covariance_adjustment.conditions import Conditions
@@ -33,27 +33,17 @@ from photostrip.triangulation.covariance_adjustment.windows import (
     windows,
 )
 from photostrip.triangulation.error_propagation.covariances import NearImages
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, SPAN, ErrorRows, ranges
+from photostrip.triangulation.error_propagation.derivatives import (
+    COMPONENTS,
+    SHARING,
+    SPAN,
+    ErrorRows,
+    ranges,
+    same_images,
+)
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 AT_A_TIME = 2048  # rows whose windows are made together, in whole models
-
-
-class SameImages(NamedTuple):
-    """Products of image points that enter two tables of rows directly."""
-
-    first: Numbers  # (k,): rows of the first table
-    second: Numbers  # (k,): rows of the second table
-    value: Floats  # (k, d, e)
-
-
-def same_images(a: ErrorRows, b: ErrorRows) -> SameImages:
-    """Find the image points that enter rows of both tables directly, of d and e coordinates."""
-    order = np.argsort(b.image, kind="stable")
-    image = b.image[order]
-    of_a, place = ranges(np.searchsorted(image, a.image), np.searchsorted(image, a.image, side="right"))
-    of_b = order[place]
-    return SameImages(a.item[of_a], b.item[of_b], a.by_image[of_a] @ b.by_image[of_b].transpose(0, 2, 1))
 
 
 def sections(base: Numbers, size: int = 1) -> Iterator[slice]:

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass, replace
+from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -204,3 +204,20 @@ def add_products(result: Floats, place: Numbers, first: Floats, second: Floats) 
     first, second = first.reshape(-1, first.shape[2]), second.reshape(-1, second.shape[2])
     for at, (start, stop) in zip(place[starts].tolist(), pairwise(ends), strict=True):
         result[at] += first[start:stop].T @ second[start:stop]
+
+
+class SameImages(NamedTuple):
+    """Products of image points that enter two tables of rows directly."""
+
+    first: Numbers  # (k,): rows of the first table
+    second: Numbers  # (k,): rows of the second table
+    value: Floats  # (k, d, e)
+
+
+def same_images(a: ErrorRows, b: ErrorRows) -> SameImages:
+    """Find the image points that enter rows of both tables directly, of d and e coordinates."""
+    order = np.argsort(b.image, kind="stable")
+    image = b.image[order]
+    of_a, place = ranges(np.searchsorted(image, a.image), np.searchsorted(image, a.image, side="right"))
+    of_b = order[place]
+    return SameImages(a.item[of_a], b.item[of_b], a.by_image[of_a] @ b.by_image[of_b].transpose(0, 2, 1))

@@ -23,7 +23,7 @@ from photostrip.triangulation.error_propagation.covariances import (
     steps_before,
     with_parameters,
 )
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, ErrorRows, ranges
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, ErrorRows, same_images
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
@@ -61,7 +61,7 @@ def joint_covariance(errors: StripErrors, rows: ErrorRows, along: SimilarityCova
             + np.einsum("nkc,nkc->n", ahead[i, distance : distance + beyond], by_component[j, :beyond])
             + np.einsum("nkc,nkc->n", coefficients[i, distance:], images[j, : reach - distance])
         )
-    whole = upper + np.triu(upper, 1).T + _same_images(rows)
+    whole = upper + np.triu(upper, 1).T + by_same_images(rows)
     result: Floats = np.empty_like(whole)
     result[np.ix_(order, order)] = whole
     return result
@@ -79,11 +79,8 @@ def after_fit(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, i
     return joint_covariance(errors, rows, fit.along) - mixed - mixed.T + influence @ fit.parameters @ influence.T
 
 
-def _same_images(rows: ErrorRows) -> Floats:
-    """Products (n, n) of the image coordinates that enter two rows directly."""
-    count, order = len(rows.first), np.argsort(rows.image, kind="stable")
-    image = rows.image[order]
-    first, place = ranges(np.searchsorted(image, image), np.searchsorted(image, image, side="right"))
-    by_image, item = rows.by_image[order, 0], rows.item[order]
-    values = (by_image[first] * by_image[place]).sum(axis=1)
-    return np.asarray(np.bincount(item[first] * count + item[place], values, count**2).reshape(count, count), float)
+def by_same_images(rows: ErrorRows) -> Floats:
+    """Covariances (n, n) of rows with d = 1 by the image points alone that enter two of them directly."""
+    count, shared = len(rows.first), same_images(rows, rows)
+    place = shared.first * count + shared.second
+    return np.asarray(np.bincount(place, shared.value[:, 0, 0], count**2).reshape(count, count), float)
