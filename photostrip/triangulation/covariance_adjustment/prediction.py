@@ -91,7 +91,7 @@ class _Section(NamedTuple):
 def _reduced(found: system.System, rows: ErrorRows | PointRows) -> Iterator[_Section]:
     """Reduce rows, in sections of bounded memory."""
     order = np.argsort(rows.first, kind="stable")
-    for section in system.sections(rows.first[order], rows.by_component.shape[2]):
+    for section in pieces(len(order), max(system.AT_A_TIME // rows.by_component.shape[2], 1)):
         some = rows.take(order[section])
         near = NearImages.of(found.errors, some)
         yield _Section(order[section], reduced.of_rows(found, some, near), near.by_image)

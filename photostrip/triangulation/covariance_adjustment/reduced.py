@@ -59,11 +59,13 @@ def of_rows(found: System, rows: ErrorRows, near: NearImages) -> Reduced:
         condition=np.full(count, -1),
         own=np.zeros((count, found.roots.root.shape[1], size)),
     )
-    begin, end = np.searchsorted(conditions.base, rows.first[[0, -1]] + [0, 1]).tolist() if count else (0, 0)
-    shared = same_images(rows, conditions.rows.part(begin, end))
-    first = found.roots.start[shared.second + begin]
-    result.condition[shared.first] = first
-    np.add.at(result.own, (shared.first, shared.second + begin - first), shared.value[:, :, 0])
+    start = found.of_images[rows.image]
+    entry = np.flatnonzero(start >= 0)
+    result.condition[rows.item[entry]] = start[entry]
+    chosen = found.roots.of_points(distinct(start[entry]))
+    shared = same_images(rows, conditions.rows.take(chosen))
+    second = chosen[shared.second]
+    np.add.at(result.own, (shared.first, second - found.roots.start[second]), shared.value[:, :, 0])
     _reduce(found, result)
     return result
 

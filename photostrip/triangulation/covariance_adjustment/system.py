@@ -43,16 +43,7 @@ from photostrip.triangulation.error_propagation.derivatives import (
 )
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-AT_A_TIME = 2048  # rows whose windows are made together, in whole models
-
-
-def sections(base: Numbers, size: int = 1) -> Iterator[slice]:
-    """Cut rows of so many coordinates, ordered by their models, into parts of bounded memory, models left whole."""
-    ends = np.append(np.flatnonzero(np.diff(base, prepend=-1)), len(base))
-    while len(ends) > 1:
-        last = max(int(np.searchsorted(ends, ends[0] + AT_A_TIME // size, side="right")) - 1, 1)
-        yield slice(int(ends[0]), int(ends[last]))
-        ends = ends[last:]
+AT_A_TIME = 2048  # rows whose windows are made together
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +75,14 @@ class PointRoots:
             own[:, np.arange(size), np.arange(size)] += noise[some]
             result.root[some, :size] = np.linalg.inv(np.linalg.cholesky(own))
         return result
+
+    def sections(self) -> Iterator[slice]:
+        """Cut the conditions into parts of bounded memory, points left whole."""
+        ends = np.append(np.flatnonzero(np.diff(self.start, prepend=-1)), len(self.start))
+        while len(ends) > 1:
+            last = max(int(np.searchsorted(ends, ends[0] + AT_A_TIME, side="right")) - 1, 1)
+            yield slice(int(ends[0]), int(ends[last]))
+            ends = ends[last:]
 
     def of_points(self, starts: Numbers) -> Numbers:
         """All conditions of points, given by the first of each."""
@@ -136,10 +135,17 @@ class System:
         base, result = self.conditions.base, np.empty(len(self.conditions.value))
         following = np.concatenate([self.solution[1:, MODELS:], np.zeros((1, self.blocks.height - MODELS))])
         of_windows = np.concatenate([self.solution[:, ANCHOR.start :], following], axis=1)
-        for part in sections(base):
+        for part in self.roots.sections():
             said = np.einsum("nc,nc->n", self.windows(part), of_windows[base[part] // self.blocks.width])
             roots = self.roots.take(part)
             result[part] = roots.weighted(roots.whitened(self.conditions.value[part]) - said)
+        return result
+
+    @cached_property
+    def of_images(self) -> Numbers:
+        """First condition of the point of each image point, shape (k,); -1 where it enters none directly."""
+        rows, result = self.conditions.rows, np.full(len(self.errors.images.row), -1)
+        result[rows.image] = self.roots.start[rows.item]
         return result
 
     @property
@@ -190,7 +196,7 @@ def system(errors: StripErrors, wanted: Conditions, factor: float, components: F
     right = np.zeros((blocks.count, blocks.height))
     _add_models(errors, wanted.similarities, blocks, diagonal, beside)
     _add_links(wanted.similarities, blocks, diagonal, beside)
-    for part in sections(wanted.base):
+    for part in roots.sections():
         found = _windows(errors, wanted, roots, blocks, part)
         whitened = roots.take(part).whitened(wanted.value[part])
         for block, some in runs_of(wanted.base[part] // blocks.width):
@@ -212,7 +218,7 @@ def system(errors: StripErrors, wanted: Conditions, factor: float, components: F
 def solved_for(found: System, value: Floats, components: Floats | None = None) -> System:
     """Solve the eliminated system for other misclosures (n,) of the same conditions."""
     conditions, right = replace(found.conditions, value=value), np.zeros_like(found.solution)
-    for part in sections(conditions.base):
+    for part in found.roots.sections():
         windows_, whitened = found.windows(part), found.roots.take(part).whitened(value[part])
         for block, some in runs_of(conditions.base[part] // found.blocks.width):
             _subtract(windows_[some].T @ whitened[some], block, right)
