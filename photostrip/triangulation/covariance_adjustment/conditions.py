@@ -69,7 +69,9 @@ def conditions(
     parts = [_Part(rows=control.rows, value=misclosures, noise=control.variance, source=np.arange(count))]
     if distances:
         placed = np.asarray(np.isfinite(formed.model_xyz).all(axis=1), bool)
-        parts += [_distances(errors, placed[section.rows], section, pairs) for section, pairs in errors.sections()]
+        for section, pairs in errors.sections():
+            parts.append(_distances(errors, placed[section.rows], section, pairs))
+            del section, pairs  # before the next are made
     rows = ErrorRows.joined([part.rows for part in parts])
     kind = np.where(np.arange(len(rows.first)) < count, CONTROL, DISTANCE)
     value, noise, source = (

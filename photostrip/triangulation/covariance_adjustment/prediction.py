@@ -60,7 +60,7 @@ def errors(found: system.System, rows: PointRows, images: Floats) -> Floats:
     images: (k, 2), errors of the image coordinates of which the rows are not free yet, in their standard deviations.
     """
     components, result = relinearisation.component_errors(found.errors, images), np.empty((len(rows.first), 3))
-    for piece in pieces(len(rows.first)):
+    for piece in pieces(len(rows.first), system.AT_A_TIME):
         some = rows.take(np.arange(piece.start, piece.stop))
         result[piece] = relinearisation.displacements(components, some, images)
         result[piece] += (some.by_similarity @ found.unknowns[some.first, :, None])[:, :, 0]
@@ -90,11 +90,11 @@ class _Section(NamedTuple):
 
 def _reduced(found: system.System, rows: ErrorRows | PointRows) -> Iterator[_Section]:
     """Reduce rows, in sections of bounded memory."""
-    order = np.argsort(rows.first, kind="stable")
+    order, of_images = np.argsort(rows.first, kind="stable"), found.of_images()
     for section in pieces(len(order), max(system.AT_A_TIME // rows.by_component.shape[2], 1)):
         some = rows.take(order[section])
         near = NearImages.of(found.errors, some)
-        yield _Section(order[section], reduced.of_rows(found, some, near), near.by_image)
+        yield _Section(order[section], reduced.of_rows(found, some, near, of_images), near.by_image)
 
 
 def photo_rows(found: system.System) -> ErrorRows:
@@ -147,7 +147,8 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     """Covariances (n, n) of what is left of the errors of rows with d = 1: E E^T - b^T K^-1 b, as ``covariances``."""
     order = np.argsort(rows.first, kind="stable")
     rows = rows.take(order)
-    known = reduced.squares_and_products(found, reduced.of_rows(found, rows, NearImages.of(found.errors, rows)))
+    near = NearImages.of(found.errors, rows)
+    known = reduced.squares_and_products(found, reduced.of_rows(found, rows, near, found.of_images()))
     result = np.empty_like(known)
     result[np.ix_(order, order)] = by_same_images(rows) - known
     return result

@@ -50,8 +50,11 @@ class Solved(NamedTuple):
     columns: Floats  # (g, b, c)
 
 
-def of_rows(found: System, rows: ErrorRows, near: NearImages) -> Reduced:
-    """Reduce rows that are ordered by the first models of their points."""
+def of_rows(found: System, rows: ErrorRows, near: NearImages, of_images: Numbers) -> Reduced:
+    """Reduce rows that are ordered by the first models of their points.
+
+    of_images: (k,), conditions of all image points, as the system finds them.
+    """
     conditions, count, size = found.conditions, *rows.by_similarity.shape[:2]
     result = Reduced(
         base=rows.first,
@@ -59,7 +62,7 @@ def of_rows(found: System, rows: ErrorRows, near: NearImages) -> Reduced:
         condition=np.full(count, -1),
         own=np.zeros((count, found.roots.root.shape[1], size)),
     )
-    start = found.of_images[rows.image]
+    start = of_images[rows.image]
     entry = np.flatnonzero(start >= 0)
     result.condition[rows.item[entry]] = start[entry]
     chosen = found.roots.of_points(distinct(start[entry]))

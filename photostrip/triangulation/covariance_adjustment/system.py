@@ -43,7 +43,7 @@ from photostrip.triangulation.error_propagation.derivatives import (
 )
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-AT_A_TIME = 2048  # rows whose windows are made together
+AT_A_TIME = 1024  # rows whose windows are made together
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +141,8 @@ class System:
             result[part] = roots.weighted(roots.whitened(self.conditions.value[part]) - said)
         return result
 
-    @cached_property
     def of_images(self) -> Numbers:
-        """First condition of the point of each image point, shape (k,); -1 where it enters none directly."""
+        """Find the first condition of the point of each image point, shape (k,); -1 where it enters none directly."""
         rows, result = self.conditions.rows, np.full(len(self.errors.images.row), -1)
         result[rows.image] = self.roots.start[rows.item]
         return result
