@@ -108,8 +108,9 @@ def accuracy(document: Document) -> str:
     at = {"check": "check points, which took no part", "cross_validation": "control points left out in turn"}
     role = seen_at(document)
     sound = {name: headline_rms(document, role, name) for name in PARTS}
+    um = {k: f"{v['rms_um']:.1f} µm at {scale} scale, " for k, v in sound.items() if v["rms_um"] is not None}
     parts = [
-        f"{part['rms']:.3f} m in {name} ({part['rms_um']:.1f} µm at {scale} scale, {counted(part['count'], 'point')})"
+        f"{part['rms']:.3f} m in {name} ({um.get(name, '')}{counted(part['count'], 'point')})"
         for name, part in sound.items()
         if part["count"]
     ]

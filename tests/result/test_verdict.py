@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import chosen_sections
 from photostrip.result.document import document_of
 from photostrip.result.points.standing_out import stand_out
-from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code, headline_rms, verdict_of
+from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, accuracy, exit_code, headline_rms, verdict_of
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Spec, Terrain
 from photostrip.statistics import binomial_p_value
@@ -134,6 +135,15 @@ def test_of_contradicting_data_a_deformation_is_told_without_metres() -> None:
 
 
 @pytest.mark.slow
+def test_errors_are_told_without_their_size_in_images_whose_scale_is_lost() -> None:
+    """A strip that its control tears apart has no photo scale: the sentence ended the run as an internal error."""
+    document = deepcopy(case().document)
+    told = accuracy(document)
+    for part in (document["summary"]["check"][name] for name in ("plan", "height")):
+        part["rms_um"] = None
+    assert accuracy(document) == re.sub(r"[\d.]+ µm at photo scale, ", "", told) != told
+
+
 def test_a_check_point_that_stands_out_is_taken_out_of_the_headline() -> None:
     document = moved(1, 447.0)
     rows = {row["id"]: row for row in document["control"]}
