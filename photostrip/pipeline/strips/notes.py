@@ -184,7 +184,7 @@ def precision_beyond_control(
     if beyond.max() <= max(BEYOND_COVARIANCE * np.ptp(at), base):
         return
     variance = variances()
-    sigma = np.sqrt(np.column_stack([variance[:, :2].mean(axis=1), variance[:, 2]]))
+    sigma = np.sqrt(np.maximum(np.column_stack([variance[:, :2].mean(axis=1), variance[:, 2]]), 0.0))
     inside, largest = column_medians(sigma[beyond <= 0]), sigma[beyond > 0].max(axis=0)
     if (largest > WORSE_BEYOND * inside).any():
         count = int((beyond > 0).sum())

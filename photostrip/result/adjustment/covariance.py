@@ -37,7 +37,7 @@ def _block(strip: StripResult, found: CovarianceFigures) -> Document:
         "distances": tested.distances,
         "squares": tested.squares,
         "redundancy": tested.redundancy,
-        "sigma0": np.sqrt(ratio),
+        "sigma0": np.sqrt(max(ratio, 0.0)),
         "p": tested.probability,
         "limit": tested.limit,
         "control": _control(strip, found),

@@ -29,7 +29,9 @@ FRESH = 0.05  # radians that a strip may turn before its derivatives are made af
 # of the variance factor: control that is more than 10 000 times as uncertain as image coordinates without errors leaves
 # no digits of the unknowns
 LEAST_FACTOR = 1e-8
-ENOUGH = 0.1  # of the angle that an image coordinate's standard deviation spans: what squares of turns may leave
+# of the angle that an image coordinate's standard deviation spans, what squares of turns may leave in the mean of n
+# points of a model, which share it: a tenth in a model of 16
+ENOUGH = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +177,8 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
     factor = max(found, LEAST_FACTOR)
     one, formations = _solved(start, np.zeros((len(start.errors.images.row), 2)), settings, factor), 1
     turn = rate = relinearisation.largest_turn(one.system)
-    while formations < MOST_FORMATIONS and turn * rate / 2 > ENOUGH * start.sigma / start.focal:
+    enough = ENOUGH * start.sigma / start.focal / np.sqrt(start.orientation.points_used.mean())
+    while formations < MOST_FORMATIONS and turn * rate / 2 > enough:
         fresh = turn > FRESH
         again = _formed_again(one, settings, factor, fresh=fresh)
         if again is None:

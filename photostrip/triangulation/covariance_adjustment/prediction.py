@@ -16,9 +16,10 @@ from photostrip.statistics import gamma_cdf, normal_quantile
 from photostrip.triangulation.covariance_adjustment import reduced, relinearisation, system
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE
 from photostrip.triangulation.error_propagation.covariances import NearImages
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SCALE, ErrorRows, PointRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, PointRows
 from photostrip.triangulation.error_propagation.joint_covariances import by_same_images
 
+TIE = 6  # decimals of a test value that are not rounding
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
 
 
@@ -46,9 +47,9 @@ class AdjustmentTest:
 
     @property
     def doubtful(self) -> Numbers:
-        """Control coordinates beyond the limit, the worst first."""
+        """Control coordinates beyond the limit, the worst first; of equal ones, whatever the rounding, the first."""
         beyond = np.flatnonzero(np.abs(np.nan_to_num(self.normalised)) > self.limit)
-        return beyond[np.argsort(-np.abs(self.normalised[beyond]), kind="stable")]
+        return beyond[np.argsort(-np.abs(self.normalised[beyond]).round(TIE), kind="stable")]
 
 
 def errors(found: system.System, rows: PointRows, images: Floats) -> Floats:
@@ -103,10 +104,8 @@ def photo_rows(found: system.System) -> ErrorRows:
     Each photo moves with the model on its right, the last with its own and the step behind it.
     """
     errors, models = found.errors, found.errors.models
-    next_centers = -errors.steps[:, :3, SCALE]
-    centers = np.concatenate([-next_centers.sum(axis=0)[None], next_centers])  # the origin is the mean of all
     by_similarity = np.zeros((models + 1, 6, SIMILARITY_PARAMETERS))
-    by_similarity[:, :3] = similarity_derivatives(centers, np.zeros(3))
+    by_similarity[:, :3] = similarity_derivatives(errors.centers, np.zeros(3))
     by_similarity[:, 3:, 3:6] = np.eye(3)
     by_component = np.zeros((models + 1, 1, 6, COMPONENTS))
     by_component[-1, 0] = by_similarity[-1] @ errors.steps[-1]

@@ -15,12 +15,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photostrip.arrays import Floats, pieces
+from photostrip.arrays import Floats, median, pieces
 from photostrip.frozen import replace
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.covariance_adjustment.system import System
 from photostrip.triangulation.error_propagation.covariances import by_components
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, MOVED, SHARING, SPAN, ErrorRows, add_rows
+from photostrip.triangulation.error_propagation.derivatives import (
+    COMPONENTS,
+    ELEMENTS,
+    MOVED,
+    SHARING,
+    SPAN,
+    ErrorRows,
+    add_rows,
+)
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.solution import iterate_elements
@@ -74,8 +82,19 @@ def displacements(components: Floats, rows: ErrorRows, images: Floats) -> Floats
 
 
 def largest_turn(found: System) -> float:
-    """Largest turn and change of scale of a model: root of the sum of their squares, radians."""
-    return float(np.sqrt(np.square(found.unknowns[:, 3:]).sum(axis=1).max()))
+    """Largest turn of a model, radians: half of its square is the angle that it leaves in the images.
+
+    It is that of its similarity, with the change of scale, or that of its photos against each other, which counts more
+    the longer the rays are beside the base: by an error e of its elements the depth of points is off by e times that
+    ratio, and what is left are squares of it.
+    """
+    errors = found.errors
+    base = np.linalg.norm(np.diff(errors.centers, axis=0), axis=1)
+    first = errors.points.first
+    ratio = median(np.linalg.norm(errors.points.xyz - errors.centers[first], axis=1) / base[first])
+    of_models = np.sqrt(np.square(found.unknowns[:, 3:]).sum(axis=1).max())
+    of_photos = np.sqrt(np.square(found.component_changes[:, ELEMENTS]).sum(axis=1).max())
+    return float(max(of_models, np.sqrt(2 * ratio) * of_photos))
 
 
 def oriented_again(orientation: Orientation, xy: Floats) -> Orientation:

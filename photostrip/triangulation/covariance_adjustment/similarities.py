@@ -18,7 +18,7 @@ from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
-from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, SCALE
+from photostrip.triangulation.error_propagation.derivatives import ELEMENTS
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
@@ -36,9 +36,7 @@ class PhotoSimilarities:
     @classmethod
     def of(cls, errors: StripErrors) -> Self:
         """Take them about the perspective centres C: t_common = t - theta x C - lambda C."""
-        # the step's scale column is minus the centre that joins its model to the next; the origin is the mean of all
-        next_centers = -errors.steps[:, :3, SCALE]
-        centers = np.concatenate([-next_centers.sum(axis=0)[None], next_centers])
+        centers = errors.centers
         length = float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean())
         to_common, from_common = np.tile(np.eye(SIMILARITY_PARAMETERS), (2, len(centers), 1, 1))
         to_common[:, :3, 3:6], to_common[:, :3, 6] = cross_matrix(centers), -centers

@@ -148,6 +148,11 @@ class System:
         return result
 
     @property
+    def component_changes(self) -> Floats:
+        """What the error components (p, 6) are beside what they were known to be."""
+        return self._of_models[:, COMPONENT] * self.conditions.similarities.size
+
+    @property
     def component_correlates(self) -> Floats:
         """Correlates (p, 6) of the error components."""
         return self._of_models[:, CORRELATE] / self.conditions.similarities.size

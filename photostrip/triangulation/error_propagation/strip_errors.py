@@ -70,6 +70,12 @@ class StripErrors:
     def models(self) -> int:
         return len(self.steps)
 
+    @property
+    def centers(self) -> Floats:
+        """Perspective centres (p + 1, 3) from the origin, which is the mean of all, metres."""
+        following = -self.steps[:, :3, SCALE]  # minus the centre that joins a model to the next
+        return np.concatenate([-following.sum(axis=0)[None], following])
+
     def with_doubt(self, scale: Floats) -> StripErrors:
         """Add standard deviations (j,) to the logarithms of the scales handed on, beside the image coordinates'."""
         found = self.component_covariances.copy()

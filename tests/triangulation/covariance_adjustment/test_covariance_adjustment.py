@@ -16,6 +16,8 @@ from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.photos import FormedPhotos, form_strip
 from photostrip.report.sections.project import project_section
 from photostrip.result.document import document_of
+from photostrip.simulation import Control, Flight, Points, Spec, simulate
+from photostrip.simulation.spec import Image
 from photostrip.triangulation.covariance_adjustment import (
     adjust,
     block_tridiagonal,
@@ -33,6 +35,7 @@ from photostrip.triangulation.strip_formation.strip import without_rows
 from tests.derivatives import UNSCREENED, errors_of, every, oriented_of, spec, without_noise, written_out
 from tests.draws import orthogonal_normal
 from tests.loops import nonempty
+from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -257,6 +260,39 @@ def test_conditions_are_the_same_however_a_strip_is_cut(monkeypatch: pytest.Monk
     assert wanted.value == pytest.approx(at_once.value, abs=1e-12)
     for name in nonempty(("by_component", "by_image", "image", "item")):
         assert getattr(wanted.rows, name) == pytest.approx(getattr(at_once.rows, name), abs=1e-9)
+
+
+@pytest.mark.slow
+def test_short_bases_are_formed_again_before_a_sound_strip_is_contradicted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """13 photos a point at 15 micrometres: squares of the elements count in the mean of many distances."""
+    flown = Spec(
+        seed=102,
+        flight=Flight(photos=20, end_lap_percent=94.0),
+        points=Points(rows=5, extra_per_model=10),
+        control=Control(every=3, check=0),
+        image=Image(15.0),
+    )
+    inputs, found = inputs_of(simulate(flown)), []
+    for enough in (adjust.ENOUGH, 1e9):
+        monkeypatch.setattr(adjust, "ENOUGH", enough)
+        result = triangulate(inputs, replace(COVARIANCE, precision=False))
+        figures = result.strips[0].of_photos.covariance
+        assert figures is not None
+        codes = {note.code for note in result.notes} & {"strip-contradicted", "control-doubtful"}
+        found.append((figures.formations, figures.tested.squares / figures.tested.redundancy, bool(codes)))
+    (again, ratio, told), (once, before, told_before) = found
+    assert again > once == 1
+    assert ratio == pytest.approx(1.0, abs=0.04)
+    assert before > ratio
+    assert (told, told_before) == (False, True)
+
+
+def test_of_equal_test_values_the_first_is_named_whatever_the_rounding() -> None:
+    values = np.array([0.5, 15.23, -15.23 - 1e-11, 15.23 + 1e-11, 9.0])
+    tested = prediction.AdjustmentTest(
+        squares=1.0, redundancy=1, normalised=values, size=values, distances=0, level=0.01
+    )
+    assert tested.doubtful.tolist() == [1, 2, 3, 4]
 
 
 @pytest.mark.slow
