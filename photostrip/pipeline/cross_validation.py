@@ -15,7 +15,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import replace
 from photostrip.pipeline.given_points import rejected_control
 from photostrip.pipeline.inputs import Inputs
-from photostrip.pipeline.results import Fold, Result, unsolved
+from photostrip.pipeline.results import Fold, Result
 
 FOLDS = 10  # adjustments that are made at most
 
@@ -34,7 +34,7 @@ def cross_validate(result: Result, adjust: Callable[[Inputs], Result]) -> tuple[
         given = replace(control, check=left_out, use=use).take(taken)
         ids = tuple(control.ids[row] for row in np.sort(group))
         try:
-            folds.append(Fold(ids, unsolved(adjust(replace(result.inputs, control=given)))))
+            folds.append(Fold(ids, adjust(replace(result.inputs, control=given))))
         except (GeometryError, InputError, np.linalg.LinAlgError) as error:
             folds.append(Fold(ids, None, str(error)))
     return tuple(folds)

@@ -20,7 +20,7 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
-from photostrip.pipeline.results import AdjustedStrips, Result, unsolved
+from photostrip.pipeline.results import AdjustedStrips, Result
 from photostrip.pipeline.strips.absolute import StripStage, on_control
 from photostrip.pipeline.strips.adjusting import adjust, adjust_without
 from photostrip.pipeline.strips.forming import as_single_photos, form_strips
@@ -64,7 +64,7 @@ def triangulate(
         require_whole(inputs, ground.control)
         # 1 interior orientation
         photo = orient_interior(inputs, settings)
-        result = _walk_from_orientations(inputs, settings, ground, photo, stages)
+        result = _walk_from_orientations(inputs, settings, ground, photo, stages, joint=joint)
     except (InputError, GeometryError) as error:
         error.findings = of_failure()
         raise
@@ -73,23 +73,21 @@ def triangulate(
         unsolvable = GeometryError(msg, code="singular")
         unsolvable.findings = of_failure()
         raise unsolvable from error
-    if not joint:
-        result = unsolved(result)
     return replace(result, findings=gate.of_result(result, directory, stages))
 
 
 def _walk_from_orientations(
-    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages
+    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages, *, joint: bool
 ) -> Result:
     """Walk, and again with single photos at their given orientations in the place of a strip that cannot be formed."""
     try:
-        return _walk(inputs, settings, ground, photo, stages)
+        return _walk(inputs, settings, ground, photo, stages, joint=joint)
     except GeometryError as error:
         cut = as_single_photos(inputs, settings, error)
         if cut is None:
             raise
         try:
-            result = _walk_from_orientations(cut, settings, ground, photo, stages)
+            result = _walk_from_orientations(cut, settings, ground, photo, stages, joint=joint)
         except GeometryError:
             raise error from None
         text = f"{error}; all photos of the strip start from their given orientations in its place"
@@ -97,7 +95,9 @@ def _walk_from_orientations(
         return replace(result, notes=(note, *result.notes))
 
 
-def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages) -> Result:
+def _walk(
+    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages, *, joint: bool
+) -> Result:
     """Every stage takes what the stages before it found."""
     # 1 lens distortion, refraction
     refined = correct(photo, inputs, settings, ground, stages)
@@ -107,6 +107,8 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     def on_the_ground(inputs: Inputs, whole: Result | None = None) -> Result:
         strips = formed if whole is None else _as_left_by(whole, formed)
         adjusted = _adjusted(inputs, settings, ground, refined.observations, strips, stages, whole)
+        if whole is not None or not (joint or settings.cross_validation):
+            adjusted = replace(adjusted, strips=tuple(strip.unsolved for strip in adjusted.strips))
         missing = {}
         if whole is None:
             missing = not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips)
@@ -143,7 +145,9 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
         return result
     from photostrip.pipeline.cross_validation import cross_validate
 
-    return replace(result, folds=cross_validate(result, partial(on_the_ground, whole=result)))
+    folds = cross_validate(result, partial(on_the_ground, whole=result))
+    strips = result.strips if joint else tuple(strip.unsolved for strip in result.strips)
+    return replace(result, folds=folds, strips=strips)
 
 
 def _of_any_method(settings: Settings) -> Settings:
