@@ -28,7 +28,7 @@ class Reduced:
 
     base: Numbers  # (n,): first model
     window: Floats  # (n, d, 7 + 24 w): z
-    condition: Numbers  # (n,): first condition of their points; of points without any, of another
+    condition: Numbers  # (n,): first condition of their points; -1 of points without any
     own: Floats  # (n, k, d): s, of the conditions from there on
 
     @property
