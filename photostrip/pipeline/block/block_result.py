@@ -12,7 +12,7 @@ from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, Bundle, Precision, StripResult, Ties
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.bundle.quality import self_calibration
-from photostrip.triangulation.resection.resection import with_residuals
+from photostrip.triangulation.resection.resection import of_known_photos
 
 
 def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFrame, bundle: Bundle) -> AdjustedStrips:
@@ -85,7 +85,7 @@ def _strip(
     control_at = np.searchsorted(number, formed.point[strip.control_rows])
     at_rows = np.searchsorted(number, observations.point[rows])
     oriented = strip.of_photos.strip.oriented(centers, rotations)
-    resection = with_residuals(observations.xy[rows], xyz[at_rows], position[rows], oriented)
+    resection = of_known_photos(observations.xy, xyz, position[rows], oriented, rows, at_rows)
     stages = replace(
         strip.of_photos,
         formed=replace(formed, point=number, xyz=shape, model_count=models),

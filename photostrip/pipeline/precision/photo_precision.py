@@ -40,7 +40,7 @@ def of_photos(
     if strip.of_photos.solved is not None:
         return _of_covariance(strip, strip.of_photos.solved, checks, oriented.frames, of_checks=of_checks)
     found = propagation(strip, oriented, observations)
-    errors, fit, xyz, control, operator = found.errors, found.fit, oriented.xyz, found.control, found.fit.operator
+    errors, fit, xyz, control, operator = found.errors, found.fit, found.xyz, found.control, found.fit.operator
     stated = strip.of_photos.sigma
     factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)

@@ -110,9 +110,9 @@ class OrientedStrip(Generic[Errors]):
         """The control in the intermediate frame."""
         return absolute_orientation.Targets(self.control, self.frames, self.intermediate)
 
-    @cached_property
+    @property
     def xyz(self) -> Floats:
-        """Points of the strip after the similarity, intermediate frame, metres, shape (q, 3)."""
+        """Points of the strip after the similarity, intermediate frame, metres, shape (q, 3); worked out anew."""
         return self.absolute.similarity(self.stage.formed.xyz)
 
     @cached_property

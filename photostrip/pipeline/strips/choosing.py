@@ -79,8 +79,9 @@ def decide(
 
 def _compared(oriented: Oriented) -> Numbers:
     """Take the new points at which the methods are compared; control where there are no others."""
-    new = np.delete(np.arange(len(oriented.xyz)), oriented.control_rows[oriented.misclosures.point])
-    return _spread(new if len(new) else np.arange(len(oriented.xyz)), MOST_POINTS)
+    every = np.arange(len(oriented.stage.formed.point))
+    new = np.delete(every, oriented.control_rows[oriented.misclosures.point])
+    return _spread(new if len(new) else every, MOST_POINTS)
 
 
 def _predicted(

@@ -34,7 +34,7 @@ from photostrip.triangulation.relative_orientation.orientation import (
     refuse_unusable,
 )
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
-from photostrip.triangulation.resection.resection import Resection, resect, with_residuals
+from photostrip.triangulation.resection.resection import Resection, of_known_photos, resect
 from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs, without_points
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ class FormedPhotos:
             resection = self._resected(oriented, photo, points, xyz)
         else:
             photos = strip.oriented(covariance.centers, covariance.rotations)
-            resection = with_residuals(self.observations.xy[rows], xyz[points], photo, photos)
+            resection = of_known_photos(self.observations.xy, xyz, photo, photos, rows, points)
         return StripResult(
             precision=oriented.precision,
             intermediate=oriented.intermediate,

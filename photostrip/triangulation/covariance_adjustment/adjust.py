@@ -175,7 +175,7 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
     """
     found, basis = image_variance(start.orientation, start.sigma)
     factor = max(found, LEAST_FACTOR)
-    one, formations = _solved(start, np.zeros((len(start.errors.images.row), 2)), settings, factor), 1
+    one, formations = _solved(start, np.broadcast_to(0.0, (len(start.errors.images.row), 2)), settings, factor), 1
     turn = rate = relinearisation.largest_turn(one.system)
     enough = ENOUGH * start.sigma / start.focal / np.sqrt(start.orientation.points_used.mean())
     while formations < MOST_FORMATIONS and turn * rate / 2 > enough:

@@ -155,13 +155,13 @@ def _distances(errors: StripErrors, placed: Flags, section: Section, pairs: Pair
     return _Part(
         rows=ErrorRows(
             first=first,
-            by_similarity=np.zeros((count, 1, SIMILARITY_PARAMETERS)),
+            by_similarity=np.broadcast_to(0.0, (count, 1, SIMILARITY_PARAMETERS)),
             by_component=by_component,
             item=np.repeat(np.arange(count), 3),
             image=image,
             by_image=by_image.reshape(-1, 1, 2) * images.sigma[image][:, None, :],
         ),
         value=np.einsum("ni,ni->n", along[:, 0], ray_after - ray_before),
-        noise=np.zeros(count),
+        noise=np.broadcast_to(0.0, count),
         source=section.passes[chosen],
     )

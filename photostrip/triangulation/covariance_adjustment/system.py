@@ -16,7 +16,7 @@ from typing import Self
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct, runs_of
+from photostrip.arrays import Floats, Numbers, distinct, pieces, runs_of
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
@@ -62,18 +62,17 @@ class PointRoots:
         start = np.flatnonzero(np.diff(point, prepend=-1))
         counts = np.diff(np.append(start, len(point)))
         result = cls(np.repeat(start, counts), np.zeros((len(point), int(counts.max(initial=0)))))
-        place = np.arange(len(point)) - result.start
         for size in distinct(counts).tolist():
-            some = start[counts == size][:, None] + np.arange(size)
-            number = np.full(len(point), -1)
-            number[some] = np.arange(len(some))[:, None]
-            own = np.zeros((len(some), size, size))
-            chosen = rows.take(some.ravel())
-            shared = same_images(chosen, chosen)  # every pair in both orders
-            first, second = (some.ravel()[each] for each in (shared.first, shared.second))
-            np.add.at(own, (number[first], place[first], place[second]), shared.value[:, 0, 0])
-            own[:, np.arange(size), np.arange(size)] += noise[some]
-            result.root[some, :size] = np.linalg.inv(np.linalg.cholesky(own))
+            of_size = start[counts == size]
+            for piece in pieces(len(of_size), max(AT_A_TIME // size, 1)):
+                some = of_size[piece, None] + np.arange(size)
+                own = np.zeros((len(some), size, size))
+                chosen = rows.take(some.ravel())
+                shared = same_images(chosen, chosen)  # every pair in both orders
+                of_point, place = np.divmod(shared.first, size)
+                np.add.at(own, (of_point, place, shared.second % size), shared.value[:, 0, 0])
+                own[:, np.arange(size), np.arange(size)] += noise[some]
+                result.root[some, :size] = np.linalg.inv(np.linalg.cholesky(own))
         return result
 
     def sections(self) -> Iterator[slice]:

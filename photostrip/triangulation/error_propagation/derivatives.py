@@ -98,7 +98,8 @@ class ErrorRows:
         )
 
     def take(self, rows: Numbers) -> Self:
-        return self._selected(rows, *ranges(*entries(self.item, rows)))
+        item = self.item
+        return self._selected(rows, *ranges(np.searchsorted(item, rows), np.searchsorted(item, rows, side="right")))
 
     def part(self, start: int, stop: int) -> Self:
         """Rows from start to stop, without copying."""
@@ -135,15 +136,15 @@ class PointRows:
     """
 
     xyz: Floats  # (n, 3): from the origin of the similarities, metres
-    # first, by_component, item, image, by_image: as in ``ErrorRows``
+    # first, by_component, image, by_image: as in ``ErrorRows``
     first: Numbers
     by_component: Floats
-    item: Numbers
+    starts: Numbers  # (n + 1,): where the image points of each begin that enter directly, and where the last end
     image: Numbers
     by_image: Floats
 
     def take(self, rows: Numbers) -> ErrorRows:
-        item, entry = ranges(*entries(self.item, rows))
+        item, entry = self.entries(rows)
         return ErrorRows(
             first=self.first[rows],
             by_similarity=self.by_similarity(rows),
@@ -152,6 +153,10 @@ class PointRows:
             image=self.image[entry],
             by_image=self.by_image[entry],
         )
+
+    def entries(self, rows: Numbers) -> tuple[Numbers, Numbers]:
+        """Find the image points that enter some points directly: number among these, and place in ``image``."""
+        return ranges(self.starts[rows], self.starts[rows + 1])
 
     def by_similarity(self, rows: Numbers) -> Floats:
         """Displacements of some points by the similarity of their first model, (..., 3, 7)."""
@@ -170,11 +175,6 @@ class PlacedStrip:
     rotations: Floats  # (p + 1, 3, 3)
     images: ImagePoints
     steps: Floats  # (p, 7, 6)
-
-
-def entries(item: Numbers, rows: Numbers) -> tuple[Numbers, Numbers]:
-    """First and last + 1 of the image points that belong to rows; ``item``: the row of each, ascending."""
-    return np.searchsorted(item, rows), np.searchsorted(item, rows, side="right")
 
 
 def ranges(start: Numbers, stop: Numbers) -> tuple[Numbers, Numbers]:

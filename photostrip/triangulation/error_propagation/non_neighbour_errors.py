@@ -32,7 +32,8 @@ def with_bridges(points: PointRows, strip: PlacedStrip) -> PointRows:
     for slot in range(slots):
         inside = np.flatnonzero(photo[:, 0] + slot < photo[:, 1])
         by_component[ends.item[inside], slot] = moved[inside] @ strip.steps[photo[inside, 0] + slot]
-    item = np.concatenate([points.item, np.repeat(ends.item, 2)])
+    counts = np.diff(points.starts)
+    item = np.concatenate([np.repeat(np.arange(len(counts)), counts), np.repeat(ends.item, 2)])
     order = np.argsort(item, kind="stable")
     image = ends.image.ravel()
     by_image = middle.by_image.reshape(-1, 3, 2) * strip.images.sigma[image][:, None, :]
@@ -40,7 +41,7 @@ def with_bridges(points: PointRows, strip: PlacedStrip) -> PointRows:
         xyz=points.xyz,
         first=first,
         by_component=by_component,
-        item=item[order],
+        starts=np.searchsorted(item[order], np.arange(len(counts) + 1)),
         image=np.concatenate([points.image, image])[order],
         by_image=np.concatenate([points.by_image, by_image])[order],
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.frozen import NamedTuple, dataclass, replace
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, entries, ranges
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 from photostrip.triangulation.resection.collinearity import distances, partials
 from photostrip.triangulation.resection.resection import Resection, runs
@@ -95,7 +95,7 @@ def _some_photos(
     count, most = len(photos), int(place.max()) + 1
     by = _resected(sightings, resection, item, place, distance)
     points, images, of_sighting = errors.points, errors.images, sightings.point
-    sighting, entry = ranges(*entries(points.item, of_sighting))
+    sighting, entry = points.entries(of_sighting)
     beside = item * most + place
     by_image = points.by_image[entry].transpose(0, 2, 1) @ by.point.reshape(-1, 3, 6)[beside[sighting]]
     image = points.image[entry]

@@ -278,8 +278,8 @@ class _PointsInMaking:
     slot: Numbers
     first: Numbers  # (q,): first model of each point
     by_component: Floats  # (q, s, 3, 6)
-    point: Numbers  # (e,): point of each image point that enters directly, ascending
-    image: Numbers  # (e,): that image point
+    starts: Numbers  # (q + 1,): where the image points of each point begin that enter directly
+    image: Numbers  # (e,): these image points
     by_image: Floats  # (e, 3, 2): in mm so far
     entry: Numbers  # (n,): place of each image point among these, -1 of those that do not enter
 
@@ -308,7 +308,7 @@ class _PointsInMaking:
             slot=slot,
             first=first,
             by_component=np.zeros((count, int(slot.max()) + 1, 3, COMPONENTS)),
-            point=point_of[image],
+            starts=np.searchsorted(point_of[image], np.arange(count + 1)),
             image=image,
             by_image=np.zeros((len(image), 3, 2)),
             entry=entry,
@@ -343,7 +343,7 @@ class _PointsInMaking:
             xyz=xyz,
             first=first,
             by_component=by_component,
-            item=self.point,
+            starts=self.starts,
             image=self.image,
             by_image=by_image,
         )

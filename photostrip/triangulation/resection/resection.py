@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
-from photostrip.frozen import dataclass, replace
+from photostrip.arrays import Flags, Floats, Numbers, distinct, pieces
+from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation.resection.collinearity import KnownPhotos, distances, partials, project
 
@@ -37,18 +37,26 @@ def runs(ends: Numbers, most: int) -> list[tuple[int, int]]:
     return list(pairwise(distinct(first).tolist()))
 
 
-def with_residuals(xy: Floats, points: Floats, photo: Numbers, photos: KnownPhotos) -> Resection:
+def of_known_photos(
+    xy: Floats, points: Floats, photo: Numbers, photos: KnownPhotos, image: Numbers, point: Numbers
+) -> Resection:
     """Image residuals of photos whose orientation is known already, as a resection.
 
-    xy, points, photo: (m, 2), (m, 3), (m,), image coordinates in mm, their points, and the photo of each.
+    xy, points: (k, 2), (q, 3), image coordinates in mm, and points.
+    photo, image, point: (m,), the photo of each residual, and its rows in these.
     """
+    residuals = np.empty((len(photo), 2))
+    for rows in pieces(len(photo)):  # to gather all of them takes as much again
+        residuals[rows] = xy[image[rows]] - project(points[point[rows]], photos, photo[rows])
+    return _with_residuals(residuals, photo, photos, np.ones(len(photos.centers), bool))
+
+
+def _with_residuals(residuals: Floats, photo: Numbers, photos: KnownPhotos, solved: Flags) -> Resection:
     centers, rotations, _ = photos
     count = len(centers)
-    residuals = project(points, photos, photo)
-    np.subtract(xy, residuals, out=residuals)
     squares = np.bincount(photo, residuals[:, 0] ** 2 + residuals[:, 1] ** 2, count)
     rms = np.sqrt(squares / np.maximum(2 * np.bincount(photo, minlength=count), 1))
-    return Resection(centers=centers, rotations=rotations, residuals=residuals, rms=rms, solved=np.ones(count, bool))
+    return Resection(centers=centers, rotations=rotations, residuals=residuals, rms=rms, solved=solved)
 
 
 def resect(
@@ -88,7 +96,10 @@ def resect(
     solved = converged & enough
     centers = np.where(solved[:, None], centers, start.centers)
     rotations = np.where(solved[:, None, None], rotations, start.rotations)
-    return replace(with_residuals(xy, points, photo, KnownPhotos(centers, rotations, focal)), solved=solved)
+    photos = KnownPhotos(centers, rotations, focal)
+    residuals = project(points, photos, photo)
+    np.subtract(xy, residuals, out=residuals)
+    return _with_residuals(residuals, photo, photos, solved)
 
 
 def _steps(
