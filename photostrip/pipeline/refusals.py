@@ -30,12 +30,13 @@ def require_runnable(inputs: Inputs, settings: Settings) -> None:
 
 
 def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
-    """Refuse geocentric points of which only some coordinates count: X, Y, Z are neither plan nor height."""
+    """Refuse points of which half a plan position counts, or some of X, Y and Z, which are neither plan nor height."""
     control = inputs.control
     if not frames:
         return
-    geocentric = np.array([frame.kind == "geocentric" for frame in frames])
+    geocentric = np.array([frame.kind == "geocentric" for frame in frames])[control.frame]
     part = control.use.any(axis=1) & ~control.use.all(axis=1)
+    half = control.use[:, 0] != control.use[:, 1]
     faults = [
         Fault(
             f"point {control.ids[row]} is geocentric, and only some of its coordinates count",
@@ -43,7 +44,16 @@ def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
             key=f"control[{control.frame[row]}]",
             expected="`use: xyz` or `off`: X, Y and Z are neither plan nor height",
         )
-        for row in np.flatnonzero(part & geocentric[control.frame]).tolist()
+        for row in np.flatnonzero(part & geocentric).tolist()
+    ]
+    faults += [
+        Fault(
+            f"of point {control.ids[row]} one plan coordinate counts without the other",
+            code="half-plan-use",
+            key=f"control[{control.frame[row]}]",
+            expected="both, `use: xyz` or `xy`, or neither, `z` or `off`",
+        )
+        for row in np.flatnonzero(half & ~geocentric).tolist()
     ]
     if faults:
         raise InputError(faults)

@@ -73,3 +73,13 @@ def test_part_of_a_geocentric_point_is_refused(both: tuple[Result, Result]) -> N
     with pytest.raises(InputError, match="is geocentric, and only some of its coordinates count") as caught:
         triangulate(replace(inputs, control=replace(inputs.control, use=use)), both[1].settings)
     assert caught.value.faults[0].code == "geocentric-use"
+
+
+@pytest.mark.parametrize("counted", [(True, False, True), (False, True, False)])
+def test_half_of_a_plan_position_is_refused(both: tuple[Result, Result], counted: tuple[bool, ...]) -> None:
+    inputs = both[0].inputs
+    use = inputs.control.use.copy()
+    use[1] = counted
+    with pytest.raises(InputError, match="one plan coordinate counts without the other") as caught:
+        triangulate(replace(inputs, control=replace(inputs.control, use=use)), both[0].settings)
+    assert caught.value.faults[0].code == "half-plan-use"
