@@ -81,7 +81,7 @@ def covariances(found: system.System, rows: ErrorRows | PointRows) -> Floats:
     return result
 
 
-class _Section(NamedTuple):
+class _Piece(NamedTuple):
     """Some of the rows, ordered by their first models."""
 
     part: Numbers  # (m,): which they are
@@ -89,13 +89,13 @@ class _Section(NamedTuple):
     images: Floats  # (m, d, k): by their own image points
 
 
-def _reduced(found: system.System, rows: ErrorRows | PointRows) -> Iterator[_Section]:
-    """Reduce rows, in sections of bounded memory."""
+def _reduced(found: system.System, rows: ErrorRows | PointRows) -> Iterator[_Piece]:
+    """Reduce rows, in pieces of bounded memory."""
     order, of_images = np.argsort(rows.first, kind="stable"), found.of_images()
-    for section in pieces(len(order), max(system.AT_A_TIME // rows.by_component.shape[2], 1)):
-        some = rows.take(order[section])
+    for piece in pieces(len(order), max(system.AT_A_TIME // rows.by_component.shape[2], 1)):
+        some = rows.take(order[piece])
         near = NearImages.of(found.errors, some)
-        yield _Section(order[section], reduced.of_rows(found, some, near, of_images), near.by_image)
+        yield _Piece(order[piece], reduced.of_rows(found, some, near, of_images), near.by_image)
 
 
 def photo_rows(found: system.System) -> ErrorRows:
@@ -128,9 +128,9 @@ def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
     if count * size >= len(chosen):
         result[:, :, order] = with_columns(found, rows, reduced.solved(found, units))
         return result
-    for section in _reduced(found, rows):
-        by_rows = reduced.products(found, units, reduced.solved(found, section.rows.by_coordinate))[:, 0]
-        result[section.part[:, None, None], np.arange(size)[:, None], order] = by_rows.T.reshape(-1, size, len(order))
+    for piece in _reduced(found, rows):
+        by_rows = reduced.products(found, units, reduced.solved(found, piece.rows.by_coordinate))[:, 0]
+        result[piece.part[:, None, None], np.arange(size)[:, None], order] = by_rows.T.reshape(-1, size, len(order))
     return result
 
 

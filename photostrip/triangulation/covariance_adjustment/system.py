@@ -75,8 +75,8 @@ class PointRoots:
                 result.root[some, :size] = np.linalg.inv(np.linalg.cholesky(own))
         return result
 
-    def sections(self) -> Iterator[slice]:
-        """Cut the conditions into parts of bounded memory, points left whole."""
+    def pieces(self) -> Iterator[slice]:
+        """Cut the conditions into pieces of bounded memory, points left whole."""
         ends = np.append(np.flatnonzero(np.diff(self.start, prepend=-1)), len(self.start))
         while len(ends) > 1:
             last = max(int(np.searchsorted(ends, ends[0] + AT_A_TIME, side="right")) - 1, 1)
@@ -134,10 +134,10 @@ class System:
         base, result = self.conditions.base, np.empty(len(self.conditions.value))
         following = np.concatenate([self.solution[1:, MODELS:], np.zeros((1, self.blocks.height - MODELS))])
         of_windows = np.concatenate([self.solution[:, ANCHOR.start :], following], axis=1)
-        for part in self.roots.sections():
-            said = np.einsum("nc,nc->n", self.windows(part), of_windows[base[part] // self.blocks.width])
-            roots = self.roots.take(part)
-            result[part] = roots.weighted(roots.whitened(self.conditions.value[part]) - said)
+        for piece in self.roots.pieces():
+            said = np.einsum("nc,nc->n", self.windows(piece), of_windows[base[piece] // self.blocks.width])
+            roots = self.roots.take(piece)
+            result[piece] = roots.weighted(roots.whitened(self.conditions.value[piece]) - said)
         return result
 
     def of_images(self) -> Numbers:
@@ -199,12 +199,9 @@ def system(errors: StripErrors, wanted: Conditions, factor: float, components: F
     right = np.zeros((blocks.count, blocks.height))
     _add_models(errors, wanted.similarities, blocks, diagonal, beside)
     _add_links(wanted.similarities, blocks, diagonal, beside)
-    for part in roots.sections():
-        found = _windows(errors, wanted, roots, blocks, part)
-        whitened = roots.take(part).whitened(wanted.value[part])
-        for block, some in runs_of(wanted.base[part] // blocks.width):
-            _subtract_squares(found[some].T @ found[some], block, diagonal, beside)
-            _subtract(found[some].T @ whitened[some], block, right)
+    for block, of_block, values in _by_block(errors, wanted, roots, blocks):
+        _subtract_squares(of_block.T @ of_block, block, diagonal, beside)
+        _subtract(of_block.T @ values, block, right)
     known = np.zeros((errors.models, COMPONENTS)) if components is None else components
     factors = block_tridiagonal.eliminate(diagonal, beside)
     return System(
@@ -221,13 +218,21 @@ def system(errors: StripErrors, wanted: Conditions, factor: float, components: F
 def solved_for(found: System, value: Floats, components: Floats | None = None) -> System:
     """Solve the eliminated system for other misclosures (n,) of the same conditions."""
     conditions, right = replace(found.conditions, value=value), np.zeros_like(found.solution)
-    for part in found.roots.sections():
-        windows_, whitened = found.windows(part), found.roots.take(part).whitened(value[part])
-        for block, some in runs_of(conditions.base[part] // found.blocks.width):
-            _subtract(windows_[some].T @ whitened[some], block, right)
+    for block, of_block, values in _by_block(found.errors, conditions, found.roots, found.blocks):
+        _subtract(of_block.T @ values, block, right)
     known = np.zeros_like(found.components) if components is None else components
     solution = _solution(found.factors, conditions.similarities, right, known)
     return replace(found, conditions=conditions, components=known, solution=solution)
+
+
+def _by_block(
+    errors: StripErrors, wanted: Conditions, roots: PointRoots, blocks: Blocks
+) -> Iterator[tuple[int, Floats, Floats]]:
+    """Go through the blocks in which conditions begin: whitened windows (n, 7 + 24 w) of some, and misclosures (n,)."""
+    for piece in roots.pieces():
+        found, values = _windows(errors, wanted, roots, blocks, piece), roots.take(piece).whitened(wanted.value[piece])
+        for block, some in runs_of(wanted.base[piece] // blocks.width):
+            yield block, found[some], values[some]
 
 
 def _windows(

@@ -77,7 +77,7 @@ def test_parts_are_bounded_however_many_points_begin_in_a_model(monkeypatch: pyt
     )
     assert np.bincount(wanted.base).max() > 12
     monkeypatch.setattr(system, "AT_A_TIME", 12)
-    parts = list(system.system(found.errors, wanted, FACTOR).roots.sections())
+    parts = list(system.system(found.errors, wanted, FACTOR).roots.pieces())
     assert (parts[0].start, parts[-1].stop) == (0, len(wanted.point))
     for before, after in nonempty(pairwise(parts)):
         assert before.stop == after.start
