@@ -116,6 +116,11 @@ def test_a_lens_error_that_no_calibration_knows_brings_the_polynomial_back() -> 
     assert (choice.taken, choice.contradicted) == ("polynomial", True)
     assert choice.predicted.ratio < BETTER < 1 / BETTER < choice.left_out.ratio
     assert choice.excess > choosing.MOST_EXCESS
+    (note,) = [note for note in strip.notes if note.code == "strip-contradicted"]
+    assert f"{choice.excess:.1f} times what the covariance of the strip lets expect" in note.message
+    document = document_of(adjusted("usual", AUTO, 60.0))
+    assert document["status"] == "look"  # its standard deviations do not hold
+    assert any(note.message in text for text in document["verdict"]["look_at"])
 
 
 @pytest.mark.parametrize(

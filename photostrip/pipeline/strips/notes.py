@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, column_medians
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted
+from photostrip.pipeline.choice import Choice
 from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.rejection import Rejection
@@ -230,26 +231,39 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
 def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceFigures | None) -> Iterator[Note]:
     """Say what the tests of the adjustment with the covariance of the strip found.
 
-    Returns doubtful control, the worst point only: it raises the test values of its neighbours; and a failed test of
-        the whole.
+    Returns a failed test of the whole that the most doubtful point does not explain; and that point, no other: it
+        raises the test values of its neighbours.
     """
     if adjusted is None:
         return
-    tested = adjusted.tested
-    worst = tested.doubtful[:1]
-    for row in worst.tolist():
-        name, axis = control.ids[adjusted.control.point[row]], GROUND_AXES[adjusted.control.axis[row]]
+    tested, names = adjusted.tested, [control.ids[row] for row in adjusted.control.point.tolist()]
+    worst = tested.doubtful[:1].tolist()
+    left = adjusted.rest or tested
+    if left.probability < left.level:
+        found = ", and no single control point explains it" if not worst else f", also without {names[worst[0]]}"
         text = (
-            f"control point {name} does not agree with the strip and the other control: {axis} by about "
-            f"{tested.size[row]:+.2f} m (test value {abs(tested.normalised[row]):.1f}, limit {tested.limit:.1f}); "
-            "it was used"
-        )
-        yield Note("control-doubtful", text, strip=strip.id, points=(name,))
-    if not len(worst) and tested.probability < tested.level:
-        sigma0 = float(np.sqrt(tested.squares / tested.redundancy))
-        text = (
-            f"strip {strip.id}: misclosures and distances are {sigma0:.2f} times as large as expected from the "
-            "standard deviations of image coordinates and control, and no single control point explains it: systematic "
+            f"strip {strip.id}: misclosures and distances are {np.sqrt(left.squares / left.redundancy):.2f} times as "
+            f"large as expected from the standard deviations of image coordinates and control{found}: systematic "
             "errors of the images, or standard deviations that are too small"
         )
         yield Note("strip-contradicted", text, strip=strip.id)
+    for row in worst:
+        axis = GROUND_AXES[adjusted.control.axis[row]]
+        text = (
+            f"control point {names[row]} does not agree with the strip and the other control: {axis} by about "
+            f"{tested.size[row]:+.2f} m (test value {abs(tested.normalised[row]):.1f}, limit {tested.limit:.1f}); "
+            "it was used"
+        )
+        yield Note("control-doubtful", text, strip=strip.id, points=(names[row],))
+
+
+def choice_notes(strip: Strip, choice: Choice | None) -> Iterator[Note]:
+    """Say where control left out in turn decided against the standard deviations: these do not hold, then."""
+    if choice is None or not choice.contradicted:
+        return
+    text = (
+        f"strip {strip.id}: errors at control left out in turn are {choice.excess:.1f} times what the covariance of "
+        "the strip lets expect: standard deviations of its points and photos do not hold; look for errors that all "
+        "photos share, such as a lens that is not what its calibration says, or correct what is stated"
+    )
+    yield Note("strip-contradicted", text, strip=strip.id)

@@ -185,6 +185,7 @@ class FormedPhotos:
                 *notes.polynomial_notes(strip, correction, xyz),
                 *([] if correction is None or found.choice else notes.covariance_proposal(strip, correction)),
                 *notes.photo_notes(strip, resection),
+                *notes.choice_notes(strip, found.choice),
                 *notes.covariance_notes(strip, oriented.control, None if covariance is None else covariance.figures),
             ),
             screened_control=screened.screened_control,

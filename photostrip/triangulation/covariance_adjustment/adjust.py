@@ -16,7 +16,7 @@ from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, T
 from photostrip.triangulation.covariance_adjustment import conditions as strip_conditions
 from photostrip.triangulation.covariance_adjustment import prediction, relinearisation
 from photostrip.triangulation.covariance_adjustment import system as strip_system
-from photostrip.triangulation.covariance_adjustment.left_out import PointsLeftOut, Without
+from photostrip.triangulation.covariance_adjustment.left_out import PointsLeftOut, Without, left_out_errors
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
 from photostrip.triangulation.error_propagation import control_errors, strip_errors
 from photostrip.triangulation.error_propagation.covariances import image_variance
@@ -40,6 +40,7 @@ class CovarianceFigures:
 
     control: control_errors.Misclosures  # control coordinates that counted
     tested: prediction.AdjustmentTest  # test of the whole, and of each of these coordinates
+    rest: prediction.AdjustmentTest | None  # of the whole without the most doubtful point; None where none is doubtful
     factor: float  # variance factor of the image coordinates
     basis: str  # where it comes from
     sigma: float  # standard deviation of an image coordinate of weight one, mm
@@ -190,9 +191,11 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
     images = relinearisation.image_errors(one.system) - one.images
     photos = prediction.photo_errors(one.system)
     similarity = one.strip.absolute.similarity
+    tested = prediction.tested(one.system, len(one.strip.misclosures.point), settings.level)
     figures = CovarianceFigures(
         control=one.strip.misclosures,
-        tested=prediction.tested(one.system, len(one.strip.misclosures.point), settings.level),
+        tested=tested,
+        rest=_without_most_doubtful(one, tested),
         factor=factor,
         basis=basis,
         sigma=start.sigma * float(np.sqrt(factor)),
@@ -206,6 +209,16 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
         control_rows=start.control_rows,
         system=one.system,
     )
+
+
+def _without_most_doubtful(one: _Linearised, tested: prediction.AdjustmentTest) -> prediction.AdjustmentTest | None:
+    """Test the whole without the point to which the most doubtful control coordinate belongs."""
+    if not len(tested.doubtful):
+        return None
+    point = one.strip.misclosures.point
+    coordinates = np.flatnonzero(point == point[tested.doubtful[0]])
+    (left_out,) = left_out_errors(one.system, [coordinates])
+    return replace(tested, squares=tested.squares - left_out.squares, redundancy=tested.redundancy - len(coordinates))
 
 
 @dataclass(frozen=True, eq=False)

@@ -410,8 +410,8 @@ def test_the_control_alone_when_asked_for() -> None:
     assert 1.1 < plan[0] / plan[1] < 1.6  # a prototype's 80 % strips: 1.33
 
 
-def adjusted(seed: int, *, wrong: float = 0.0, axis: int = 2) -> tuple[StripResult, str]:
-    """A strip of 12 photos with its errors, and one control point made wrong."""
+def adjusted(seed: int, *, wrong: float = 0.0, axis: int = 2, off: str = "") -> tuple[StripResult, str]:
+    """A strip of 12 photos with its errors, and one control point made wrong; one may be switched off."""
     inputs = without_noise(spec(12, bands=5))
     rng = np.random.default_rng(seed)
     xy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
@@ -419,7 +419,10 @@ def adjusted(seed: int, *, wrong: float = 0.0, axis: int = 2) -> tuple[StripResu
     given = control.enu + rng.normal(0, 1, control.enu.shape) * control.sigma
     row = [n for n, check in enumerate(control.check) if not check][7]
     given[row, axis] += wrong
-    changed = replace(inputs, observations=replace(inputs.observations, xy=xy), control=replace(control, enu=given))
+    use = control.use & (np.array(control.ids) != off)[:, None]
+    changed = replace(
+        inputs, observations=replace(inputs.observations, xy=xy), control=replace(control, enu=given, use=use)
+    )
     return triangulate(changed, COVARIANCE).strips[0], control.ids[row]
 
 
@@ -430,11 +433,27 @@ def test_a_wrong_control_point_is_named(axis: int, size: float) -> None:
     strip, name = adjusted(3, wrong=size, axis=axis)
     notes = [note for note in strip.notes if note.code == "control-doubtful"]
     assert [note.points for note in notes] == [(name,)]
+    assert not [note for note in strip.notes if note.code == "strip-contradicted"]  # that point explains it
     assert strip.of_photos.covariance is not None
     worst = strip.of_photos.covariance.tested.doubtful[0]
     assert strip.of_photos.covariance.tested.size[worst] == pytest.approx(size, abs=0.45)
     clean, _ = adjusted(3)
     assert not [note for note in clean.notes if note.code in {"control-doubtful", "strip-contradicted"}]
+
+
+@pytest.mark.slow
+def test_the_rest_is_tested_as_if_the_doubtful_point_were_not_given() -> None:
+    strip, name = adjusted(3, wrong=1.0)
+    figures = strip.of_photos.covariance
+    assert figures is not None
+    assert figures.rest is not None
+    without, _ = adjusted(3, wrong=1.0, off=name)
+    alone = without.of_photos.covariance
+    assert alone is not None
+    assert alone.rest is None  # nothing is doubtful there
+    assert figures.rest.redundancy == alone.tested.redundancy == figures.tested.redundancy - 3
+    assert figures.rest.squares == pytest.approx(alone.tested.squares, rel=1e-3)
+    assert figures.tested.probability < 1e-3 < figures.rest.probability
 
 
 @pytest.mark.slow
@@ -463,7 +482,9 @@ def test_coordinates_worse_than_stated_are_told() -> None:
     assert strip.of_photos.covariance is not None
     tested = strip.of_photos.covariance.tested
     assert tested.probability < 1e-3
-    assert {note.code for note in strip.notes} & {"control-doubtful", "strip-contradicted"}
+    notes = {note.code: note.message for note in strip.notes}
+    assert "systematic errors of the images" in notes["strip-contradicted"]
+    assert ("also without" in notes["strip-contradicted"]) == ("control-doubtful" in notes)  # none is to blame alone
 
 
 @pytest.mark.slow
