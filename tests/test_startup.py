@@ -251,6 +251,28 @@ def test_failures_become_messages_and_codes(
     assert captured.out == ""
 
 
+def test_an_interrupt_that_a_half_import_hides_is_an_interrupt(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    hidden = AttributeError("partially initialized module 'pyproj' has no attribute 'network'")
+    hidden.__context__ = KeyboardInterrupt()
+    failing(monkeypatch, hidden)
+    assert cli.main(["probe"]) == 130
+    assert capsys.readouterr().err == "error: interrupted\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "place"), [(("a.yaml", "-o", ""), 3), (("", "-o", "x"), 1), (("a", "--output="), 2)]
+)
+def test_an_empty_argument_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], place: int
+) -> None:
+    failing(monkeypatch, AssertionError("it is not called"))
+    assert cli.main(["probe", *arguments]) == 2
+    message = f"error: argument {place} of 'probe' is empty: is a variable of the shell not set?\n"
+    assert capsys.readouterr().err == message
+
+
 @pytest.mark.parametrize("arguments", [["--debug", "probe"], ["probe", "--debug"]])
 def test_debug_shows_the_traceback(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str]

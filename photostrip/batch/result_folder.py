@@ -113,7 +113,8 @@ class ResultFolder:
             "outcome": answer.outcome,
         }
         _sweep(place)
-        write_files(place, {**answer.files, RECORD: record_text(record)})
+        read = [name for name, content in answer.inputs.items() if content is not None]
+        write_files(place, {**answer.files, RECORD: record_text(record)}, read)
 
     def forget_summaries(self) -> None:
         """Remove the summary of an earlier batch, which would not be true while this one runs, or if it is killed."""

@@ -39,8 +39,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (the one place where failures become exit codes)
         from photostrip.cli.failures import exit_code_of
 
-        return exit_code_of(error, debug=debug)
+        return exit_code_of(_cause(error), debug=debug)
     return code
+
+
+def _cause(error: BaseException) -> BaseException:
+    """Give an interrupt that another error hides: what was being imported then is there in part."""
+    before = error
+    while before.__context__ is not None and not isinstance(before, KeyboardInterrupt):
+        before = before.__context__
+    return before if isinstance(before, KeyboardInterrupt) else error
 
 
 def _seldom_collect_garbage() -> None:
@@ -109,6 +117,10 @@ def _call(name: str, arguments: list[str]) -> int:
 
     The function returns its exit code, or None for 0.
     """
+    for place, each in enumerate(arguments, 1):
+        if not each or (each.startswith("--") and each.find("=") == len(each) - 1):
+            _complain(f"argument {place} of '{name}' is empty: is a variable of the shell not set?")
+            return EXIT_USAGE
     from photostrip.cli.plain_line import plain_arguments
 
     target = getattr(import_module(COMMANDS[name].module), name)

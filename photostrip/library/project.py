@@ -77,7 +77,8 @@ class Project:
             computed = self.loaded.result(adjust_project(self.loaded, self._stages, joint=joint))
             document = document_of(computed, self.loaded.remarks)
             document["certificate"] = self._certificate(document, computed)
-        return Result(document, computed=computed, resolved=self.loaded.resolved)
+        read = self.loaded.files_read(computed) if self._source is None else ()
+        return Result(document, computed=computed, resolved=self.loaded.resolved, read=read)
 
     def _certificate(self, document: dict[str, Any], computed: Computed) -> dict[str, Any]:
         """Say what the result was made from, by hashes that any machine can repeat."""

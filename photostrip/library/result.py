@@ -29,8 +29,16 @@ class Result:
     its unit (``result.points.units``).
     """
 
-    def __init__(self, document: Document, *, computed: Computed | None = None, resolved: str = "") -> None:
+    def __init__(
+        self,
+        document: Document,
+        *,
+        computed: Computed | None = None,
+        resolved: str = "",
+        read: Sequence[str | PathLike[str]] = (),
+    ) -> None:
         self._document = document
+        self._read = read
         self.computed = computed
         """Every stage of the run that found it, with numbers that are not rounded; None where it was read."""
         self._resolved = resolved
@@ -262,13 +270,14 @@ class Result:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none.
 
         Returns their names.
+        Raises InputError where a file that the run read would be replaced.
         """
         from pathlib import Path
 
         from photostrip.formats.text.writing import write_files
 
         files = self._files(html=html)
-        write_files(Path(folder), files)
+        write_files(Path(folder), files, map(Path, self._read))
         return tuple(files)
 
     def __repr__(self) -> str:

@@ -7,10 +7,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from photostrip.errors import Fault, InputError
 from photostrip.formats.text.source import Source
 from photostrip.library.project import Project, assignments_of, loaded_from, reading_from
 
 KEY = "photostrip_simulation"  # number of the schema
+PROJECT, TRUTH = "project.yaml", "truth.json"
 
 
 class Simulation:
@@ -30,21 +32,28 @@ class Simulation:
         from photostrip.formats.output.result_json import parsed
 
         with reading_from(self._source):
-            return dict(parsed("truth.json"))
+            return dict(parsed(TRUTH))
 
     @property
     def project(self) -> Project:
         """The project, ready to run, without files."""
-        return loaded_from(Path("project.yaml"), (), self._source)
+        return loaded_from(Path(PROJECT), (), self._source)
 
     @property
     def _source(self) -> Source:
         return Source({name: text.encode() for name, text in self.files.items()})
 
     def write(self, folder: str | PathLike[str]) -> None:
-        """Write the files into a folder, as ``photostrip simulate -o`` does: all of them or none."""
+        """Write the files into a folder, as ``photostrip simulate -o`` does: all of them or none.
+
+        Raises InputError where a project stands there that no simulation wrote.
+        """
         from photostrip.formats.text.writing import write_files
 
+        there = Path(folder) / PROJECT
+        if there.exists() and not there.with_name(TRUTH).exists():
+            message, fix = "is no simulated project, and is not overwritten", "choose another folder, or remove it"
+            raise InputError(Fault(message, "exists", str(there), fix=fix))
         write_files(Path(folder), self.files)
 
     def __repr__(self) -> str:

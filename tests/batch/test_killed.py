@@ -224,7 +224,9 @@ def test_interrupted_in_good_order(tmp_path: Path, number: signal.Signals, execu
         assert process.stderr is not None
         for _ in range(3):
             process.stderr.readline()
-        assert len(marked(mark)) >= 2
+        while len(marked(mark)) < 2:  # on a busy machine one worker has done three before the other is there
+            assert process.poll() is None
+            time.sleep(0.01)
         os.killpg(process.pid, number)
         out, err = process.communicate(timeout=20.0)
     assert process.returncode == 128 + number

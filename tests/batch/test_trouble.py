@@ -105,6 +105,20 @@ def test_an_earlier_result_survives_a_full_disk(here: Path, monkeypatch: pytest.
 
 
 @pytest.mark.slow
+def test_a_result_replaces_no_file_of_its_project(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first = here / "strips" / "s1"
+    (first / "control.csv").rename(first / "points.csv")
+    project = first / "project.yaml"
+    project.write_text(project.read_text(encoding="utf-8").replace("control.csv", "points.csv"), encoding="utf-8")
+    before = tree(first)
+    assert main(["batch", "strips", "-o", "strips"]) == 2
+    out = capsys.readouterr().out
+    assert "5 projects: 1 unwritten, 4 good" in out
+    assert "s1/points.csv: was read, and what is written would replace it" in " ".join(out.split())
+    assert tree(first) == before
+
+
+@pytest.mark.slow
 def test_files_that_the_system_cuts_off(here: Path) -> None:
     """A limit of the system on the size of files, as a quota is: a real write fails in the middle of result.json."""
 

@@ -51,6 +51,20 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, st
 # --------------------------------------------------------------------------------------------- what comes out where
 
 
+def test_a_result_replaces_no_file_of_its_project(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = write_project(tmp_path, spec("north first", 2))
+    (tmp_path / "control.csv").rename(tmp_path / "points.csv")
+    file.write_text(file.read_text(encoding="utf-8").replace("control.csv", "points.csv"), encoding="utf-8")
+    before = {each.name: each.read_bytes() for each in tmp_path.iterdir()}
+    code, _, err = run(capsys, "run", file, "-o", tmp_path)
+    assert code == 2
+    assert err == (
+        f"error: {tmp_path}/points.csv: was read, and what is written would replace it; choose another place\n"
+    )
+    assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == before
+    assert run(capsys, "run", file, "-o", tmp_path / "out", "-q")[0] == 0
+
+
 @pytest.mark.slow
 def test_the_report_is_printed_and_nothing_else(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = sorted(project.parent.iterdir())

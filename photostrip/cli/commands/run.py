@@ -82,10 +82,11 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         if result.computed is not None:
             messages.step(f"adjusted {counted(len(result.computed.points.number), 'point')}")
         waiting.at("writing the result")
+        files_read = read.files_read(result)
         if trace is not None:
-            write_text(trace, result.trace(form_of(trace, "--trace").value))
+            write_text(trace, result.trace(form_of(trace, "--trace").value), files_read)
         if depfile is not None and output is not None:  # before the result: it must not be the newer of the two
-            write_text(depfile, make_rule(output / RESULT, read.files_read(result)))
+            write_text(depfile, make_rule(output / RESULT, files_read), files_read)
         if output is not None:
             messages.say(f"wrote {len(result.write(output, html=html))} files to {output}")
         if plots is not None:

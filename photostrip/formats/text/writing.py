@@ -20,27 +20,31 @@ Content = str | bytes | Iterable[str]  # the last: a text in pieces, each made w
 PIECE = 1_000_000  # characters that are encoded at a time
 
 
-def write_text(path: Path, text: str | bytes) -> None:
+def write_text(path: Path, text: str | bytes, read: Iterable[str | Path] = ()) -> None:
     """Write one file, whole or not at all; missing folders are made, a device or a pipe is written to as it is.
 
     A text is written as UTF-8 with the line ends that it has. Errors are those of ``write_files``.
     """
-    write_files(path.parent, {path.name: text})
+    write_files(path.parent, {path.name: text}, read)
 
 
-def write_files(folder: Path, files: Mapping[str, Content]) -> None:
+def write_files(folder: Path, files: Mapping[str, Content], read: Iterable[str | Path] = ()) -> None:
     """Write the files of one folder, all of them or none; the folder is made when it is missing.
 
     All contents are written first and renamed then, in the order given: put the file last that make or another program
     looks at.
 
-    Raises InputError when the folder is a file, or one of the files a folder.
+    read: files that the contents were made from; none of them is replaced.
+    Raises InputError when the folder is a file, one of the files a folder, or one that was read.
     Raises OSError when the disk is full or the folder must not be written to.
     """
     _make(folder)
+    kept = {os.path.realpath(each) for each in read}
     for name in files:
         if (folder / name).is_dir():
             _refuse(folder / name, "is a folder", "a file")
+        if kept and os.path.realpath(folder / name) in kept:
+            _refuse(folder / name, "was read, and what is written would replace it")
     waiting: list[tuple[Path, Path]] = []
     try:
         for name, content in files.items():
@@ -50,13 +54,28 @@ def write_files(folder: Path, files: Mapping[str, Content]) -> None:
                 continue
             target = Path(os.path.realpath(target))  # through a link, to where the file is
             waiting.append((target.with_name(f".{target.name}.{os.getpid()}.tmp"), target))
-            _write(waiting[-1][0], content)
-        for temporary, target in waiting:
-            temporary.replace(target)
+            try:
+                _write(waiting[-1][0], content)
+            except OSError as error:
+                error.filename = str(target)  # the temporary file is nobody's business
+                raise
+        _rename(waiting)
     except BaseException:  # also when the user interrupts
         for temporary, _ in waiting:
             with suppress(OSError):
                 temporary.unlink()
+        raise
+
+
+def _rename(waiting: Iterable[tuple[Path, Path]]) -> None:
+    """Rename all files; an interrupt waits for the last, so that what stands in a folder belongs together."""
+    try:
+        for temporary, target in waiting:
+            temporary.replace(target)
+    except (KeyboardInterrupt, SystemExit):
+        for temporary, target in waiting:
+            with suppress(FileNotFoundError):  # it was renamed before
+                temporary.replace(target)
         raise
 
 
@@ -82,7 +101,7 @@ def _make(folder: Path) -> None:
         _refuse(blocking, "is a file", "a folder")
 
 
-def _refuse(path: Path, what: str, expected: str) -> None:
+def _refuse(path: Path, what: str, expected: str = "") -> None:
     raise InputError(Fault(what, code="output-path", file=str(path), expected=expected, fix="choose another place"))
 
 

@@ -53,6 +53,20 @@ def test_keys_are_set_and_nothing_is_said(spec: Path, capsys: pytest.CaptureFixt
     assert (spec.parent / "out.d").read_text(encoding="utf-8").startswith(f"{folder}/project.yaml: {spec}\n")
 
 
+def test_a_project_that_was_not_simulated_is_not_overwritten(
+    spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine" / "project.yaml"
+    mine.parent.mkdir()
+    mine.write_text("photostrip: 1\n", encoding="utf-8")
+    assert main(["simulate", str(spec), "-o", str(mine.parent)]) == 2
+    message = "is no simulated project, and is not overwritten; choose another folder, or remove it"
+    assert capsys.readouterr().err == f"error: {mine}: {message}\n"
+    assert [each.name for each in mine.parent.iterdir()] == ["project.yaml"]
+    again = tmp_path / "again"
+    assert [main(["simulate", str(spec), "-o", str(again), "-q"]) for _ in range(2)] == [0, 0]
+
+
 def test_the_same_command_writes_the_same_bytes(spec: Path) -> None:
     folders = [spec.parent / "one", spec.parent / "two"]
     for folder in nonempty(folders):

@@ -86,6 +86,49 @@ def test_an_interrupt_leaves_no_temporary_file(tmp_path: Path, monkeypatch: pyte
     assert content(tmp_path) == {}
 
 
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_an_interrupt_while_files_are_renamed_leaves_them_all_new(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, which: int
+) -> None:
+    names = ["one.csv", "two.csv", "three.json"]
+    write_files(tmp_path, dict.fromkeys(names, "old"))
+    rename = Path.replace
+    seen: list[str] = []
+
+    def interrupted(self: Path, target: Path) -> Path:
+        seen.append(target.name)
+        renamed = rename(self, target)
+        if len(seen) == which + 1:
+            raise KeyboardInterrupt
+        return renamed
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_files(tmp_path, dict.fromkeys(names, "new"))
+    assert content(tmp_path) == dict.fromkeys(names, "new")
+
+
+def test_a_file_that_was_read_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = tmp_path / "points.csv"
+    given.write_text("given", encoding="utf-8")
+    (tmp_path / "link.csv").symlink_to(given)
+    monkeypatch.chdir(tmp_path)
+    for name in nonempty(("points.csv", "link.csv")):
+        with pytest.raises(InputError, match=rf"{name}: was read, and what is written would replace it"):
+            write_files(tmp_path, {"one.csv": "new", name: "new"}, ["points.csv"])
+    assert content(tmp_path) == {"points.csv": "given", "link.csv": "given"}
+
+
+def test_an_error_names_the_file_and_not_the_temporary_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(self: Path, _: str | Iterable[str]) -> None:
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(writing, "_write", refused)
+    with pytest.raises(PermissionError) as caught:
+        write_text(tmp_path / "one.csv", "new")
+    assert caught.value.filename == str(tmp_path / "one.csv")
+
+
 @pytest.mark.parametrize("place", ["file", "file/below"])
 def test_a_file_where_a_folder_should_be_is_refused(tmp_path: Path, place: str) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
