@@ -191,11 +191,11 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
     images = relinearisation.image_errors(one.system) - one.images
     photos = prediction.photo_errors(one.system)
     similarity = one.strip.absolute.similarity
-    tested = prediction.tested(one.system, len(one.strip.misclosures.point), settings.level)
+    tested = prediction.tested(one.system, settings.level, factor)
     figures = CovarianceFigures(
         control=one.strip.misclosures,
         tested=tested,
-        rest=_without_most_doubtful(one, tested),
+        rest=_without_most_doubtful(one, tested, factor),
         factor=factor,
         basis=basis,
         sigma=start.sigma * float(np.sqrt(factor)),
@@ -211,14 +211,18 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
     )
 
 
-def _without_most_doubtful(one: _Linearised, tested: prediction.AdjustmentTest) -> prediction.AdjustmentTest | None:
+def _without_most_doubtful(
+    one: _Linearised, tested: prediction.AdjustmentTest, factor: float
+) -> prediction.AdjustmentTest | None:
     """Test the whole without the point to which the most doubtful control coordinate belongs."""
     if not len(tested.doubtful):
         return None
     point = one.strip.misclosures.point
     coordinates = np.flatnonzero(point == point[tested.doubtful[0]])
     (left_out,) = left_out_errors(one.system, [coordinates])
-    return replace(tested, squares=tested.squares - left_out.squares, redundancy=tested.redundancy - len(coordinates))
+    return replace(
+        tested, squares=tested.squares - left_out.squares / factor, redundancy=tested.redundancy - len(coordinates)
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -41,13 +40,8 @@ class LeftOut(NamedTuple):
 
 def left_out_errors(found: System, groups: Sequence[Numbers]) -> list[LeftOut]:
     """Predict groups of control coordinates (rows of the misclosures), each from all the others."""
-    rows = found.conditions.of_control(np.concatenate(groups))
-    inverse = part_of_inverse(found, rows)
-    ends = np.cumsum([0, *(len(group) for group in groups)])
-    return [
-        _predicted(inverse[start:stop, start:stop], found.correlates[rows[start:stop]])
-        for start, stop in pairwise(ends.tolist())
-    ]
+    of_groups = [found.conditions.of_control(group) for group in groups]  # one by one: all together take their square
+    return [_predicted(part_of_inverse(found, rows), found.correlates[rows]) for rows in of_groups]
 
 
 class PointsLeftOut(NamedTuple):

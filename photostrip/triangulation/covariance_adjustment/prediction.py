@@ -153,24 +153,24 @@ def joint_covariance(found: system.System, rows: ErrorRows) -> Floats:
     return result
 
 
-def tested(found: system.System, count: int, level: float) -> AdjustmentTest:
-    """Test the adjustment as a whole, w^T lambda, and each control coordinate, lambda / sqrt(q).
+def tested(found: system.System, level: float, factor: float) -> AdjustmentTest:
+    """Test the adjustment as a whole, w^T lambda / f, and each control coordinate, lambda / sqrt(f q).
 
-    count: number of control coordinates.
     level: probability of calling any of them doubtful in a sound strip.
+    factor: f, the variance factor of the image coordinates with which the system was built: f Q is the covariance of w.
     """
     wanted = found.conditions
     rows = np.flatnonzero(wanted.kind == CONTROL)
     correlates, cofactors = found.correlates[rows], cofactors_of(found, rows)
-    normalised, size = np.full(count, np.nan), np.full(count, np.nan)
-    checked = np.flatnonzero(cofactors * (wanted.noise[rows] + 1e-12) > CHECKED)
+    normalised, size = np.full((2, len(rows)), np.nan)
+    checked = np.flatnonzero(cofactors * (wanted.noise[rows] + 1e-12) / factor > CHECKED)
     source = wanted.source[rows[checked]]
-    normalised[source] = correlates[checked] / np.sqrt(cofactors[checked])
+    normalised[source] = correlates[checked] / np.sqrt(factor * cofactors[checked])
     size[source] = -correlates[checked] / cofactors[checked]  # given minus true
     distances = int((wanted.kind == DISTANCE).sum())
     return AdjustmentTest(
-        squares=found.squares,
-        redundancy=count - SIMILARITY_PARAMETERS + distances,
+        squares=found.squares / factor,
+        redundancy=len(rows) - SIMILARITY_PARAMETERS + distances,
         normalised=normalised,
         size=size,
         distances=distances,

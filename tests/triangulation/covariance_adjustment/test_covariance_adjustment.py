@@ -410,8 +410,13 @@ def test_the_control_alone_when_asked_for() -> None:
     assert 1.1 < plan[0] / plan[1] < 1.6  # a prototype's 80 % strips: 1.33
 
 
-def adjusted(seed: int, *, wrong: float = 0.0, axis: int = 2, off: str = "") -> tuple[StripResult, str]:
-    """A strip of 12 photos with its errors, and one control point made wrong; one may be switched off."""
+def adjusted(
+    seed: int, *, wrong: float = 0.0, axis: int = 2, off: str = "", stated: float = 1.0
+) -> tuple[StripResult, str]:
+    """A strip of 12 photos with its errors, and one control point made wrong; one may be switched off.
+
+    stated: stated over true standard deviation of the image coordinates.
+    """
     inputs = without_noise(spec(12, bands=5))
     rng = np.random.default_rng(seed)
     xy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
@@ -420,9 +425,8 @@ def adjusted(seed: int, *, wrong: float = 0.0, axis: int = 2, off: str = "") -> 
     row = [n for n, check in enumerate(control.check) if not check][7]
     given[row, axis] += wrong
     use = control.use & (np.array(control.ids) != off)[:, None]
-    changed = replace(
-        inputs, observations=replace(inputs.observations, xy=xy), control=replace(control, enu=given, use=use)
-    )
+    observations = replace(inputs.observations, xy=xy, sigma=stated * inputs.observations.sigma)
+    changed = replace(inputs, observations=observations, control=replace(control, enu=given, use=use))
     return triangulate(changed, COVARIANCE).strips[0], control.ids[row]
 
 
@@ -454,6 +458,22 @@ def test_the_rest_is_tested_as_if_the_doubtful_point_were_not_given() -> None:
     assert figures.rest.redundancy == alone.tested.redundancy == figures.tested.redundancy - 3
     assert figures.rest.squares == pytest.approx(alone.tested.squares, rel=1e-3)
     assert figures.tested.probability < 1e-3 < figures.rest.probability
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stated", [1 / 3, 3.0])
+def test_tests_hold_where_parallaxes_contradict_the_stated_sigma(stated: float) -> None:
+    """Where the y parallaxes have found the true one, tests are made with it: no false alarm, nothing is missed."""
+    strips = [adjusted(seed, stated=stated) for seed in nonempty(range(8))]
+    strips.append(adjusted(8, wrong=1.2, stated=stated))
+    found = [strip.of_photos.covariance for strip, _ in strips]
+    assert {each.basis for each in found if each is not None} == {"a-posteriori"}
+    tested = [each.tested for each in found if each is not None]
+    ratio = np.array([each.squares / each.redundancy for each in tested[:-1]])
+    assert ratio.mean() == pytest.approx(1.0, abs=0.25)  # not 9 and 1/9
+    assert [len(each.doubtful) for each in tested[:-1]].count(0) >= 7
+    strip, name = strips[-1]
+    assert [note.points for note in strip.notes if note.code == "control-doubtful"] == [(name,)]
 
 
 @pytest.mark.slow
