@@ -74,7 +74,7 @@ def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float
     """Points measured on neighbouring photos of a strip, as pairs.
 
     photos: photos of the strip in flight order; pair i is made of photos i and i+1.
-    Returns measurements; weights are 1 where both sigmas are the strip's median.
+    Returns measurements; weights are 1 where the standard deviations across the base are the strip's median.
     Raises GeometryError when a pair has fewer than five common points.
     """
     place = {photo: number for number, photo in enumerate(photos)}
@@ -89,17 +89,27 @@ def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float
     pair = position[both]
     counts = np.bincount(pair, minlength=len(photos) - 1)
     _require_points(counts, photos)
-    variance = (observations.sigma**2).mean(axis=1)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    left, right = observations.xy[rows[:, 0]], observations.xy[rows[:, 1]]
+    variance = observations.sigma**2
+    across = _across(np.add.reduceat(left - right, starts))[pair]
+    of_parallax = (variance[rows, 1] + (variance[rows, 0] - variance[rows, 1]) * across[:, None]).sum(axis=1)
     return Pairs(
-        starts=np.concatenate([[0], np.cumsum(counts)[:-1]]),
+        starts=starts,
         pair=pair,
-        left=observations.xy[rows[:, 0]],
-        right=observations.xy[rows[:, 1]],
-        weight=frozen_alike(2 * median(variance[inside]) / variance[rows].sum(axis=1), float, (len(rows),)),
+        left=left,
+        right=right,
+        weight=frozen_alike(2 * median(observations.sigma[inside]) ** 2 / of_parallax, float, (len(rows),)),
         focal=focal,
         point=observations.point[rows[:, 0]],
         rows=rows,
     )
+
+
+def _across(shifts: Floats) -> Floats:
+    """Shares (p,) of x in a variance across the base, which common points show by their shift (p, 2) between photos."""
+    squares = (shifts**2).sum(axis=1)
+    return np.divide(shifts[:, 1] ** 2, squares, out=np.zeros(len(shifts)), where=squares > 0.0)
 
 
 def _require_points(counts: Numbers, photos: Sequence[str]) -> None:

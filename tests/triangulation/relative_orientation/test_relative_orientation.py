@@ -17,7 +17,13 @@ from photostrip.notes import counted
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again, orient_pairs
+from photostrip.triangulation.error_propagation.covariances import image_variance
+from photostrip.triangulation.relative_orientation.orientation import (
+    assess_pairs,
+    orient_again,
+    orient_pairs,
+    orient_unchecked,
+)
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, collect_pairs
 from photostrip.triangulation.relative_orientation.solution import (
     ITERATIONS,
@@ -389,6 +395,24 @@ def test_pairs_are_collected_in_flight_order() -> None:
         both = set(obs.point[obs.photo == number]) & set(obs.point[obs.photo == number + 1])
         assert set(point[pairs.pair == number]) == both
     assert np.allclose(pairs.weight, 1)
+
+
+@pytest.mark.parametrize("kappa", [0.0, 90.0, 180.0, 30.0])
+@pytest.mark.parametrize("sigma", [(0.010, 0.003), (0.003, 0.010)])
+def test_a_y_parallax_has_the_variance_across_the_base(sigma: tuple[float, float], kappa: float) -> None:
+    """On photos turned by kappa, whose x and y are not measured equally well."""
+    flown = fly(2, 4, extra=40)
+    turn = Rotation.from_euler("z", kappa, degrees=True).as_matrix()[:2, :2]
+    rng = np.random.default_rng(5)
+    xy = flown.observations.xy @ turn.T
+    noise = rng.normal(0.0, sigma, xy.shape)
+    measured = replace(flown.observations, xy=xy + noise, sigma=np.tile(sigma, (len(xy), 1)))
+    pairs = collect_pairs(measured, flown.photos, flown.focal)
+    oriented, _ = orient_unchecked(pairs)
+    factor, _ = image_variance(oriented, float(np.median(sigma)))
+    assert factor == pytest.approx(1.0, abs=0.3)  # half of the mean variance of x and y: 0.2, or 2.3, at 0 degrees
+    across = np.hypot(*(turn[:, 1] * sigma))  # but for the few degrees by which the photos are turned themselves
+    assert pairs.weight == pytest.approx((np.median(sigma) / across) ** 2, rel=0.15)
 
 
 def test_rows_in_any_order_and_other_photos_do_not_matter() -> None:
