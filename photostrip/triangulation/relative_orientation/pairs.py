@@ -89,13 +89,12 @@ def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float
     pair = position[both]
     counts = np.bincount(pair, minlength=len(photos) - 1)
     _require_points(counts, photos)
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     left, right = observations.xy[rows[:, 0]], observations.xy[rows[:, 1]]
     variance = observations.sigma**2
-    across = _across(np.add.reduceat(left - right, starts))[pair]
+    across = _across(*(np.bincount(pair, shift, len(counts)) for shift in (left - right).T))[pair]
     of_parallax = (variance[rows, 1] + (variance[rows, 0] - variance[rows, 1]) * across[:, None]).sum(axis=1)
     return Pairs(
-        starts=starts,
+        starts=np.concatenate([[0], np.cumsum(counts)[:-1]]),
         pair=pair,
         left=left,
         right=right,
@@ -106,10 +105,10 @@ def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float
     )
 
 
-def _across(shifts: Floats) -> Floats:
-    """Shares (p,) of x in a variance across the base, which common points show by their shift (p, 2) between photos."""
-    squares = (shifts**2).sum(axis=1)
-    return np.divide(shifts[:, 1] ** 2, squares, out=np.zeros(len(shifts)), where=squares > 0.0)
+def _across(x: Floats, y: Floats) -> Floats:
+    """Shares (p,) of x in a variance across the base, along which common points shift by x, y (p,) between photos."""
+    squares = x**2 + y**2
+    return np.divide(y**2, squares, out=np.zeros(len(x)), where=squares > 0.0)
 
 
 def _require_points(counts: Numbers, photos: Sequence[str]) -> None:

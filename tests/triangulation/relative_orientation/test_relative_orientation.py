@@ -412,7 +412,7 @@ def test_a_y_parallax_has_the_variance_across_the_base(sigma: tuple[float, float
     factor, _ = image_variance(oriented, float(np.median(sigma)))
     assert factor == pytest.approx(1.0, abs=0.3)  # half of the mean variance of x and y: 0.2, or 2.3, at 0 degrees
     across = np.hypot(*(turn[:, 1] * sigma))  # but for the few degrees by which the photos are turned themselves
-    assert pairs.weight == pytest.approx((np.median(sigma) / across) ** 2, rel=0.15)
+    assert pairs.weight == pytest.approx((np.median(sigma) / across) ** 2, rel=0.25)
 
 
 def test_rows_in_any_order_and_other_photos_do_not_matter() -> None:
