@@ -91,7 +91,8 @@ def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float
     _require_points(counts, photos)
     left, right = observations.xy[rows[:, 0]], observations.xy[rows[:, 1]]
     variance = observations.sigma**2
-    across = _across(*(np.bincount(pair, shift, len(counts)) for shift in (left - right).T))[pair]
+    x, y = (np.bincount(pair, shift, len(counts)).astype(float) for shift in (left - right).T)
+    across = _across(x, y)[pair]
     of_parallax = (variance[rows, 1] + (variance[rows, 0] - variance[rows, 1]) * across[:, None]).sum(axis=1)
     return Pairs(
         starts=np.concatenate([[0], np.cumsum(counts)[:-1]]),
