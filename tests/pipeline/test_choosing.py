@@ -16,10 +16,11 @@ from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips import choosing
 from photostrip.report.page.text import to_text
 from photostrip.report.sections.accuracy_report import sections_of
-from photostrip.report.sections.decisions import choices_in_short
+from photostrip.report.sections.decisions import choice_line, choices_in_short, decisions_section
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
+from photostrip.triangulation.polynomial.correction import PolynomialSettings
 from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
 
@@ -234,6 +235,25 @@ def test_the_result_says_what_was_taken_and_why() -> None:
     apart = f"{difference['plan']:.3f}/{difference['height']:.3f} m (ratio with that {difference['ratio']:.2f})"
     assert f"; the results differ by {apart}; errors at" in text
     assert document_of(adjusted.__wrapped__("usual")) == document
+
+
+def test_ratios_at_the_limit_show_on_which_side_they_are() -> None:
+    (choice,) = document_of(adjusted("usual"))["choices"]
+    for value, shown, percent in nonempty([(0.897, "0.897", "10.3"), (0.903, "0.903", "9.7"), (0.5, "0.50", "50")]):
+        ratios = {name: {**choice[name], "ratio": value} for name in ("predicted", "difference")}
+        line = choice_line({**choice, **ratios})
+        assert f"(ratio {shown}); the results differ by" in line
+        assert f"(ratio with that {shown})" in line
+        assert line.startswith(f"covariance, which betters the polynomial by {percent} %: ")
+
+
+def test_a_degree_that_was_asked_for_and_not_taken_is_told() -> None:
+    simulation = simulate(USUAL)
+    settings = replace(settings_of(simulation), polynomial=PolynomialSettings(degree="1"), precision=False)
+    document = document_of(triangulate(inputs_of(simulation), settings))
+    assert document["choices"][0]["taken"] == "covariance"
+    text = " ".join(to_text("", [decisions_section(document)], 100).split())
+    assert "degree 1 was asked for and weighed, and is not in the result" in text
 
 
 def test_the_result_says_that_the_results_are_apart() -> None:

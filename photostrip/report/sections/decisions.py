@@ -12,7 +12,7 @@ from photostrip.report.sections.strip import elsewhere
 
 WEIGHED = ("polynomial", "covariance")
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
-AGREEING = "10 %"  # methods that differ by less are said to agree
+AGREEING, LIMIT = "10 %", 0.9  # methods that differ by less are said to agree; the ratio that is the limit
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
 
 
@@ -26,10 +26,14 @@ def decisions_section(document: Document) -> Section:
 def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     settings = document["settings"]
     yield from choice_rows(document)
+    taken = {block["strip"]: block["taken"] for block in document.get("choices", [])}
     for block in document.get("polynomials", []):
+        label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
         if block["asked"] == "auto":
-            label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
             yield label, _degree(block)
+        elif taken.get(block["strip"]) == "covariance":
+            fix = "`processing.adjustment: polynomial` takes it"
+            yield label, f"degree {block['asked']} was asked for and weighed, and is not in the result; {fix}"
     if "relative" in settings:
         yield from _screening(document, settings["relative"])
     elif settings["links"]["screening"] == "auto":
@@ -74,7 +78,7 @@ def choice_line(block: Document) -> str:
     text = f"{block['taken']}, {_why(block)}: standard deviations of new points {_figures(predicted)}"
     apart = block["difference"]
     text += f"; the results differ by {metres(apart['plan'])}/{metres(apart['height'])} m"
-    text += f" (ratio with that {ratio(apart['ratio'])})"
+    text += f" (ratio with that {_ratio(apart['ratio'])})"
     if left_out is None:
         return f"{text}; no control can be left out"
     excess = f"; those of the covariance are {ratio(block['excess'])} times what it lets expect"
@@ -89,13 +93,23 @@ def _why(block: Document) -> str:
         return f"which the covariance of the strip betters by less than {AGREEING}"
     if block["apart"]:
         return f"because the results differ by more than predictions that agree within {AGREEING} let expect"
-    return f"which betters the polynomial by {fixed(100 * (1 - block['predicted']['ratio']), 0)} %"
+    percent = 100 * (1 - block["predicted"]["ratio"])
+    return f"which betters the polynomial by {fixed(percent, 1 if _at_limit(block['predicted']['ratio']) else 0)} %"
+
+
+def _ratio(value: float | None) -> str:
+    """Write a ratio, with as many digits as show on which side of the limit it is."""
+    return ratio(value) if value is None or not _at_limit(value) else fixed(value, 3)
+
+
+def _at_limit(value: float) -> bool:
+    return abs(value - LIMIT) < 0.01  # noqa: PLR2004 (the last digit of what is written)
 
 
 def _figures(witness: Document) -> str:
     """Give plan and height of both methods, and their ratio."""
     each = [f"{metres(witness[name]['plan'])}/{metres(witness[name]['height'])} m" for name in WEIGHED]
-    return f"{each[0]} with the polynomial, {each[1]} with the covariance (ratio {ratio(witness['ratio'])})"
+    return f"{each[0]} with the polynomial, {each[1]} with the covariance (ratio {_ratio(witness['ratio'])})"
 
 
 def _degree(block: Document) -> str:
