@@ -235,8 +235,11 @@ def lay(
                 f"is {2 * half:.4g} m long; do ids and coordinates belong to the points that were measured?"
             )
             raise GeometryError(message, points=targets.control.ids, code="control-of-other-points")
-        message = "the strip fits the control only upside down: the control coordinates are left-handed"
-        expected = "the axes in the order of the columns, [north, east, up] where X is north"
+        message = "the strip fits the control only upside down: control or image coordinates are left-handed"
+        expected = (
+            "the axes in the order of the columns, [north, east, up] where X is north; y of the images up, or "
+            "`observations.y_axis: down`"
+        )
         raise InputError(Fault(message, code="left-handed-control", key="control.axes", expected=expected))
     return Laid(similarity, values, iteration)
 
