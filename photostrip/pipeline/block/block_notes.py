@@ -22,6 +22,7 @@ OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustme
     "little-control",
     "little-redundancy",
     "long-strip",
+    "not-converged",
     "not-resected",
     "strip-contradicted",
     "weak-control",

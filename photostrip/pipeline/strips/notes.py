@@ -229,7 +229,7 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
 
 
 def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceFigures | None) -> Iterator[Note]:
-    """Say what the tests of the adjustment with the covariance of the strip found.
+    """Say whether the adjustment with the covariance of the strip came to its end, and what its tests found.
 
     Returns a failed test of the whole that the most doubtful point does not explain; and that point, no other: it
         raises the test values of its neighbours.
@@ -237,6 +237,13 @@ def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceF
     if adjusted is None:
         return
     tested, names = adjusted.tested, [control.ids[row] for row in adjusted.control.point.tolist()]
+    if not adjusted.converged:
+        text = (
+            f"strip {strip.id}: the adjustment with its covariance is not at rest after the strip was formed "
+            f"{counted(adjusted.formations, 'time')}: errors in its pairs are too large; look at pairs and photos with "
+            "large residuals, or use `processing.adjustment: bundle`"
+        )
+        yield Note("not-converged", text, strip=strip.id)
     worst = tested.doubtful[:1].tolist()
     left = adjusted.rest or tested
     if left.probability < left.level:

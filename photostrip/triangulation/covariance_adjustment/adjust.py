@@ -45,6 +45,7 @@ class CovarianceFigures:
     basis: str  # where it comes from
     sigma: float  # standard deviation of an image coordinate of weight one, mm
     formations: int  # how often the strip was formed
+    converged: bool  # whether what squares of the turns leave is small against the image coordinates by then
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +201,7 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
         basis=basis,
         sigma=start.sigma * float(np.sqrt(factor)),
         formations=formations,
+        converged=bool(turn * rate / 2 <= enough),
     )
     return CovarianceAdjustment(
         figures=figures,

@@ -385,6 +385,8 @@ def test_passes_go_on_until_nothing_is_left_to_be_linear(monkeypatch: pytest.Mon
         difference = formed_from_what_is_taken_for_true(result) - result.points.cartesian
         off.append(float(np.sqrt(np.mean((np.linalg.norm(difference, axis=1) / sigma) ** 2))))
         passes.append(document_of(result)["covariance"][0]["passes"])
+        told = [note.code for note in result.notes if note.code == "not-converged"]
+        assert told == ["not-converged"] * (most == 1)
     assert min(passes[:2]) > passes[2] == 1
     assert max(off[:2]) < 0.05  # of a standard deviation
     assert off[2] > 0.5
