@@ -236,10 +236,7 @@ def lay(
             )
             raise GeometryError(message, points=targets.control.ids, code="control-of-other-points")
         message = "the strip fits the control only upside down: control or image coordinates are left-handed"
-        expected = (
-            "the axes in the order of the columns, [north, east, up] where X is north; y of the images up, or "
-            "`observations.y_axis: down`"
-        )
+        expected = "the axes in the order of the columns, [north, east, up] where X is north; or `y_axis: down`"
         raise InputError(Fault(message, code="left-handed-control", key="control.axes", expected=expected))
     return Laid(similarity, values, iteration)
 

@@ -13,7 +13,7 @@ from dataclasses import field
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
@@ -113,7 +113,33 @@ def form_from_pairs(
     )
     formed = place_models(orientation, models, junctions, orientation.used & models.sound, first)
     _refuse_vertical_base(np.diff(formed.centers, axis=0) / formed.scale[:, None], photos)
-    return formed
+    return without_rows(formed, orientation, _elsewhere(orientation, formed))
+
+
+def _elsewhere(orientation: Orientation, formed: FormedStrip) -> Flags:
+    """Rows (m,) of points that stand again farther away than a photo reaches on the ground: two under one id.
+
+    Of such a point the longest run of models stays. The mean of both places would be nowhere, and its precision reach
+    over all models between.
+    """
+    pairs, gone = orientation.pairs, np.zeros(len(orientation.point), bool)
+    rows = np.flatnonzero(orientation.used & np.isfinite(formed.model_xyz).all(axis=1))
+    rows = rows[np.argsort(orientation.point[rows], kind="stable")]  # the models of a point one after the other
+    point, model, xyz = orientation.point[rows], pairs.pair[rows], formed.model_xyz[rows]
+    depth = np.linalg.norm(xyz - formed.centers[model], axis=1)
+    reach = np.linalg.norm(np.ptp(np.concatenate([pairs.left, pairs.right]), axis=0)) / pairs.focal * median(depth)
+    other = point[1:] != point[:-1]
+    no_photo = np.diff(model) > 1  # is in both models
+    apart = ~other & no_photo & (np.linalg.norm(np.diff(xyz, axis=0), axis=1) > reach)
+    if apart.any():
+        begins = np.flatnonzero(np.append(True, other | apart))  # of the runs
+        length = np.diff(np.append(begins, len(rows)))
+        longest = np.lexsort((-length, point[begins]))
+        longest = longest[np.append(True, np.diff(point[begins][longest]) > 0)]
+        stays = np.zeros(len(begins), bool)
+        stays[longest] = True
+        gone[rows] = np.repeat(~stays, length)
+    return gone
 
 
 def model_points(

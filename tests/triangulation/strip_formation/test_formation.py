@@ -446,6 +446,31 @@ def test_coordinates_are_means_over_the_models() -> None:
         assert strip.model_count[row] == len(models)
 
 
+@pytest.mark.parametrize(("kept", "renamed"), [("p4_0", "p20_1"), ("p4_1", "p23_0")])
+def test_of_two_points_under_one_id_that_lie_far_apart_the_one_in_more_models_stays(kept: str, renamed: str) -> None:
+    flown = fly(11, 24, sigma=5 * MICROMETRE, extra=20)
+    number, other = flown.at[kept], flown.at[renamed]
+    observations = flown.observations
+    two = replace(observations, point=np.where(observations.point == other, number, observations.point))
+    before, strip = formed(flown), formed(replace(flown, observations=two))
+    model = {each: int(before.model_count[before.point == each][0]) for each in (number, other)}
+    row, stays = np.flatnonzero(strip.point == number)[0], number if model[number] >= model[other] else other
+    assert strip.model_count[row] == max(model.values())
+    assert strip.xyz[row] == pytest.approx(before.xyz[before.point == stays][0], abs=1e-9)
+    assert other not in strip.point
+    assert np.isnan(strip.model_xyz).any(axis=1).sum() == min(model.values())
+
+
+def test_a_point_that_is_missing_on_photos_in_between_is_one_point() -> None:
+    flown = fly(9, 12, overlap=0.9, sigma=5 * MICROMETRE, extra=30)
+    on = np.sort(flown.observations.photo[flown.observations.point == flown.at["p5_0"]])
+    gone = np.isin(flown.observations.photo, on[2:-2]) & (flown.observations.point == flown.at["p5_0"])
+    assert gone.sum() >= 2
+    strip = formed(replace(flown, observations=only(flown.observations, ~gone)))
+    assert strip.model_count[strip.point == flown.at["p5_0"]] == 2
+    assert np.isfinite(strip.model_xyz).all()
+
+
 @given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=20))
 def test_means_by_hand(rows: list[tuple[int, bool]]) -> None:
     point = np.array([number for number, _ in rows], int)
