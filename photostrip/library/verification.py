@@ -108,7 +108,7 @@ def _compared(document: Document, again: Document, file: str) -> Document:
     return {
         "versions": versions,
         "grids": changed,
-        "numbers": compare_results(document, again, None, (file, "the result made again")),
+        "numbers": compare_results(again, document, None, ("the result made again", file)),
         "words": [] if versions else others,
         "result_sha256": {"certificate": before["result_sha256"], "now": now["result_sha256"]},
     }

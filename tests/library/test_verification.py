@@ -131,6 +131,9 @@ def test_an_edited_result_is_told(copied: Path) -> None:
     answer = verify(edited(copied, found), project)
     assert (answer["status"], answer["edited"]) == ("different", False)
     assert answer["result_sha256"]["now"] != answer["result_sha256"]["certificate"]
+    del found["points"][0]
+    (row,) = [each for each in verify(edited(copied, found), project)["numbers"]["sets"] if each["kind"] == "ids"]
+    assert (row["missing"], len(row["new"])) == ([], 1)  # the result made again has what the other lacks
     found = document(copied)
     found["statement"]["remarks"] = ["all is well"]  # neither hashed nor compared
     answer = verify(edited(copied, found), project)

@@ -75,7 +75,8 @@ def choices_in_short(document: Document) -> Iterator[tuple[str, str]]:
 def choice_line(block: Document) -> str:
     """Say what was taken, why, and what both witnesses say of both methods."""
     predicted, left_out = block["predicted"], block["left_out"]
-    text = f"{block['taken']}, {_why(block)}: standard deviations of new points {_figures(predicted)}"
+    text = f"{block['taken']}, {_why(block)}: standard deviations of new points, of one plan coordinate/of the height, "
+    text += _figures(predicted)
     apart = block["difference"]
     text += f"; the results differ by {metres(apart['plan'])}/{metres(apart['height'])} m"
     text += f" (ratio with that {_ratio(apart['ratio'])})"
