@@ -228,7 +228,8 @@ def test_the_result_says_what_was_taken_and_why() -> None:
     text = " ".join(to_text("", sections_of(document), 100).split())
     figures = [choice["predicted"]["polynomial"], choice["predicted"]["covariance"]]
     first, second = (f"{each['plan']:.3f}/{each['height']:.3f} m" for each in figures)
-    assert f"standard deviations of new points, of one plan coordinate/of the height, {first} with the polynomial, {second} with the covariance" in text
+    both = f"{first} with the polynomial, {second} with the covariance"
+    assert f"standard deviations of new points, of one plan coordinate/of the height, {both}" in text
     assert "weighed and not taken: the strip was adjusted with its covariance" in text
     difference = choice["difference"]
     assert difference["ratio"] < 1
