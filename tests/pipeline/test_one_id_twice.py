@@ -1,4 +1,4 @@
-"""Two points far apart under one id: a slip that each adjustment must survive, and the gate must name."""
+"""Two points far apart under one id: a slip that the strip method must survive, and the gate must name."""
 
 from __future__ import annotations
 

@@ -96,10 +96,7 @@ def screen_bundle(
         chosen = search.robust(chosen)
     done = search.clean(chosen)
     while (more := search.fitting(done)) is not None:  # a point comes back once only
-        try:
-            done = search.clean(more)
-        except GeometryError:  # what came back does not go with the rest
-            break
+        done = search.clean(more)
     return replace(done, rejections=tuple(search.log(done)), rounds=search.rounds, common=tuple(search.common))
 
 
