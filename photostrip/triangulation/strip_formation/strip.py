@@ -126,12 +126,12 @@ def _elsewhere(orientation: Orientation, formed: FormedStrip) -> Flags:
     rows = np.flatnonzero(orientation.used & np.isfinite(formed.model_xyz).all(axis=1))
     rows = rows[np.argsort(orientation.point[rows], kind="stable")]  # the models of a point one after the other
     point, model, xyz = orientation.point[rows], pairs.pair[rows], formed.model_xyz[rows]
-    depth = np.linalg.norm(xyz - formed.centers[model], axis=1)
-    reach = np.linalg.norm(np.ptp(np.concatenate([pairs.left, pairs.right]), axis=0)) / pairs.focal * median(depth)
     other = point[1:] != point[:-1]
-    no_photo = np.diff(model) > 1  # is in both models
-    apart = ~other & no_photo & (np.linalg.norm(np.diff(xyz, axis=0), axis=1) > reach)
+    apart = ~other & (np.diff(model) > 1)  # no photo is in both models
     if apart.any():
+        depth = median(np.linalg.norm(xyz - formed.centers[model], axis=1))
+        extent = np.linalg.norm(np.ptp(np.concatenate([pairs.left, pairs.right]), axis=0))
+        apart &= np.linalg.norm(np.diff(xyz, axis=0), axis=1) > extent / pairs.focal * depth
         begins = np.flatnonzero(np.append(True, other | apart))  # of the runs
         length = np.diff(np.append(begins, len(rows)))
         longest = np.lexsort((-length, point[begins]))
