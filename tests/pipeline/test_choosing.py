@@ -240,7 +240,7 @@ def test_the_result_says_what_was_taken_and_why() -> None:
 
 
 def test_ratios_at_the_limit_show_on_which_side_they_are() -> None:
-    assert (decisions.LIMIT, decisions.AGREEING) == (BETTER, f"{100 * (1 - BETTER):.0f} %")  # a report knows no methods
+    assert (BETTER, f"{100 * (1 - BETTER):.0f} %") == (decisions.LIMIT, decisions.AGREEING)  # a report knows no methods
     (choice,) = document_of(adjusted("usual"))["choices"]
     for value, shown, percent in nonempty([(0.897, "0.897", "10.3"), (0.903, "0.903", "9.7"), (0.5, "0.50", "50")]):
         ratios = {name: {**choice[name], "ratio": value} for name in ("predicted", "difference")}
