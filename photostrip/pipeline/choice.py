@@ -66,6 +66,11 @@ class Choice:
         return self.taken != method_of(self.predicted, self.expected)
 
 
+_NOTHING = (float("nan"), float("nan"))
+# the polynomial, where a strip's own covariance does not determine it
+NOT_COMPARED = Choice(POLYNOMIAL, Witness(_NOTHING, _NOTHING, 0), _NOTHING, None, "point", float("nan"))
+
+
 @dataclass(frozen=True, eq=False)
 class Deformation:
     """What the similarity leaves at the control, and who takes it out."""

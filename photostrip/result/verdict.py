@@ -56,17 +56,13 @@ def _verification(document: Document) -> Document:
     checks, turned = document["summary"]["check"], document.get("cross_validation", {})
     plan, height = (checks[part]["count"] for part in ("plan", "height"))
     if plan and height:
-        return {"verified": True, "verification": f"{_given_points(plan, 'check')} in plan and {height} in height"}
+        return {"verified": True, "verification": f"{counted(plan, 'check point')} in plan and {height} in height"}
     if turned and turned["plan"]["count"] and turned["height"]["count"]:
-        points = _given_points(turned["plan"]["count"], "control")
+        points = counted(turned["plan"]["count"], "control point")
         text = f"{points} in plan and {turned['height']['count']} in height, left out in turn"
         return {"verified": True, "verification": text}
     missing = "the heights" if plan else "the plan coordinates" if height else "the result"
     return {"verified": False, "verification": f"no point verifies {missing}: {_cure(document)}"}
-
-
-def _given_points(number: int, role: str) -> str:
-    return f"{number} {role} point{'' if number == 1 else 's'}"
 
 
 def _cure(document: Document) -> str:
@@ -169,8 +165,9 @@ def _standing_out(document: Document, role: str, part: str) -> list[str]:
     return [name for name, parts in _given(document, role, "id", "stands_out") if part in parts]
 
 
-def _rms(values: Sequence[float]) -> float:
-    return float((sum(value**2 for value in values) / len(values)) ** 0.5)
+def _rms(values: Sequence[float | None]) -> float | None:
+    squares = [value**2 for value in values if value is not None]  # µm are known where a photo scale is
+    return float((sum(squares) / len(squares)) ** 0.5) if squares else None
 
 
 def _tolerances(document: Document) -> Iterator[str]:

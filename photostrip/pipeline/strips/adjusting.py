@@ -10,9 +10,10 @@ from functools import partial
 
 import numpy as np
 
+from photostrip.errors import GeometryError
 from photostrip.frozen import replace
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.pipeline.choice import COVARIANCE, POLYNOMIAL, Deformation
+from photostrip.pipeline.choice import COVARIANCE, NOT_COMPARED, POLYNOMIAL, Deformation
 from photostrip.pipeline.inputs import AUTO, Settings
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.strips.absolute import Errors, OrientedStrip, ScreenedStrip, StripStage, on_control
@@ -63,7 +64,12 @@ def _deformation(oriented: OrientedStrip[Errors], settings: Settings, stages: St
     covariance = None
     if asked in {COVARIANCE, AUTO}:
         by_covariance = partial(oriented.stage.by_covariance, oriented, settings)
-        covariance = stages.once("covariance", by_covariance, oriented, settings.covariance)
+        try:
+            covariance = stages.once("covariance", by_covariance, oriented, settings.covariance)
+        except GeometryError:
+            if fitted is None:
+                raise
+            return Deformation(fitted, choice=NOT_COMPARED)
     if fitted is None or covariance is None:
         return Deformation(fitted, covariance)
     from photostrip.pipeline.strips.choosing import choose

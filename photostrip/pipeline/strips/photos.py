@@ -204,7 +204,10 @@ class FormedPhotos:
         )
 
     def by_covariance(self, oriented: Oriented, settings: Settings) -> CovarianceAdjustment:
-        """Distribute the misclosures at the control by the strip's own covariance."""
+        """Distribute the misclosures at the control by the strip's own covariance.
+
+        Raises GeometryError where this determines nothing; the strip is named.
+        """
         from photostrip.triangulation.covariance_adjustment.adjust import StripOnControl, adjust
 
         start = StripOnControl(
@@ -221,7 +224,14 @@ class FormedPhotos:
             errors=oriented.errors,
             misclosures=oriented.misclosures,
         )
-        return adjust(start, settings.covariance)
+        try:
+            return adjust(start, settings.covariance)
+        except np.linalg.LinAlgError as error:
+            msg = (
+                f"strip {self.strip.id}: its own covariance does not determine it: its pairs hang together by rounding "
+                "only; look at what is wrong in them, or use `processing.adjustment: polynomial`"
+            )
+            raise GeometryError(msg, photos=self.strip.photos, code="singular") from error
 
     @cached_property
     def _rays_in_use(self) -> Numbers:

@@ -11,6 +11,7 @@ from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import elsewhere
 
 WEIGHED = ("polynomial", "covariance")
+NOT_COMPARED = "the strip's own covariance does not determine it"
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
 AGREEING, LIMIT = "10 %", 0.9  # methods that differ by less are said to agree; the ratio that is the limit
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
@@ -68,13 +69,16 @@ def choices_in_short(document: Document) -> Iterator[tuple[str, str]]:
     for block in blocks:
         left_out = "" if block["left_out"] is None else f", left-out errors {ratio(block['left_out']['ratio'])}"
         known = f", with the results {ratio(block['difference']['ratio'])}" if block["apart"] else ""
-        text = f"{block['taken']}; covariance over polynomial: σ {ratio(block['predicted']['ratio'])}{known}{left_out}"
+        why = f"covariance over polynomial: σ {ratio(block['predicted']['ratio'])}{known}{left_out}"
+        text = f"{block['taken']}; {why if block['predicted']['count'] else NOT_COMPARED}"
         yield "chosen adjustment" if len(blocks) == 1 else f"adjustment of {block['strip']}", text
 
 
 def choice_line(block: Document) -> str:
     """Say what was taken, why, and what both witnesses say of both methods."""
     predicted, left_out = block["predicted"], block["left_out"]
+    if not predicted["count"]:
+        return f"{block['taken']}: {NOT_COMPARED}"
     text = f"{block['taken']}, {_why(block)}: standard deviations of new points, of one plan coordinate/of the height, "
     text += _figures(predicted)
     apart = block["difference"]

@@ -20,7 +20,7 @@ from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, E
 from photostrip.triangulation.error_propagation.joint_covariances import by_same_images
 
 TIE = 6  # decimals of a test value that are not rounding
-CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
+CHECKED = 1e-6  # part of a control coordinate's variance that the others must check; what is less may be rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,10 +158,15 @@ def tested(found: system.System, level: float, factor: float) -> AdjustmentTest:
 
     level: probability of calling any of them doubtful in a sound strip.
     factor: f, the variance factor of the image coordinates with which the system was built: f Q is the covariance of w.
+    Raises numpy.linalg.LinAlgError where rounding has left nothing of the solution: the redundancy number of an
+        observation, q times its variance, lies between 0 and 1.
     """
     wanted = found.conditions
     rows = np.flatnonzero(wanted.kind == CONTROL)
     correlates, cofactors = found.correlates[rows], cofactors_of(found, rows)
+    if not (np.abs(cofactors * wanted.noise[rows] / factor - 0.5) < 0.5 + CHECKED).all():
+        msg = "Singular matrix"  # as numpy says it where a pivot is 0, not nearly so
+        raise np.linalg.LinAlgError(msg)
     normalised, size = np.full((2, len(rows)), np.nan)
     checked = np.flatnonzero(cofactors * (wanted.noise[rows] + 1e-12) / factor > CHECKED)
     source = wanted.source[rows[checked]]
