@@ -13,6 +13,7 @@ from photostrip.batch.outcomes import BROKEN, FAULTY, WEAK, failure, out_of_memo
 from photostrip.batch.parcel import Parcel, unpack_grids
 from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.formats.text.files import LARGEST_FILE, from_disk
 from photostrip.formats.text.source import Source, digest, reading_from
 from photostrip.library.project import loaded_from
 from photostrip.notes import Document
@@ -64,7 +65,7 @@ def _inputs(project: Project, source: Source) -> dict[str, str | None]:
     inputs: dict[str, str | None] = dict(source.digests)
     for name in project.grids:
         grid = project.grid_folder / name
-        inputs[str(project.directory / name)] = digest(grid.read_bytes()) if grid.is_file() else None
+        inputs[str(project.directory / name)] = digest(from_disk(str(grid), LARGEST_FILE)) if grid.is_file() else None
     return inputs
 
 

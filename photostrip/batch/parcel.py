@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from photostrip.errors import InputError
-from photostrip.formats.text.files import read_bytes
+from photostrip.formats.text.files import LARGEST_FILE, from_disk, read_bytes
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.source import Source, reading_from
 from photostrip.formats.text.table_text import LARGEST_TABLE
@@ -42,7 +42,7 @@ def pack(path: Path, overrides: Sequence[str] = ()) -> Parcel:
     # grids elsewhere than below the project's folder must be on every machine
     below = (name for name in sorted(grids) if not Path(name).is_absolute() and ".." not in Path(name).parts)
     found = {name: path.parent / name for name in below if (path.parent / name).is_file()}
-    return Parcel(files, {name: grid.read_bytes() for name, grid in found.items()}, str(Path.cwd()))
+    return Parcel(files, {name: from_disk(str(grid), LARGEST_FILE) for name, grid in found.items()}, str(Path.cwd()))
 
 
 def unpack_grids(parcel: Parcel, folder: Path) -> None:

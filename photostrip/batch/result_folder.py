@@ -19,6 +19,7 @@ from photostrip.batch.selection import ChosenProject
 from photostrip.batch.tasks import Answer
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output.batch import SCHEMA, parsed_record, record_text
+from photostrip.formats.text.files import LARGEST_FILE, from_disk
 from photostrip.formats.text.source import digest
 from photostrip.formats.text.writing import write_files
 from photostrip.notes import Document
@@ -129,8 +130,8 @@ class ResultFolder:
     @staticmethod
     def _record(place: Path) -> Document | None:
         try:
-            return parsed_record((place / RECORD).read_bytes())
-        except OSError:
+            return parsed_record(from_disk(str(place / RECORD), LARGEST_FILE))
+        except InputError:
             return None
 
 
@@ -166,11 +167,9 @@ def _sweep(folder: Path) -> None:
 def _is(file: Path, content: str | None) -> bool:
     """Whether a file has the content with a digest; None: whether it is not there."""
     try:
-        return digest(file.read_bytes()) == content
-    except FileNotFoundError:
-        return content is None
-    except OSError:
-        return False
+        return digest(from_disk(str(file), LARGEST_FILE)) == content
+    except InputError as refusal:
+        return content is None and refusal.faults[0].code == "file-missing"
 
 
 def _back(name: str, folder: str) -> str:

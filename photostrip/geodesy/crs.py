@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _EARTH_RADIUS = 6378137.0  # m; a body whose radius is within half a percent of it is the Earth
 _BODY_TOLERANCE = 0.005
 _GRIDS = re.compile(r"(\b(?:geoid|nad)grids=)(\S+)")
+_GRID_FILES = re.compile(r'PARAMETERFILE\["[^"]*","([^"]*)"')  # as WKT has them, whatever the text of the CRS
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +166,18 @@ def parse_crs(spec: FrameSpec, directory: Path | None) -> CRS:
         message = f"PROJ does not know the coordinate reference system {spec.name!r} ({reason})"
         fix = "for a system of your own write `crs: local` (right-handed, metres)"
         raise Refusal(message, code="crs-unknown", expected=expected, fix=fix) from None
+    _require_files(parsed)
     return parsed
+
+
+def _require_files(crs: CRS) -> None:
+    """Refuse grids that are no files, before PROJ opens them: at a pipe it would wait forever."""
+    names = (name for names in _GRID_FILES.findall(crs.to_wkt()) for name in names.split(","))
+    for name in names:
+        place = Path(name.removeprefix("@"))
+        if place.exists() and not place.is_file():
+            what = "a folder" if place.is_dir() else "a device or a pipe"
+            raise Refusal(f"the grid {name} is {what}", code="file-kind", expected="a file")
 
 
 def _with_grids(text: str, directory: Path | None) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
+from photostrip.formats.text.files import LARGEST_FILE, from_disk
 from photostrip.formats.text.source import Source, current, digest
 from photostrip.formats.text.source import reading_from as accounted
 from photostrip.frozen import replace
@@ -90,7 +91,7 @@ class Project:
             document,
             frames=[*inputs.frames, inputs.output or inputs.frames[0]],
             inputs={loaded.seen(file): content for file, content in self._digests.items()},
-            grids={grid.name: digest(grid.read_bytes()) for grid in grids if grid.is_file()},
+            grids={grid.name: digest(from_disk(str(grid), LARGEST_FILE)) for grid in grids if grid.is_file()},
             settings={"set": list(self._assignments), "resolved_sha256": digest(loaded.resolved.encode())},
         )
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
+from contextlib import suppress
 from math import isclose
 from os.path import normpath
 from pathlib import Path
@@ -10,13 +11,16 @@ from typing import Any
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.output.result_json import read_result
-from photostrip.formats.text.source import digest
+from photostrip.formats.text.files import from_disk
+from photostrip.formats.text.source import Source, digest, reading_from, seen_from
 from photostrip.library.project import loaded_from
 from photostrip.notes import Document
+from photostrip.project.yaml.parsing import LARGEST_PROJECT
 from photostrip.result.statement.certificate import result_hash
 
 SCHEMA = 1
 SAME, DIFFERENT = "same", "different"
+CHANGED, MISSING, NOT_READ, NOT_NAMED = "changed", "missing", "not read", "not in the certificate"  # states of files
 PROJECT = "project.yaml"
 LEFT_OUT = {"version", "certificate"}  # what does not come from the project
 # Differences that another machine makes: of a number in a block that `compare` does not look at.
@@ -45,7 +49,7 @@ def verify(result: Path, project: Path | None = None) -> Document:
         "project": str(place),
         "name": document["name"],
         "edited": result_hash(document) != certificate["result_sha256"],
-        "inputs": list(_inputs(certificate, place)),
+        "inputs": [],
         "grids": [],
         "versions": [],
         "refused": "",
@@ -53,12 +57,14 @@ def verify(result: Path, project: Path | None = None) -> Document:
         "words": [],
         "result_sha256": {"certificate": certificate["result_sha256"], "now": None},
     }
-    try:
-        again = loaded_from(place, certificate["set"]).run(joint=False).document
-    except (InputError, GeometryError) as error:
-        found["refused"] = str(error)
-    else:
-        found |= _compared(document, again, file)
+    with reading_from(Source()) as account:
+        try:
+            again = loaded_from(place, certificate["set"]).run(joint=False).document
+        except (InputError, GeometryError) as error:
+            found["refused"] = str(error)
+        else:
+            found |= _compared(document, again, file, place.parent)
+    found["inputs"] = _states(certificate["inputs"], _read(account, place, certificate), place.parent)
     found["status"] = SAME if _same(found) else DIFFERENT
     return found
 
@@ -69,27 +75,38 @@ def _found(folder: Path, certificate: Document) -> Path | None:
     above = [Path(normpath(folder / up)) for up in ("..", "../..")]  # methods side by side have folders of their own
     for place in (folder, *above, Path()):
         for path in sorted(place.glob("*.yaml")):
-            content = path.read_bytes() if path.is_file() else b""
-            if "/" not in wanted.get(digest(content), "/") and path.name in wanted.values():
-                return path
+            with suppress(InputError):  # no project
+                content = digest(from_disk(str(path), LARGEST_PROJECT))
+                if "/" not in wanted.get(content, "/") and path.name in wanted.values():
+                    return path
     return None
 
 
-def _inputs(certificate: Document, project: Path) -> Iterator[Document]:
-    """Compare every file that was read with what stands there now; the project file may have another name."""
-    for each in certificate["inputs"]:
-        path = project.parent / each["file"]
-        yield {"file": each["file"], "state": _state(path, each["sha256"])}
+def _read(account: Source, project: Path, certificate: Document) -> dict[str, str]:
+    """Return the hash of every file that was read, as the certificate names it; the project may have another name."""
+    read = {seen_from(file, project.parent): content for file, content in account.digests.items()}
+    wanted = {each["file"]: each["sha256"] for each in certificate["inputs"]}
+    if project.name in read and project.name not in wanted:
+        content = read.pop(project.name)
+        read[next((name for name in wanted if wanted[name] == content and name not in read), project.name)] = content
+    return read
 
 
-def _state(path: Path, content: str) -> str:
-    try:
-        return SAME if digest(path.read_bytes()) == content else "changed"
-    except OSError:
-        return "missing"
+def _states(certificate: list[Document], now: Mapping[str, str], folder: Path) -> list[Document]:
+    """Compare the files that a certificate names with those that were read; being named there opens none."""
+    named = {each["file"]: each["sha256"] for each in certificate}
+    states = {name: _state(folder / name, content, now.get(name)) for name, content in named.items()}
+    states |= {name: NOT_NAMED for name in sorted(now) if name not in named}
+    return [{"file": name, "state": state} for name, state in states.items()]
 
 
-def _compared(document: Document, again: Document, file: str) -> Document:
+def _state(path: Path, content: str, now: str | None) -> str:
+    if now is None:
+        return NOT_READ if path.exists() else MISSING
+    return SAME if now == content else CHANGED
+
+
+def _compared(document: Document, again: Document, file: str, folder: Path) -> Document:
     """Return what is different between a result and the same made again."""
     from photostrip.comparison import compare_results
 
@@ -100,14 +117,10 @@ def _compared(document: Document, again: Document, file: str) -> Document:
         if before["versions"].get(name) != version
     ]
     grids = {each["file"]: each["sha256"] for each in now["grids"]}
-    changed = [
-        {"file": each["file"], "state": SAME if grids.get(each["file"]) == each["sha256"] else "changed"}
-        for each in before["grids"]
-    ]
     others = [key for key in again if key not in LEFT_OUT and _other(document.get(key), again[key])]
     return {
         "versions": versions,
-        "grids": changed,
+        "grids": _states(before["grids"], grids, folder),
         "numbers": compare_results(again, document, None, ("the result made again", file)),
         "words": [] if versions else others,
         "result_sha256": {"certificate": before["result_sha256"], "now": now["result_sha256"]},

@@ -222,6 +222,22 @@ def test_every_file_is_refused_in_the_same_words(
     assert line.startswith(f"error: {tmp_path}/project.yaml:")
 
 
+@pytest.mark.parametrize(("harm", "words"), [(folder, "is a folder"), (pipe, "is a device or a pipe")])
+def test_a_grid_that_is_no_file_is_refused_in_the_same_words(
+    tmp_path: Path, harm: Callable[[Path], None], words: str
+) -> None:
+    """PROJ, which reads grids by itself, would wait at a pipe for ever."""
+    project, grid = sample(tmp_path), tmp_path / "grid.gsb"
+    grid.touch()
+    harm(grid)
+    project.change("project.yaml", "crs: EPSG:32633", f'crs: "+proj=utm +zone=33 +ellps=bessel +nadgrids={grid}"')
+    project.change("project.yaml", "output:", "output:\n  crs: EPSG:4326")
+    command = [sys.executable, "-m", "photostrip", "check", str(tmp_path / "project.yaml")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 2
+    assert f"the grid {grid} {words}; expected a file" in done.stdout
+
+
 @pytest.mark.parametrize(("command", "options"), [("simulate", ["-o", "out"]), ("report", []), ("run", [])])
 @pytest.mark.parametrize(("harm", "kind", "words"), HARMS)
 def test_every_command_refuses_its_file_in_the_same_words(

@@ -12,6 +12,7 @@ import pytest
 
 import photostrip
 from photostrip.cli.main import main
+from photostrip.formats.text.source import digest
 from photostrip.library import verification
 from photostrip.library.verification import verify
 from photostrip.result.statement.certificate import result_hash
@@ -118,6 +119,28 @@ def test_a_file_that_has_changed_is_named(copied: Path, capsys: pytest.CaptureFi
     assert main(["verify", str(copied / "result"), "--quiet"]) == 1
     printed = " ".join(capsys.readouterr().out.split())
     assert "missing: control.csv; the project cannot be adjusted any more" in printed
+
+
+@pytest.mark.slow
+def test_a_certificate_must_name_the_files_that_are_read_and_no_others(
+    copied: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a certificate names is not opened for that: a device would be read without end."""
+    project, found = str(copied / "project.yaml"), document(copied)
+    inputs = found["certificate"]["inputs"]
+    found["certificate"]["inputs"] = [*inputs, {"file": "/dev/null", "sha256": digest(b"")}]
+    assert main(["verify", str(edited(copied, found)), "--project", project, "--quiet"]) == 1
+    assert "DIFFERENT: not read: /dev/null." in capsys.readouterr().out
+    found["certificate"]["inputs"] = []
+    assert main(["verify", str(edited(copied, found)), "--project", project, "--quiet"]) == 1
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "not in the certificate: control.csv, observations.csv, project.yaml." in printed
+
+
+@pytest.mark.slow
+def test_the_project_may_have_another_name(copied: Path) -> None:
+    project = (copied / "project.yaml").rename(copied / "renamed.yaml")
+    assert verify(copied / "result", project)["status"] == "same"
 
 
 @pytest.mark.slow

@@ -64,6 +64,7 @@ def compare(
 
 
 def _print(found: dict[str, Any], form: CompareFormat, width: int | None, *, quiet: bool, verbose: bool) -> None:
+    from photostrip.formats.output.result_json import text_of
     from photostrip.formats.output.result_lines import line_finder
     from photostrip.report.commands.compare_findings import compare_cases, compare_findings
     from photostrip.report.commands.comparisons import comparison_report
@@ -78,9 +79,7 @@ def _print(found: dict[str, Any], form: CompareFormat, width: int | None, *, qui
                 to_junit(f"photostrip compare {found.get('name') or found['result']}", compare_cases(found))
             )
         case CompareFormat.GITHUB:
-            sys.stdout.write(
-                annotated(compare_findings(found, lambda file: line_finder(Path(file).read_text(encoding="utf-8"))))
-            )
+            sys.stdout.write(annotated(compare_findings(found, lambda file: line_finder(text_of(file)))))
         case CompareFormat.TEXT | CompareFormat.MD:
             title, sections = comparison_report(found, quiet=quiet, everything=verbose)
             print_sections(title, sections, width, markdown=form is CompareFormat.MD)

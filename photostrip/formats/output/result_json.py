@@ -111,11 +111,15 @@ def _on_one_line(value: Plain, encode: Encoder) -> Iterator[str]:
         yield encode.value(value)
 
 
+def text_of(file: str) -> str:
+    """Read the text of a file of JSON."""
+    return decode(file, read_bytes(file, LARGEST_RESULT))[0]
+
+
 def parsed(file: str, block: Callable[[Document], Document] | None = None) -> Any:  # noqa: ANN401 (any JSON)
     """Read a file of JSON, or raise what keeps it from being one; `block` makes its blocks from dictionaries."""
-    text, _ = decode(file, read_bytes(file, LARGEST_RESULT))
     try:
-        return json.loads(text, object_hook=block)
+        return json.loads(text_of(file), object_hook=block)
     except json.JSONDecodeError as error:
         message = f"is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
         fix = "a result.json that was not written to its end? run the project again"

@@ -1,7 +1,8 @@
 """Bytes and text of a file: everything that can go wrong before its first line is read, in one form.
 
-Every file of a project is read through ``read_bytes``, so that a missing table, a missing project and a missing
-preset are reported in the same words.
+Every file that the user or a document names is read through ``read_bytes``, or through ``from_disk`` where it counts as
+no input: a missing table, a missing project and a missing preset are reported in the same words, and nothing waits for
+a pipe, reads a device or fills the memory.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.source import current, digest
 
 MEGABYTE = 1_000_000
+LARGEST_FILE = 1000 * MEGABYTE  # of files that are compared or handed on only; a world of geoid heights has 930 MB
 BOM = b"\xef\xbb\xbf"
 BYTE_ORDER_MARK = "begins with a byte order mark; it was skipped"
 GZIP = b"\x1f\x8b"
@@ -41,7 +43,7 @@ def read_bytes(file: str, limit: int) -> bytes:
     if source is not None and source.given is not None:
         data = _travelled(file, source.given, limit)
     else:
-        data = _from_disk(file, limit)
+        data = from_disk(file, limit)
     if source is not None:
         source.digests[file] = digest(data)
     return data
@@ -64,7 +66,8 @@ def _fits(file: str, size: int, limit: int) -> None:
         refuse(file, "file-size", message, expected=f"at most {limit / MEGABYTE:.0f} MB; is it the right file?")
 
 
-def _from_disk(file: str, limit: int) -> bytes:
+def from_disk(file: str, limit: int) -> bytes:
+    """Read a file that a document names, and take no account of it; raises what ``read_bytes`` does."""
     try:
         # without O_NONBLOCK a pipe that nobody writes to would wait forever, before it can be seen to be one
         handle = os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))

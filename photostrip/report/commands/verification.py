@@ -40,7 +40,7 @@ def verification_headline(document: Document) -> str:
 
 def _differences(document: Document) -> list[str]:
     found = ["the numbers of the result are not those of its certificate: it was edited"] if document["edited"] else []
-    for state in ("changed", "missing"):
+    for state in ("changed", "missing", "not read", "not in the certificate"):
         names = [each["file"] for each in (*document["inputs"], *document["grids"]) if each["state"] == state]
         found += [f"{state}: {listed(names)}"] if names else []
     if document["refused"]:

@@ -14,6 +14,7 @@ import pytest
 from photostrip.cli.jobs import batch as batch_job
 from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
+from photostrip.formats.text.source import digest
 from tests.batch.projects import PHOTOS, Alone, run, tree, write_projects
 
 if TYPE_CHECKING:
@@ -190,6 +191,23 @@ def test_a_result_that_is_not_as_it_was_written_is_computed_again(
     assert main(batch) == 0
     assert computed(capsys.readouterr().err) == {"s2"}
     assert tree(here / "out") == before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("named", ["inputs", "outputs"])
+def test_a_record_that_names_a_device_is_not_trusted(
+    here: Path, capsys: pytest.CaptureFixture[str], named: str
+) -> None:
+    """Most devices would be read without end."""
+    batch = ["batch", "strips", "-o", "out"]
+    assert main(batch) == 0
+    record = here / "out" / "s2" / "batch.json"
+    content = json.loads(record.read_text(encoding="utf-8"))
+    content[named]["/dev/null"] = digest(b"")
+    record.write_text(json.dumps(content), encoding="utf-8")
+    capsys.readouterr()
+    assert main(batch) == 0
+    assert computed(capsys.readouterr().err) == {"s2"}
 
 
 @pytest.mark.slow
