@@ -25,12 +25,12 @@ def refuse(read: Measurements, target: str, findings: Findings) -> None:
     order = np.argsort(key, kind="stable")
     again = np.flatnonzero(key[order][1:] == key[order][:-1]) + 1
     first: dict[int, int] = {}
-    for place in again:
+    for told, place in enumerate(again):
+        if findings.full(read.table.file):
+            findings.count(read.table.file, len(again) - told)
+            return
         row = int(order[place])
         number = first.setdefault(int(key[row]), int(order[place - 1]))
-        if findings.full(read.table.file):
-            findings.count(read.table.file, 1)
-            continue
         name, photo = read.target_ids[read.target[row]], read.photo_ids[read.photo[row]]
         message = f"{target} {name} is already measured on photo {photo}, in line {read.table.lines[number]}"
         fix = "keep one of the two, give one another id, or set `repeated: average`"

@@ -13,6 +13,8 @@ from photostrip.formats.text.files import BOM, GZIP, MEGABYTE, decode, read_byte
 from photostrip.formats.text.rows import PlainRows, plain_rows
 
 LARGEST_TABLE = 200 * MEGABYTE  # unpacked; a million points are 50 MB
+MOST_LINES = 5_000_000  # of a table; a row takes 0.2 to 0.4 kB once it is read, however few bytes it has
+LONGEST_LINE = 20_000  # bytes; each of its fields takes 60 bytes and more
 BLOCK_BYTES = 4 * MEGABYTE
 BLOCK = MEGABYTE // 5  # bytes of rows that are taken at a time; what comes of them stays in the cache
 LINE_END = re.compile(rb"\r\n|\r|\n")
@@ -86,6 +88,7 @@ def content(file: str) -> tuple[bytes, bool]:
         what = "is compressed (gzip), but its name does not say so" if not packed else "is not compressed (gzip)"
         refuse(file, "gzip", what, fix="name it .csv.gz" if not packed else "name it .csv")
     data = _unpack(file, data) if packed else data
+    _countable(file, data)
     _, marked = decode(file, data)
     return data[len(BOM) :] if marked else data, marked
 
@@ -107,3 +110,20 @@ def _unpack(file: str, data: bytes) -> bytes:
     if not unpacked:
         refuse(file, "file-empty", "is empty")
     return unpacked
+
+
+def _countable(file: str, data: bytes) -> None:
+    """Refuse rows and lines that would fill the memory once they are numbers and texts."""
+    lines = max(data.count(b"\n"), data.count(b"\r"))
+    if lines > MOST_LINES:
+        expected = f"at most {MOST_LINES}, whose rows take 1 to 2 GB of memory"
+        fix = "is it the right file? keep the points that join the photos best, or cut the project into strips"
+        refuse(file, "file-size", f"has {lines} lines", expected=expected, fix=fix)
+    start = 0
+    while len(data) - start > LONGEST_LINE:
+        end = max(data.rfind(sign, start, start + LONGEST_LINE) for sign in (b"\n", b"\r"))
+        if end < 0:
+            line = data.count(b"\n", 0, start) + 1
+            message = f"has a line of more than {LONGEST_LINE // 1000} kB, line {line}"
+            refuse(file, "file-size", message, expected="a table with commas between a few fields, each row on a line")
+        start = end + 1

@@ -176,6 +176,29 @@ def test_a_compressed_table_that_unpacks_without_end_is_refused(
     assert "unpacks to more than" in faults(write(tmp_path / "o.csv.gz", bomb))[0]
 
 
+@pytest.mark.parametrize(
+    ("part", "count", "words"),
+    [
+        (b"1,1,1,1\n", 6_000_000, "has 6000001 lines; expected at most 5000000"),
+        (b"1,", 20_000_000, "has a line of more than 20 kB, line 2"),
+    ],
+)
+def test_a_small_packed_table_does_not_fill_the_memory(tmp_path: Path, part: bytes, count: int, words: str) -> None:
+    """However well rows and fields pack, they are counted before they are made."""
+    packer = zlib.compressobj(wbits=31)
+    some = part * (count // 100)
+    pieces = [packer.compress(each) for each in (HEADER.encode(), *[some] * 100)]
+    path = write(tmp_path / "o.csv.gz", b"".join(pieces) + packer.flush())
+    assert path.stat().st_size < 100_000
+    tracemalloc.start()
+    told = faults(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(told) == 1
+    assert words in told[0]
+    assert peak < 3 * len(part) * count
+
+
 def test_what_reads_on_after_a_fault(tmp_path: Path) -> None:
     text = HEADER + "1,P\n,Q,1,2\n1,R,a,b\n1,S,1,2,3\n1,T,1,2\n1,T,3,4\n"
     assert [fault.partition(" ")[0] for fault in faults(write(tmp_path / "o.csv", text))] == [
