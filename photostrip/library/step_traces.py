@@ -21,11 +21,13 @@ from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 from photostrip.triangulation.resection.closed_form import OrientedPhoto, approximate
 from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 from photostrip.triangulation.resection.resection import resect
+from photostrip.triangulation.strip_formation.intersection import lies_across
 from photostrip.units import MICROMETRES
 
 Trace = list[Document]
 
 _COLLINEAR = "(u, v, w) = R' (X - X0); x' = -f u/w, y' = -f v/w; v = x - x'"
+_EXCHANGED = str.maketrans("XxYy", "YyXx")  # where the base lies along Y
 _TURNED = "(u, v, w) = R (x, y, -f); xh = -f u/w, yh = -f v/w; eq. 137"
 
 
@@ -79,12 +81,13 @@ def intersection(
     ids: Sequence[str], images: tuple[Floats, Floats], focal: float, base: Floats, rotations: tuple[Floats, Floats]
 ) -> Trace:
     """Show each point from the image to the model."""
-    words = (
-        _TURNED,
+    words = [
         f"N = (BX + x2h BZ/f) / (x1h - x2h), N2 = N + BZ/f, B = {', '.join(f'{each:g}' for each in base)}; eq. 138",
         "X = N x1h, Y1 = N y1h, Y2 = BY + N2 y2h, Z = -N f",
-    )
-    found = _table("Points", ids, _rays(*images, focal, base, rotations), *words)
+    ]
+    if lies_across(base):
+        words = [each.translate(_EXCHANGED) for each in words]
+    found = _table("Points", ids, _rays(*images, focal, base, rotations), _TURNED, *words)
     return [_matrices("Rotations, by rows", ("left", "right"), np.stack(rotations)), found]
 
 
@@ -186,18 +189,21 @@ def polynomial(
 
 
 def _rays(left: Floats, right: Floats, focal: float, base: Floats, rotations: tuple[Floats, Floats]) -> list[Column]:
-    """Return images turned into the frame of the base, ray factors and heights of both rays."""
+    """Return images turned into the frame of the base, ray factors and the coordinate of both rays across the base."""
+    along, across = (1, 0) if lies_across(base) else (0, 1)
     turned = []
     for xy, rotation in zip((left, right), rotations, strict=True):
         u, v, w = rotation @ np.vstack([xy.T, np.full(len(xy), -focal)])
-        turned += [-focal * u / w, -focal * v / w]
-    x1, y1, x2, y2 = turned
+        turned.append(np.stack([-focal * u / w, -focal * v / w]))
+    one, two = turned
     with np.errstate(divide="ignore", invalid="ignore"):
-        factor = (base[0] + x2 * base[2] / focal) / (x1 - x2)
+        factor = (base[along] + two[along] * base[2] / focal) / (one[along] - two[along])
     other = factor + base[2] / focal  # the same where the base is level
-    rows = columns("x1h y1h x2h y2h", "mm", 4, np.column_stack(turned))
+    rows = columns("x1h y1h x2h y2h", "mm", 4, np.vstack(turned).T)
     rows += [("N", "", 6, factor), *([("N2", "", 6, other)] if base[2] else [])]
-    return [*rows, ("Y1", "", 4, factor * y1), ("Y2", "", 4, base[1] + other * y2)]
+    name = "XY"[across]
+    rows += [(f"{name}1", "", 4, factor * one[across]), (f"{name}2", "", 4, base[across] + other * two[across])]
+    return rows
 
 
 def _images(xy: Floats, arms: Floats, rotations: Floats, focal: float, unit: str) -> list[Column]:

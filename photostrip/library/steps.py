@@ -167,10 +167,11 @@ def intersection(
 ) -> Intersection:
     """Intersect the rays of two photos whose orientation is known.
 
-    base: (3,), from the left to the right perspective centre; its X is the longest.
+    base: (3,), from the left to the right perspective centre.
     rotations: (3, 3) each, photo to the frame of the base.
     left_ray: Y of the left ray, as the textbook has it, instead of the mean of both.
-    Returns coordinates relative to the left perspective centre, and the gap in Y between the rays.
+    Returns coordinates relative to the left perspective centre, and the gap in Y between the rays. Where the base is
+    nearer to Y than to X, these two are exchanged in all this.
 
     Source: [001] eq. 137, 138.
     """

@@ -471,6 +471,14 @@ def test_a_trace_leads_to_what_the_step_found(truth: Truth, tmp_path: Path, caps
     met = steps.intersection(left, right, F, base=[900, 10, -20], rotations=(np.eye(3), turned))
     np.testing.assert_allclose(tables["Points"]["Y1"] - tables["Points"]["Y2"], met.gap, atol=1e-9)
 
+    across = table(tmp_path / "across.csv", "point x_left y_left x_right y_right", ids, left[:, ::-1], right[:, ::-1])
+    tables = traced(capsys, "intersection", across, "-f", "153", "--base=10,900,-20")
+    met = steps.intersection(
+        left[:, ::-1], right[:, ::-1], F, base=[10, 900, -20], rotations=(np.eye(3), np.eye(3)), left_ray=True
+    )
+    np.testing.assert_allclose(tables["Points"]["X1"] - tables["Points"]["X2"], met.gap, atol=1e-9)
+    np.testing.assert_allclose(tables["Points"]["N"] * tables["Points"]["y1h"], met.xyz[:, 1])
+
     photo = table(tmp_path / "photo.csv", "point x y x_ground y_ground z_ground", ids, left, truth.xyz(ids))
     tables = traced(capsys, "resection", photo, "-f", "153")
     oriented = steps.resection(left, truth.xyz(ids), F)

@@ -41,7 +41,7 @@ def differentiate_pairs(
     """Differentiate all pairs of a strip.
 
     ``rotations`` (p, 3, 3) bring the left photo of each pair to the frame of the ground, ``scale`` (p,) is the length
-    of each base in metres; ``across`` (p, 3), for points on left rays, is the strip's Y in the frames of left photos.
+    of each base in metres; ``across`` (p, 3), for points on left rays, is as in ``FormedStrip``.
     Rows whose rays do not meet hold numbers without meaning; they take part in nothing.
     """
     pairs = orientation.pairs

@@ -93,7 +93,7 @@ def differentiate_strip(
     sigma: (k, 2), standard deviations of all image points in the observations, mm.
     """
     rotations = similarity.rotation @ formed.rotations
-    across = formed.rotations[:-1, 1] if formed.left_ray else None
+    across = formed.across if formed.left_ray else None
     scale = similarity.scale * formed.scale
     centers = similarity(formed.centers)
     origin = centers.mean(axis=0)

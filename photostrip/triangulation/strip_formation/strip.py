@@ -18,7 +18,7 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.orientation import Orientation
-from photostrip.triangulation.strip_formation.intersection import Intersection, intersect
+from photostrip.triangulation.strip_formation.intersection import Intersection, intersect, lies_across
 from photostrip.triangulation.strip_formation.scale_transfer import (
     LEFT_RAY,
     Junctions,
@@ -44,7 +44,8 @@ class StereoModels(NamedTuple):
 
     vectors: Floats  # (m, 3): from the left perspective centre, base length 1; NaN where rays do not meet in front
     gap: Floats  # (m,): Y gap of the two rays at photo scale, mm
-    left_ray: bool = False  # whether points lie on the left ray, where the right one meets it seen along the strip's Y
+    # whether points lie on the left ray, where the right one meets it seen along the strip's axis across the base
+    left_ray: bool = False
 
     @property
     def sound(self) -> Flags:
@@ -84,6 +85,12 @@ class FormedStrip:
     def scale_factor(self) -> Floats:
         """Scale factor k of each model, which has a base as long as the first one; shape (n-1,)."""
         return np.asarray(self.scale / self.scale[0], float)
+
+    @property
+    def across(self) -> Floats:
+        """Axis of the strip, Y or else X, that lies across each base, in the frame of its left photo; (n-1, 3)."""
+        axis = np.where(lies_across(np.diff(self.centers, axis=0).T), 0, 1)
+        return self.rotations[np.arange(len(axis)), axis]
 
     @property
     def ends(self) -> Floats:
@@ -154,8 +161,8 @@ def model_points(
 def intersect_models(orientation: Orientation, first: FirstPhoto, *, left_ray: bool) -> tuple[Intersection, Floats]:
     """Intersect the rays of all pairs, base length 1; return the rotations of the left photos to the frames, too.
 
-    For the mean of both rays these are the base frames: there the x parallax is the whole parallax at any kappa; along
-    the strip's X it may vanish. For the left ray it is the frame of the strip, as in [001].
+    For the mean of both rays these are the base frames: there the x parallax is the whole parallax at any kappa; for
+    the left ray it is the frame of the strip, as in [001], along whose nearer axis at least 0.7 of it is left.
     """
     pairs = orientation.pairs
     if not left_ray:

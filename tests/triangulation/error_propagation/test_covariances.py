@@ -41,21 +41,23 @@ def settings(adjustment: str, transfer: str = "least_squares", intersection: str
 
 
 CASES = [
-    ("similarity", 60.0, "least_squares", "mean", None),
-    ("similarity", 80.0, "distances", "mean", None),
-    ("similarity", 62.0, "distances", "left", None),
-    ("3", 62.0, "least_squares", "mean", None),
-    ("2", 70.0, "least_squares", "mean", MIXED),
+    ("similarity", 60.0, 0.0, "least_squares", "mean", None),
+    ("similarity", 80.0, 0.0, "distances", "mean", None),
+    ("similarity", 62.0, 0.0, "distances", "left", None),
+    ("similarity", 62.0, 95.7, "distances", "left", None),
+    ("3", 62.0, 0.0, "least_squares", "mean", None),
+    ("2", 70.0, 0.0, "least_squares", "mean", MIXED),
 ]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("adjustment", "lap", "transfer", "intersection", "use"), CASES)
+@pytest.mark.parametrize(("adjustment", "lap", "kappa", "transfer", "intersection", "use"), CASES)
 def test_derivatives_are_those_of_the_whole_run(
-    adjustment: str, lap: float, transfer: str, intersection: str, use: dict[str, float] | None
+    adjustment: str, lap: float, kappa: float, transfer: str, intersection: str, use: dict[str, float] | None
 ) -> None:
     """Relative orientation, chain, scale transfer, intersection, means, similarity, polynomials, resection at once."""
-    inputs = without_noise(spec(8, lap, use=use))
+    wanted_strip = spec(8, lap, use=use)
+    inputs = without_noise(replace(wanted_strip, flight=replace(wanted_strip.flight, photo_rotation_deg=kappa)))
     wanted = settings(adjustment, transfer, intersection)
     result = triangulate(inputs, wanted)
     found = errors_of(result)

@@ -121,6 +121,19 @@ def test_every_ray_may_have_its_own_base() -> None:
     assert np.allclose(found.xyz, points * factors[:, None], rtol=1e-11, atol=0)
 
 
+@pytest.mark.parametrize("left_ray", [True, False])
+def test_a_base_along_y_meets_as_one_along_x(left_ray: bool) -> None:
+    """Frame and photos turned by a quarter: the point turns with them, and the gap changes its sign."""
+    _, base, left, right = scene(4)
+    left = left + np.random.default_rng(4).normal(0, 0.05, left.shape)
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    one = intersect(base, left, right, FOCAL, left_ray=left_ray)
+    two = intersect(quarter @ base, quarter @ left, quarter @ right, FOCAL, left_ray=left_ray)
+    assert np.allclose(two.xyz, one.xyz @ quarter.T, rtol=0, atol=1e-11 * 100)
+    assert np.allclose(two.gap, -one.gap, rtol=0, atol=1e-11 * 100)
+    assert np.abs(one.gap).max() > 0.01
+
+
 def test_rays_that_do_not_meet_are_marked() -> None:
     left = np.array([[30.0, 0, -100], [30, 0, -100], [-30, 0, -100], [30, 0, 100], [30, 0, -100], [30, 0, -100]]).T
     right = np.array(
