@@ -134,8 +134,7 @@ def _counts(document: Document, role: str) -> list[int]:
 
 
 def _whole(document: Document, role: str) -> Document:
-    found: Document = document.get(role, {}) if role == "cross_validation" else document["summary"][role]
-    return found
+    return dict(document.get(role, {}) if role == "cross_validation" else document["summary"][role])
 
 
 def _given(document: Document, role: str, *keys: str) -> Iterator[tuple[Any, ...]]:
@@ -150,8 +149,7 @@ def headline_rms(document: Document, role: str, part: str) -> Document:
     """Return count and rms of the differences in plan or height without those that stand out, metres and µm."""
     out = set(_standing_out(document, role, part))
     if not out:
-        whole: Document = _whole(document, role)[part]
-        return whole
+        return dict(_whole(document, role)[part])
     axes, points = set("xy" if part == "plan" else "z"), _given(document, role, "id", "rejected", part, f"{part}_um")
     kept = [
         sizes
@@ -235,9 +233,10 @@ def _contradiction(who: str, document: Document, found: Document, ratio: str, ch
         for name in PARTS
         if (part := found[name])["count"]
     ]
+    likely = f"{100 * chance:.1f} %" if chance >= SMALLEST_PROBABILITY else f"below {100 * SMALLEST_PROBABILITY:g} %"
     return (
         f"{who} are farther off than expected from the standard deviations of the points: {'; '.join(said)}; "
-        f"probability {_percent(chance)} by chance{_known_cause(document)}"
+        f"probability {likely} by chance{_known_cause(document)}"
     )
 
 
@@ -256,21 +255,21 @@ def _known_cause(document: Document) -> str:
     return "; the Earth's curvature is left out: try `earth_curvature: model`" if left_out else ""
 
 
-def _percent(chance: float) -> str:
-    return f"{100 * chance:.1f} %" if chance >= SMALLEST_PROBABILITY else f"below {100 * SMALLEST_PROBABILITY:g} %"
-
-
 def _stated(document: Document) -> float:
     """Return the stated standard deviation of an image or model coordinate, micrometres."""
     return max(float(document["summary"]["sigma_given_um"]), LEAST_STATED)
 
 
+def _worse_than(given: float, found: float | None, redundancy: int) -> bool:
+    """Whether a standard deviation is larger than given, by much and by more than chance."""
+    ratio = (found or 0.0) / given
+    return ratio > SIGMA0_RATIO and ratio**2 > chi2_quantile(1 - TEST_LEVEL, redundancy) / redundancy
+
+
 def _sigma0(document: Document) -> Iterator[str]:
     summary = document["summary"]
     found, given = summary["sigma0_um"], _stated(document)
-    if found is None or found <= SIGMA0_RATIO * given:
-        return
-    if (found / given) ** 2 > chi2_quantile(1 - TEST_LEVEL, summary["redundancy"]) / summary["redundancy"]:
+    if _worse_than(given, found, summary["redundancy"]):
         kind = "model" if summary.get("model_scale") else "image"
         yield (
             f"the {kind} coordinates are {found / given:.1f} times worse than stated: sigma0 {found:.1f} µm, "
@@ -337,8 +336,12 @@ def _more(number: int, one: str, kind: str = "") -> Iterator[str]:
 
 
 def _photos(document: Document) -> Iterator[str]:
-    """Name photos of large residuals, then those of which much was rejected, as by a shift of all their points."""
-    whole = document["summary"]["image_rms_um"]
+    """Weigh all image residuals; name photos of large ones, then those that lost much, as by a shift of all points."""
+    whole, given, used = document["summary"]["image_rms_um"], _stated(document), document["counts"]["image_points_used"]
+    # of fewer redundant coordinates than there are, so that chance makes them smaller than this
+    if not any(_sigma0(document)) and _worse_than(given, whole, 2 * used):
+        ratio, text = whole / given, f"rms {whole:.1f} µm, stated {given:.1f} µm"
+        yield f"the image residuals under the final orientation are {ratio:.1f} times as large as stated: {text}"
     rejected = {(row["photo"], row["point"]) for row in document["rejected"] if not row.get("readmitted")}
     lost, poor, losing = Counter(photo for photo, _ in rejected), [], []
     columns = (column_of(document["photos"], key) for key in ("id", "image_rms_um", "points"))

@@ -286,6 +286,18 @@ def test_a_pair_is_compared_with_the_other_pairs_and_with_what_is_stated() -> No
     assert text.startswith("the image coordinates are 4.0 times worse than stated")
 
 
+@pytest.mark.parametrize(("rms_um", "status"), [(5.0, GOOD), (57.3, LOOK)])
+def test_image_residuals_are_weighed_against_what_is_stated(rms_um: float, status: str) -> None:
+    """The pairs may be at peace where the points of the strip are metres off."""
+    document = case("projected", 2).document
+    verdict = verdict_of({**document, "summary": {**document["summary"], "image_rms_um": rms_um}})
+    assert verdict["status"] == status
+    text = (
+        "the image residuals under the final orientation are 11.5 times as large as stated: rms 57.3 µm, stated 5.0 µm"
+    )
+    assert verdict["look_at"] == ([text] if status == LOOK else [])
+
+
 @pytest.mark.parametrize(("status", "code", "strict"), [(GOOD, 0, 0), (UNVERIFIED, 0, 1), (LOOK, 0, 1), (FAILED, 1, 1)])
 def test_exit_codes(status: str, code: int, strict: int) -> None:
     assert exit_code(status, strict=False) == code
