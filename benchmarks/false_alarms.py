@@ -381,9 +381,7 @@ def two_lists(seed: int) -> Sound:
             ),
         )
 
-    sound = sound_of(made(rng, seed, draw), str(rng.choice(METHODS)))
-    # the Gauss-Kruger zones are not made for Bulgaria, where they are used
-    return replace(sound, allowed=frozenset({"P402"} if crs == "EPSG:28404" else ()))
+    return sound_of(made(rng, seed, draw), str(rng.choice(METHODS)))
 
 
 def given_orientations(seed: int) -> Sound:

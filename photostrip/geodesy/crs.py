@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from photostrip.errors import PhotostripError
-from photostrip.frozen import dataclass
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geodesy.curvature import Ellipsoid
 from photostrip.geodesy.frame_spec import FrameSpec, Kind, Refusal
 from photostrip.geodesy.ground_frame import WGS84
@@ -19,7 +19,9 @@ from photostrip.geodesy.proj_operation import load_pyproj
 
 if TYPE_CHECKING:
     from pyproj import CRS
+    from pyproj._crs import AreaOfUse
 
+Area = tuple[float, float, float, float]
 _EARTH_RADIUS = 6378137.0  # m; a body whose radius is within half a percent of it is the Earth
 _BODY_TOLERANCE = 0.005
 _GRIDS = re.compile(r"(\b(?:geoid|nad)grids=)(\S+)")
@@ -244,15 +246,23 @@ def _check_directions(spec: FrameSpec, core: CRS, kind: Kind) -> None:
         raise Refusal(message, code="crs-axes", expected=expected, fix=fix)
 
 
-def area_of_use(spec: FrameSpec, *, directory: Path | None = None) -> tuple[float, float, float, float] | None:
-    """Area that a CRS is made for: west, south, east, north in degrees.
+class AreasOfUse(NamedTuple):
+    """Areas that a CRS is made for: west, south, east, north in degrees, west larger than east across 180 degrees."""
 
-    West is larger than east across the meridian of 180 degrees. None where nobody has said it: for `local`,
-    `geocentric` and PROJ strings.
-    """
-    if spec.crs in {"local", "geocentric"}:
-        return None
-    area = parse_crs(spec, directory).area_of_use
+    crs: Area | None  # ends where another datum is official
+    projection: Area | None  # of its map projection, whatever the datum: a zone from pole to pole, or the same
+
+
+def areas_of_use(spec: FrameSpec, *, directory: Path | None = None) -> AreasOfUse:
+    """Areas that a CRS and its projection are made for; None where nobody has said it, as for PROJ strings."""
+    parts = read_crs(spec, directory)
+    if parts.whole is None or parts.core is None:
+        return AreasOfUse(None, None)
+    operation = parts.core.coordinate_operation
+    return AreasOfUse(_bounds(parts.whole.area_of_use), None if operation is None else _bounds(operation.area_of_use))
+
+
+def _bounds(area: AreaOfUse | None) -> Area | None:
     return None if area is None else (float(area.west), float(area.south), float(area.east), float(area.north))
 
 

@@ -9,7 +9,7 @@ from typing import Self
 
 from photostrip.arrays import Numbers
 from photostrip.frozen import dataclass, replace
-from photostrip.geodesy.crs import area_of_use
+from photostrip.geodesy.crs import areas_of_use
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Inputs, Strip
@@ -43,7 +43,7 @@ class GivenControl:
         places = [
             wrong_place.find_wrong_place(
                 frame,
-                area_of_use(inputs.frames[number], directory=directory),
+                areas_of_use(inputs.frames[number], directory=directory),
                 control.enu[(control.frame == number) & control.use[:, 0]],
                 number,
             )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+import photostrip
 from benchmarks import plausibility
 from photostrip.camera import Distortion
 from photostrip.cli.main import main
@@ -41,6 +42,7 @@ from photostrip.triangulation.plausibility import KINDS
 from photostrip.triangulation.plausibility.control.straightening import StripPoints
 from photostrip.triangulation.plausibility.photos import flight_order
 from tests.pipeline.blocks import positions
+from tests.results import write_project
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
@@ -185,11 +187,44 @@ def test_projected_control_in_feet(foot: float) -> None:
     assert "US survey feet" in finding.fix
 
 
-def test_control_of_another_country() -> None:
+@pytest.mark.parametrize(("crs", "severity"), [("EPSG:27700", "error"), ("EPSG:3067", "warning")])
+def test_control_of_another_country(crs: str, severity: str) -> None:
+    """In the one it lies nowhere on the Earth; in the other beside Finland, and an area proves nothing by itself."""
     inputs = inputs_of(simulation("utm"))
-    (finding,) = told(replace(inputs, frames=(replace(inputs.frames[0], crs="EPSG:27700"),)))
-    assert finding.code == "P402"
+    (finding,) = told(replace(inputs, frames=(replace(inputs.frames[0], crs=crs),)))
+    assert (finding.code, finding.severity) == ("P402", severity)
     assert finding.key == "control[0].crs"
+
+
+def in_bulgaria(folder: Path, second: str | None = None) -> Path:
+    """Write a strip over the border of two zones of 1942, for whose datum EPSG names countries farther north."""
+    spec = Spec(
+        seed=3,
+        ground=Ground("EPSG:28404", center_deg=(24.0, 42.5)),
+        flight=Flight(photos=8, heading_deg=90.0),
+        control=Control(every=2, check=6, second_crs=second, boundary_longitude_deg=24.0 if second else None),
+    )
+    return write_project(folder, spec)
+
+
+def test_zones_are_used_beyond_the_countries_for_which_they_were_registered(tmp_path: Path) -> None:
+    project = in_bulgaria(tmp_path, "EPSG:28405")
+    check, result = photostrip.check(project), photostrip.run(project)
+    assert check.ok
+    assert check.findings == ()
+    assert (result.status, result.document["findings"]) == ("good", [])
+
+
+def test_a_strip_given_in_the_next_zone_is_named(tmp_path: Path) -> None:
+    project = in_bulgaria(tmp_path)
+    text = project.read_text(encoding="utf-8").replace("EPSG:28404", "EPSG:28405")
+    project.write_text(text, encoding="utf-8")
+    (finding,) = photostrip.check(project).findings
+    assert (finding.code, finding.key) == ("P402", "control[0].crs")
+    assert finding.fix == "name the crs of zone 4, with which its eastings begin"
+    result = photostrip.run(project)
+    assert result.status == "look"
+    assert result.document["verdict"]["look_at"][0].startswith("P402 control[0] lies about 17.9 E")
 
 
 @pytest.mark.parametrize(("of_images", "of_distance"), [(10.0, 1.0), (1.0, 0.1)])

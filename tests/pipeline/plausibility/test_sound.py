@@ -146,19 +146,6 @@ def test_a_bundle_says_whose_given_points_need_a_closer_look(role: str, monkeypa
 
 
 @pytest.mark.slow
-def test_one_control_list_outside_its_area_is_told_alone() -> None:
-    """Gauss-Kruger zones are used beyond the countries for which they were registered."""
-    spec = Spec(
-        seed=3,
-        ground=Ground("EPSG:28404", center_deg=(24.0, 42.5)),
-        flight=Flight(photos=23, scale=10000.0),
-        control=Control(every=3, second_crs="EPSG:28405", boundary_longitude_deg=24.0),
-    )
-    made = simulate(spec)
-    assert told(inputs_of(made), settings_of(made)) == ["P402"]
-
-
-@pytest.mark.slow
 def test_a_start_may_be_far_off() -> None:
     """Orientations without influence are no observations: what they say of themselves matters where a run fails."""
     made = simulate(BLOCK)

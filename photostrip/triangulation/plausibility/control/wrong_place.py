@@ -1,7 +1,9 @@
 """Where on the Earth given coordinates lie, against where their coordinate reference system is made for.
 
 Coordinates with exchanged axes, in feet, or of another system fall hundreds of kilometres away. When they do, the
-readings that would bring them back are tried. A neighbouring zone cannot be seen: the same numbers lie in it as well.
+readings that would bring them back are tried: one that does is an error. Without one the area alone proves nothing: a
+zone of Gauss-Kruger serves at any latitude, whoever registered it for which country. A neighbouring zone of UTM cannot
+be seen: the same numbers lie in it as well; those of Gauss-Kruger begin with the number of their zone.
 """
 
 from __future__ import annotations
@@ -12,13 +14,13 @@ import numpy as np
 
 from photostrip.arrays import Floats, column_medians, median
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import NamedTuple
+from photostrip.frozen import NamedTuple, replace
+from photostrip.geodesy.crs import Area, AreasOfUse
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Finding
 from photostrip.triangulation.plausibility.control.straightening import FOOT, KINDS_OF_FEET
-from photostrip.triangulation.plausibility.finding import Evidence, found
+from photostrip.triangulation.plausibility.finding import WARNING, Evidence, found
 
-Area = tuple[float, float, float, float]
 MARGIN_SHARES = (0.6, 0.25)  # of the width and the height of the area: a neighbouring zone is used at times
 MARGIN_LIMITS_DEG = (1.0, 4.0)
 CIRCLE_DEG = 360.0
@@ -40,11 +42,12 @@ class FramePlace(NamedTuple):
     inside: bool  # whether it lies where its coordinate reference system is made for, as far as that is known
 
 
-def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number: int) -> FramePlace:
-    """Compare the place of control list `number` with the area of its coordinate reference system.
+def find_wrong_place(frame: GroundFrame, areas: AreasOfUse, enu: Floats, number: int) -> FramePlace:
+    """Compare the place of control list `number` with the areas of its coordinate reference system.
 
     enu: (n, 3), its points east, north, up, in the units of the frame.
     """
+    area = areas.crs
     known = _together(enu[np.isfinite(enu[:, :2]).all(axis=1)])
     if area is None or not len(known) or frame.kind not in {"projected", "geographic"}:
         return FramePlace([], None, inside=True)
@@ -54,30 +57,53 @@ def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number:
     tens = 0.0 if well_inside else _tens(frame, area, level)
     if well_inside or (_inside(frame, area, level) and not tens):
         return FramePlace([], None if _inside(frame, area, exchanged) else True, inside=True)
-    key = f"control[{number}]"
-    where = _where(frame, level, known)
+    finding = _outside(frame, areas, level, f"control[{number}] {_where(frame, level, known)}", tens)
+    if finding is None:
+        return FramePlace([], None, inside=True)
+    finding = replace(finding, key=f"control[{number}]{finding.key}")
+    return FramePlace([finding], sure=False if finding.code == "P401" else None, inside=False)
+
+
+def _outside(frame: GroundFrame, areas: AreasOfUse, level: Floats, where: str, tens: float) -> Finding | None:
+    """Say how points outside the area of their CRS would lie in it; its key is below that of their list.
+
+    Without such a reading there is nothing to say where their projection is made for the place, and little elsewhere.
+    """
+    if areas.crs is None:
+        return None
+    west, south, east, north = areas.crs
     evidence: Evidence = {
-        "area_west_deg": area[0],
-        "area_south_deg": area[1],
-        "area_east_deg": area[2],
-        "area_north_deg": area[3],
+        "area_west_deg": west,
+        "area_south_deg": south,
+        "area_east_deg": east,
+        "area_north_deg": north,
     }
-    head = f"{key} {where}, and {frame.title} is made for {area[0]:g} to {area[2]:g} E, {area[1]:g} to {area[3]:g} N"
+    head = f"{where}, and {frame.title} is made for {west:g} to {east:g} E, {south:g} to {north:g} N"
     if tens:
-        message = f"{head}; multiplied by {tens:g} it would lie there"
         fix = "give metres; was a digit lost, or are the coordinates in kilometres?"
-        evidence["factor"] = tens
-        return FramePlace([found("P402", message, fix, evidence, key=key)], sure=None, inside=False)
-    if _inside(frame, area, exchanged):
+        return found("P402", f"{head}; multiplied by {tens:g} it would lie there", fix, evidence | {"factor": tens})
+    zone = _other_zone(frame, areas.projection, level)
+    if _inside(frame, areas.crs, level[:, [1, 0, 2]]):
         message = f"{head}; with east and north exchanged it would lie there"
-        fix = "put `control.axes` into the order of the columns"
-        return FramePlace([found("P401", message, fix, evidence, key=f"{key}.axes")], sure=False, inside=False)
+        fix = "put `control.axes` into the order of the columns" + (f", or {zone}" if zone else "")
+        return found("P401", message, fix, evidence, key=".axes")
     for code, changed, what, fix in _readings(level):
-        if _inside(frame, area, changed):
-            finding = found(code, f"{head}; {what}", fix, evidence, key=f"{key}.crs")
-            return FramePlace([finding], sure=None, inside=False)
-    fix = "is the crs the right one: zone, datum, false easting and northing?"
-    return FramePlace([found("P402", head, fix, evidence, key=f"{key}.crs")], sure=None, inside=False)
+        if _inside(frame, areas.crs, changed):
+            return found(code, f"{head}; {what}", fix, evidence, key=".crs")
+    if _inside(frame, areas.projection, level):
+        return None
+    fix = zone or "is the crs the right one: zone, datum, false easting and northing?"
+    finding = found("P402", head, fix, evidence, key=".crs")
+    return finding if _degrees(frame, level) is None else replace(finding, severity=WARNING)
+
+
+def _other_zone(frame: GroundFrame, area: Area | None, level: Floats) -> str:
+    """Say what to do where eastings begin with the number of the next zone: those of this one would lie in its area."""
+    begin = np.floor(median(level[:, 0]) / MILLION)
+    steps = np.array([[-MILLION, 0.0, 0.0], [MILLION, 0.0, 0.0]]) if begin > 0 else ()
+    if not any(_inside(frame, area, level + step, margin=0.0) for step in steps):
+        return ""
+    return f"name the crs of zone {begin:.0f}, with which its eastings begin"
 
 
 def _together(enu: Floats) -> Floats:
@@ -117,10 +143,10 @@ def _tens(frame: GroundFrame, area: Area, level: Floats) -> float:
     return next((each for each in TENS if _inside(frame, area, each * level, margin=0.0)), 0.0)
 
 
-def _inside(frame: GroundFrame, area: Area, enu: Floats, *, margin: float = 1.0) -> bool:
+def _inside(frame: GroundFrame, area: Area | None, enu: Floats, *, margin: float = 1.0) -> bool:
     """Whether most points lie in an area or beside it, within a part of the usual margin."""
-    degrees = _degrees(frame, enu)
-    if degrees is None:
+    degrees = None if area is None else _degrees(frame, enu)
+    if area is None or degrees is None:
         return False
     west, south, east, north = area
     width = (east - west) % CIRCLE_DEG or CIRCLE_DEG
