@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -11,24 +11,86 @@ from photostrip.formats.measured.control import ControlTable
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.tables import Table
-from photostrip.frozen import replace
+from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
 from photostrip.project.conversion import certificate_of
 from photostrip.project.models import ModelTables
+from photostrip.project.resolved import OF_MODELS, OF_PHOTOS
 from photostrip.project.schema.cameras import Camera
+from photostrip.project.schema.processing import Processing
 from photostrip.project.schema.project_file import ProjectFile
+from photostrip.project.schema.sections import Section
 from photostrip.project.tables import Tables, alike, rays
-from photostrip.project.yaml.tree import Node, key_path
+from photostrip.project.yaml.tree import NO_FILES, Node, key_path
 from photostrip.triangulation.image_coordinates.certificate import POOR_FIT, Certificate
 
 NEAR_NAMED = 3
+
+
+class Condition(NamedTuple):
+    """Keys of ``processing`` that do nothing unless other keys let them."""
+
+    keys: tuple[str, ...]
+    counts: Callable[[ProjectFile], bool]
+    by: str  # what makes them count
+
+
+def _adjusted(*methods: str) -> Callable[[ProjectFile], bool]:
+    return lambda project: project.processing.adjustment in methods
+
+
+def _curved(*ways: str) -> Callable[[ProjectFile], bool]:
+    return lambda project: project.processing.earth_curvature in ways
+
+
+CONDITIONS = (  # of several that a key has, the first that fails is told
+    Condition(OF_PHOTOS, lambda project: project.models is None, "`observations` in place of `models`"),
+    Condition(OF_MODELS, lambda project: project.models is not None, "`models` in place of `observations`"),
+    Condition(
+        ("relative.grubbs_alpha",),
+        lambda project: project.processing.relative.screening in {"parallax+grubbs", "tau"},
+        "`processing.relative.screening: parallax+grubbs` or `tau`",
+    ),
+    Condition(
+        ("relative.parallax_limit",),
+        lambda project: project.processing.relative.screening == "parallax+grubbs",
+        "`processing.relative.screening: parallax+grubbs`",
+    ),
+    Condition(
+        ("links.alpha",),
+        lambda project: project.processing.links.screening == "auto",
+        "`processing.links.screening: auto`",
+    ),
+    Condition(  # a bundle starts from it
+        ("polynomial",), _adjusted("auto", "polynomial", "bundle"), "`processing.adjustment: polynomial` or `auto`"
+    ),
+    Condition(("covariance",), _adjusted("auto", "covariance"), "`processing.adjustment: covariance` or `auto`"),
+    Condition(("bundle",), _adjusted("bundle"), "`processing.adjustment: bundle`"),
+    Condition(
+        ("earth_radius", "earth_latitude", "earth_azimuth"),
+        _curved("model", "image"),
+        "`processing.earth_curvature: model` or `image`",
+    ),
+    Condition(
+        ("earth_radius",),
+        lambda project: project.processing.earth_latitude is None,
+        "`processing.earth_curvature` without `earth_latitude`, whose radius takes its place",
+    ),
+    Condition(
+        ("flying_height", "ground_height"),
+        lambda project: project.processing.refraction or _curved("image")(project),
+        "`processing.refraction: true` or `processing.earth_curvature: image`",
+    ),
+    Condition(("interior",), lambda project: project.fiducial_measurements is not None, "`fiducial_measurements`"),
+)
 
 
 def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
     """Explain every row and every definition that is not used: a note for each kind in each file."""
     photos = {str(photo) for strip in project.strips for photo in strip.photos}
     yield from _unused_cameras(project, root)
+    yield from _without_effect(project, root)
     for name, camera in project.cameras.items():
         if (solved := certificate_of(camera)) is not None:
             yield _solved_marks(name, camera, solved, root)
@@ -121,6 +183,35 @@ def _unused_cameras(project: ProjectFile, root: Node) -> Iterator[Note]:
         message = f"{number} {verb} to no strip: {listed(unused)}"
         key = key_path(("cameras", unused[0]))
         yield root.entries["cameras"].keys[unused[0]].note("unused-camera", message, key=key)
+
+
+def _without_effect(project: ProjectFile, root: Node) -> Iterator[Note]:
+    """Name the keys that the project itself sets, no preset, and that do nothing as the others stand.
+
+    Defaults are not meant: a project with all of them filled in would say nothing else.
+    """
+    told = set[str]()
+    for condition in CONDITIONS:
+        for name in condition.keys if not condition.counts(project) else ():
+            for path in _ends(root, ("processing", *name.split("."))):
+                node, key = root.find(*path), key_path(path)
+                own = node is not None and (node.place.file in NO_FILES or node.place.file == root.place.file)
+                if own and key not in told and _value(project.processing, path) != _value(Processing(), path):
+                    told.add(key)
+                    message = f"`{key}` has no effect here: it counts with {condition.by}"
+                    yield root.place_of(path).note("without-effect", message, key=key)
+
+
+def _ends(root: Node, path: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    """Give the paths of the keys of a section that stand in a file, or of the one key."""
+    inner = root.mapping_at(*path) if isinstance(_value(Processing(), path), Section) else {}
+    yield from ((*path, name) for name in inner) if inner else (path,)
+
+
+def _value(section: object, path: tuple[str, ...]) -> object:
+    for name in path[1:]:
+        section = getattr(section, name)
+    return section
 
 
 def _solved_marks(name: str, camera: Camera, solved: Certificate, root: Node) -> Note:

@@ -239,13 +239,15 @@ def _notes(notes: Iterable[Document], most: int) -> Section:
 
 
 def _likewise(rest: Sequence[Document]) -> str:
-    """Say for what else a note holds, in other words: strips, where it is about strips."""
+    """Say for what else a note holds, in other words: strips or keys, where it is about them."""
     if not rest:
         return ""
     strips = [note["strip"] for note in rest if note["strip"]]
     if len(strips) == len(rest):
         return f" (and the same for {'strip' if len(strips) == 1 else 'strips'} {listed(strips)})"
-    return f" (and {len(rest)} more like this: --section notes)"
+    keys = [note["key"] for note in rest if "." in note.get("key", "")]
+    which = f", {listed(keys)}" if len(keys) == len(rest) else ""
+    return f" (and {len(rest)} more like this{which}: --section notes)"
 
 
 def _worst_of(rows: Sequence[Document], key: str, most: int) -> list[Document]:
