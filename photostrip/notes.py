@@ -11,6 +11,16 @@ from photostrip.frozen import dataclass
 Document = dict[str, Any]  # of a result, a plan, a comparison: plain values, as JSON has them
 
 MOST_NAMED = 8  # ids in one message
+LOST_SAY = (  # codes of warnings on what was given and lost its say, in the order of importance
+    "control-lost",
+    "control-rejected",
+    "control-image",
+    "control-measured-once",
+    "given-ray",
+    "given-residual",
+    "check-lost",
+    "position-rejected",
+)
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ def rejected_control(result: Result) -> Flags:
         problem, selection = result.bundle.screened.problem, result.bundle.screened.selection
         rows = locate(map(problem.point_name, problem.control.point.tolist()), control.ids)
         held[rows], used[rows] = True, selection.control
-    for strip in result.photo_strips if result.bundle is None else ():
+    for strip in result.strips if result.bundle is None else ():
         rows = locate(strip.control.ids, control.ids)
         held[rows] = True
         used[rows] |= strip.control.use

@@ -254,7 +254,7 @@ def _measured_once(
     new = [name for name in once if name not in given]
     if control and not together:
         number = counted(len(control), "control or check point is", "control or check points are")
-        message = f"{number} measured on one photo only and cannot be used: {listed(control)}"
+        message = f"{number} measured on one photo only and cannot be used: {', '.join(control)}"
         row = _first_row(read, control)
         yield read.table.note(row, "control-measured-once", message, key="point", points=control)
     if new:

@@ -20,7 +20,7 @@ from photostrip.result.adjustment import (
     strips,
 )
 from photostrip.result.numbers import natural_rank
-from photostrip.result.points import cross_validation, given, ground, image_coordinates, photos, precision
+from photostrip.result.points import cross_validation, given, ground, image_coordinates, lost_say, photos, precision
 from photostrip.result.statement.evidence import statement_of
 from photostrip.result.verdict import verdict_of
 
@@ -38,6 +38,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     images = photos.image_residuals(result, rank)
     found = given.differences(result)
     numbers = summary.summary_of(result, found)
+    taken_out, said = rejected.rejected_of(result), (*notes, *result.notes)
     body: Document = {
         "adjustment": choices.adjustment_of(result),
         "frame": ground.frame_of(result),
@@ -60,10 +61,10 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "control": given.control_of(result, found),
         "misclosures": given.misclosures_of(result),
         "ties": ground.ties_of(result, rank),
-        "rejected": rejected.rejected_of(result),
+        "rejected": taken_out,
         "not_determined": ground.not_determined_of(result),
         "findings": [_finding(each) for each in result.findings],
-        "notes": [_note(note) for note in (*notes, *result.notes)],
+        "notes": [_note(note) for note in (*said, *lost_say.lost_say_notes(result, images, taken_out, said))],
         "models": links.models_of(result) if result.model_strips else pairs.models_of(result),
         **({"links": links.links_of(result)} if result.model_strips else {}),
         **deformation.deformations_of(result),

@@ -6,13 +6,13 @@ It is made from the finished document, so that a saved result has the same verdi
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import compress, groupby
 from operator import itemgetter
 from typing import Any
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
-from photostrip.notes import Document, before, counted, listed
+from photostrip.notes import LOST_SAY, Document, before, counted, listed
 from photostrip.result.records import column_of
 from photostrip.statistics import SECOND_LOOK, TEST_LEVEL, chi2_quantile, f_p_value
 
@@ -25,26 +25,26 @@ PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
 POOR_CONTROL = 5.0  # rms of the control's residuals in standard deviations; a long strip bends by that much
 MANY_REJECTED, MANY_OF_PHOTO = 0.05, 0.2  # share of the points in pairs, of those of a photo
 SMALLEST_PROBABILITY = 0.001  # probability that is written as a number
-PARTS = "plan", "height"
-TERMS = "twist", "bending"
+PARTS, TERMS = ("plan", "height"), ("twist", "bending")
 AREAS = {"plan": "ellipse", "height": "interval"}
 WRONG_CONTROL = {"control-rejected", "control-doubtful"}  # notes on control points that a finding may have named
 BARE_ENDS = {"P501", "P503"}  # findings on control that leaves an end out
-NAMED = 3  # pairs, photos, findings or notes of one kind that are named
+NAMED = 3  # pairs, photos, findings or notes of one kind that are told; the given points of the others are named
 
 
 def verdict_of(document: Document) -> Document:
     """Return status, accuracy in a sentence and what to look at, from a document that has no verdict yet."""
     errors = list(_findings(document, "error"))
-    failed = [*_tolerances(document), *errors]
+    failed, (lost, others) = [*_tolerances(document), *errors], _warnings(document)
     look_at = [
         *failed,
         *_findings(document, "warning"),
+        *_kinds(document, lost, "note"),
         *(() if errors else _numbers(document)),  # of data that contradict themselves as a whole they say the same
         *_common_deformation(document, in_metres=not errors),
         *(() if errors else _deformed(document)),
         *_rejected(document),
-        *_notes(document),
+        *_kinds(document, others, "note"),
     ]
     verification = _verification(document)
     status = FAILED if failed else LOOK if look_at else GOOD if verification["verified"] else UNVERIFIED
@@ -58,9 +58,8 @@ def _verification(document: Document) -> Document:
     if plan and height:
         return {"verified": True, "verification": f"{counted(plan, 'check point')} in plan and {height} in height"}
     if turned and turned["plan"]["count"] and turned["height"]["count"]:
-        points = counted(turned["plan"]["count"], "control point")
-        text = f"{points} in plan and {turned['height']['count']} in height, left out in turn"
-        return {"verified": True, "verification": text}
+        points, heights = counted(turned["plan"]["count"], "control point"), turned["height"]["count"]
+        return {"verified": True, "verification": f"{points} in plan and {heights} in height, left out in turn"}
     missing = "the heights" if plan else "the plan coordinates" if height else "the result"
     return {"verified": False, "verification": f"no point verifies {missing}: {_cure(document)}"}
 
@@ -77,7 +76,8 @@ def _cure(document: Document) -> str:
 
 def _numbers(document: Document) -> Iterator[str]:
     """Say where differences, residuals and standard deviations do not go together."""
-    named = {point for each in (*_open_findings(document), *_on_control(document)) for point in each["points"]}
+    noted = (each for each in document["notes"] if each["code"] in WRONG_CONTROL)
+    named = {point for each in (*_open_findings(document), *noted) for point in each["points"]}
     yield from _control(document)
     yield from _odd(document, "control", named)
     yield from _odd(document, "check", named)
@@ -125,8 +125,7 @@ def accuracy(document: Document) -> str:
 
 def seen_at(document: Document) -> str:
     """Return what says most about the points: ``check``, ``cross_validation`` or ``control``."""
-    found = (role for role in ("check", "cross_validation") if any(_counts(document, role)))
-    return next(found, "control")
+    return next((role for role in ("check", "cross_validation") if any(_counts(document, role))), "control")
 
 
 def _counts(document: Document, role: str) -> list[int]:
@@ -246,8 +245,7 @@ def _unseen_level(document: Document) -> float:
     Where something larger than the noise is known to be left out, they decide on that alone.
     """
     both = "cross_validation" in document and any(_counts(document, "check"))
-    level = SECOND_LOOK if _known_cause(document) else TEST_LEVEL
-    return level / 2 if both else level
+    return (SECOND_LOOK if _known_cause(document) else TEST_LEVEL) / (2 if both else 1)
 
 
 def _known_cause(document: Document) -> str:
@@ -368,33 +366,35 @@ def _open_findings(document: Document) -> list[Document]:
 
 
 def _findings(document: Document, severity: str) -> Iterator[str]:
-    """Name what the data say against themselves and nobody has accepted, and whether it was used."""
-    given = (column_of(document["control"], key, optional=key == "rejected") for key in ("id", "rejected"))
-    out = {name for name, rejected in zip(*given, strict=True) if rejected}
-    open_ones = [each for each in _open_findings(document) if each["severity"] == severity]
-    for _, group in groupby(open_ones, key=itemgetter("code")):
-        kind = list(group)
-        for each in kind[:NAMED]:
-            unused = bool(each["points"]) and out.issuperset(each["points"])
-            yield f"{each['code']} {each['message']}{'; not used' if unused else ''}"
-        yield from _more(len(kind), "finding")
+    """Name what the data say against themselves and nobody has accepted."""
+    return _kinds(document, [each for each in _open_findings(document) if each["severity"] == severity], "finding")
 
 
-def _notes(document: Document) -> Iterator[str]:
-    """Warnings, the first of each kind; not what a finding says of the same control points, or of the same strip."""
+def _warnings(document: Document) -> tuple[list[Document], list[Document]]:
+    """Return the warnings on what was given and lost its say, and all others; not what a finding says of the same."""
     named = {point for each in _open_findings(document) for point in each["points"]}
-    told = [each for each in _on_control(document) if named.issuperset(each["points"])]
+    told = [each for each in document["notes"] if each["code"] in WRONG_CONTROL and named.issuperset(each["points"])]
     bare = {strip for each in _open_findings(document) if each["code"] in BARE_ENDS for strip in each["strips"]}
     told += [each for each in document["notes"] if each["code"] == "extrapolation" and each["strip"] in bare]
-    warnings = sorted(
-        (n for n in document["notes"] if n["severity"] == "warning" and n not in told), key=itemgetter("code")
-    )
-    for _, group in groupby(warnings, key=itemgetter("code")):
+    open_ones = [each for each in document["notes"] if each["severity"] == "warning" and each not in told]
+    lost = [each for code in LOST_SAY for each in open_ones if each["code"] == code]
+    return lost, sorted((each for each in open_ones if each["code"] not in LOST_SAY), key=itemgetter("code"))
+
+
+def _kinds(document: Document, every: Iterable[Document], one: str) -> Iterator[str]:
+    """Say the first of each kind of findings or notes, and count the others; what they say of given points is named."""
+    rejected = {name: out for role in ("control", "check") for name, out in _given(document, role, "id", "rejected")}
+    for code, group in groupby(every, key=itemgetter("code")):
         kind = list(group)
-        yield from (before(n["file"], n["line"], n["column"]) + n["message"] for n in kind[:NAMED])
-        yield from _more(len(kind), "note")
+        told, more = [_sentence(each, rejected) for each in kind[:NAMED]], list(_more(len(kind), one))
+        concerned = (name for each in kind[NAMED:] for name in each["points"] or each["photos"])
+        names = ", ".join(dict.fromkeys(name for name in concerned if name in rejected or code in LOST_SAY))
+        yield from [*told[:-1], f"{told[-1]}; {more[0]}: {names}"] if names else [*told, *more]
 
 
-def _on_control(document: Document) -> list[Document]:
-    """Return the notes on control points that do not agree with the others."""
-    return [each for each in document["notes"] if each["code"] in WRONG_CONTROL]
+def _sentence(each: Document, rejected: Document) -> str:
+    """Say a note after its place, or a finding after its code and whether the given points it names were used."""
+    if "accepted" not in each:
+        return before(each["file"], each["line"], each["column"]) + str(each["message"])
+    unused = bool(each["points"]) and all(rejected.get(name) for name in each["points"])
+    return f"{each['code']} {each['message']}{'; not used' if unused else ''}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from photostrip.notes import Document, counted
+from photostrip.notes import LOST_SAY, Document, counted
 from photostrip.report.page.numbers import fixed, short, unit
 from photostrip.report.page.parts import Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
@@ -44,16 +44,28 @@ def accuracy(document: Document) -> Words:
 
 
 def verdict_section(document: Document, *, everything: bool = False, most: int = LOOK_SHOWN) -> Section:
-    """Whether the result can be used, and what to look at."""
+    """Whether the result can be used, and what to look at: what was given and lost its say always."""
     look_at = document["verdict"]["look_at"]
-    shown = look_at if everything else look_at[:most]
+    lost = _lost(document)
+    shown = [
+        (number, text)
+        for number, text in enumerate(look_at, 1)
+        if everything or number <= most or any(message in text for message in lost)
+    ]
     parts: list[Part] = [Words(headline(document), document["status"]), accuracy(document)]
-    parts += [Words(text, mark=f"{number}.", names=_named(document, text)) for number, text in enumerate(shown, 1)]
+    parts += [Words(text, mark=f"{number}.", names=_named(document, text)) for number, text in shown]
     if len(look_at) > len(shown):
         parts.append(Words(elsewhere(len(look_at) - len(shown), "things", "verdict", "verdict")))
     if document["tolerances"]:
         parts.append(tabulated(document["tolerances"], TOLERANCES))
     return Section("Verdict", tuple(parts))
+
+
+def _lost(document: Document) -> list[str]:
+    """Return what notes and findings say of given points that lost their say."""
+    without = {row["id"] for row in document["control"] if row.get("rejected") or not row["measured"]}
+    findings = (each for each in document.get("findings", []) if not without.isdisjoint(each["points"]))
+    return [each["message"] for each in (*(n for n in document["notes"] if n["code"] in LOST_SAY), *findings)]
 
 
 def _named(document: Document, text: str) -> tuple[tuple[str, str], ...]:

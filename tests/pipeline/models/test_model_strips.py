@@ -430,6 +430,20 @@ def test_a_link_that_its_search_leaves_three_points_is_told(model: int, name: st
     assert [note.points for note in result.notes if note.code == "contradicting-link"] == [(name,)] * told
 
 
+@pytest.mark.parametrize(("name", "lost"), [("G01", False), ("G04", True)])
+def test_control_measured_wrongly_in_a_model_is_told(name: str, *, lost: bool) -> None:
+    """In one model its given coordinates contradict it and show as rejected; of two models none places it."""
+    given = mistaken("nothing")
+    assert given.models is not None
+    points, xyz = given.models.points, given.models.points.xyz.copy()
+    xyz[np.flatnonzero(points.node == points.point_ids.index(name))[0], 0] += 1.0
+    document = document_of(triangulate(with_points(given, replace(points, xyz=xyz)), PLAIN))
+    (row,) = (row for row in document["control"] if row["id"] == name)
+    assert (row["measured"], bool(row["rejected"])) == (not lost, not lost)
+    (text,) = (text for text in document["verdict"]["look_at"] if name in text)
+    assert text.startswith(f"control point {name} {'took no part' if lost else 'contradicts the strip'}")
+
+
 @pytest.mark.parametrize(("kind", "finding"), [("control swapped", "P401"), ("centers below", "P401")])
 def test_mistakes_that_stop_a_run(kind: str, finding: str) -> None:
     with pytest.raises(InputError) as told:

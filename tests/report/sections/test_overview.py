@@ -29,7 +29,7 @@ def crowded() -> Document:
     text = "a sentence of some length that says with ids, numbers and units what is wrong with this one and why " * 3
     note = {"severity": "note", "message": text, "strip": "", "photos": [], "points": []}
     finding = {"title": "a mistake", "severity": "error", "accepted": False, "message": text, "fix": text}
-    finding |= {"evidence": {"size_m": 1.0}, "file": "", "line": 0, "column": 0, "key": ""}
+    finding |= {"evidence": {"size_m": 1.0}, "points": [], "file": "", "line": 0, "column": 0, "key": ""}
     document |= {
         "status": "failed",
         "control": [{**row, "id": f"{n}"} for n in range(300) for row in (control, check)],
@@ -105,7 +105,7 @@ def test_nothing_is_said_twice() -> None:
     warning = {"code": "c", "severity": "warning", "message": "mind this", "strip": "", "photos": [], "points": []}
     finding = {
         "code": "P101", "title": "units", "severity": "warning", "accepted": False, "message": "too large by 1000",
-        "fix": "write `um`", "evidence": {}, "file": "", "line": 0, "column": 0,
+        "fix": "write `um`", "evidence": {}, "points": [], "file": "", "line": 0, "column": 0,
     }  # fmt: skip
     document |= {"notes": [warning], "findings": [finding]}
     document["verdict"] = {**document["verdict"], "look_at": ["P101 too large by 1000", "mind this"]}
