@@ -21,6 +21,7 @@ from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, locate
 from photostrip.triangulation.bundle.common_errors import taken_up
+from photostrip.triangulation.bundle.normal_equations import defects
 from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.correlations import Correlation, correlations
@@ -174,8 +175,7 @@ def _searched(
     """Adjust, and search for gross errors, for what groups of observations share, and for variance components."""
     asked = block.problem.common_names()
     try:
-        block = _refilled(block, control, frames)
-        screened = snooping.screen_bundle(block.problem, block.begin, settings.bundle, block.kept)
+        block, screened = _screened(block, control, frames, settings)
     except GeometryError as error:
         _name_undetermined(block, error)
         raise
@@ -184,6 +184,24 @@ def _searched(
     sigma0 = reliability.sigma0_test(screened.solution)
     found = _Estimated(block=block, screened=screened, sigma0=sigma0, asked=asked)
     return _with_components(found, settings) if settings.bundle.variance_components else found
+
+
+def _screened(
+    block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> tuple[BlockProblem, ScreenedBundle]:
+    """Search for gross errors; with everything from the start where what begins leaves photos or the datum open.
+
+    Rays and control wait outside when they miss a start, and a rough one may be what is wrong.
+    """
+    try:
+        begun = _refilled(block, control, frames)
+        return begun, snooping.screen_bundle(begun.problem, begun.begin, settings.bundle, begun.kept)
+    except GeometryError as error:
+        everything = Selection.everything(block.problem)
+        alike = block.begin.images.all() and block.begin.given == everything.given
+        if alike or error.code not in defects.OPEN:
+            raise
+    return _screened(replace(block, begin=everything), control, frames, settings)
 
 
 def _as_before(before: Bundle, block: BlockProblem, settings: Settings) -> _Estimated:

@@ -8,8 +8,10 @@ import numpy as np
 
 from photostrip.notes import Note
 from photostrip.pipeline.results import Bundle
+from photostrip.rejection import Rejection
 from photostrip.triangulation.bundle.common_errors import DISTANCE
 from photostrip.triangulation.bundle.normal_equations import defects
+from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.quality import reliability
 
 OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustment
@@ -73,26 +75,35 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
 
 
 def _given_notes(bundle: Bundle) -> Iterator[Note]:
-    """Name control and camera positions that were taken out."""
+    """Name control and camera positions that contradict the rest, whether they were taken out or had to stay."""
     problem = bundle.block.problem
     for each in bundle.screened.rejections:
-        if each.readmitted or each.kind == reliability.IMAGE:
-            continue
-        axis = ("east (X)", "north (Y)", "up (Z)")[each.axes[0]]
-        reached = (
-            f"test value {each.value:.2f}, limit {each.limit:.2f}" if np.isfinite(each.value) else "found in its strip"
-        )
-        if each.kind == reliability.CONTROL:
-            name = problem.point_name(int(problem.control.point[each.row]))
-            size = f"{axis} by about {each.worst:+.2f} m"
-            text = f"control point {name} contradicts the photos and the other control: {size}"
-            yield Note("control-rejected", f"{text} ({reached}); not used", points=(name,))
-            continue
-        part = problem.positions if each.kind == reliability.POSITION else problem.attitudes
-        photo = problem.photo_name(int(part.photo[each.row]))
-        if each.kind == reliability.POSITION:
-            text = f"the given position of photo {photo} does not fit: {axis} by about {each.worst:+.2f} m"
-        else:
-            turn = f"{np.degrees(each.worst):+.3f} deg"
-            text = f"the given angles of photo {photo} do not fit: about image axis {each.axes[0] + 1} by {turn}"
-        yield Note("position-rejected", f"{text} ({reached}); not used", photos=(photo,))
+        if not each.readmitted and each.kind != reliability.IMAGE:
+            text, photos, points = _contradiction(problem, each)
+            text += "; not used"
+            yield Note("control-rejected" if points else "position-rejected", text, photos=photos, points=points)
+    for each in bundle.screened.held:
+        text, photos, points = _contradiction(problem, each)
+        text += "; it was used: the adjustment fails without it"
+        yield Note("control-doubtful" if points else "position-doubtful", text, photos=photos, points=points)
+
+
+def _contradiction(problem: BundleProblem, each: Rejection) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    """Say how far a given coordinate is off; of which photo or point it is."""
+    axis = ("east (X)", "north (Y)", "up (Z)")[each.axes[0]]
+    reached = "found in its strip"
+    if np.isfinite(each.value):
+        reached = f"test value {each.value:.2f}, limit {each.limit:.2f}"
+    if each.kind == reliability.CONTROL:
+        name = problem.point_name(int(problem.control.point[each.row]))
+        size = f"{axis} by about {each.worst:+.2f} m"
+        text = f"control point {name} contradicts the photos and the other control: {size}"
+        return f"{text} ({reached})", (), (name,)
+    part = problem.positions if each.kind == reliability.POSITION else problem.attitudes
+    photo = problem.photo_name(int(part.photo[each.row]))
+    if each.kind == reliability.POSITION:
+        text = f"the given position of photo {photo} does not fit: {axis} by about {each.worst:+.2f} m"
+    else:
+        turn = f"{np.degrees(each.worst):+.3f} deg"
+        text = f"the given angles of photo {photo} do not fit: about image axis {each.axes[0] + 1} by {turn}"
+    return f"{text} ({reached})", (photo,), ()

@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.comparison import compare_results
 from photostrip.errors import GeometryError
-from photostrip.pipeline.inputs import Inputs, Strip
+from photostrip.pipeline.inputs import GivenOrientations, Inputs, Strip
 from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
 from photostrip.report.html import to_html
@@ -18,7 +18,7 @@ from photostrip.result.document import document_of
 from photostrip.result.trace.trace import trace_of
 from photostrip.result.verdict import verdict_of
 from photostrip.simulation import Control, Flight, Ground, Points, Simulation, Spec
-from tests.pipeline.blocks import adjusted, errors, exact, orientations, simulate, with_control
+from tests.pipeline.blocks import adjusted, errors, exact, orientations, positions, simulate, with_control
 from tests.results import result_files
 from tests.simulated import inputs_of, settings_of
 
@@ -191,3 +191,50 @@ def test_approximate_orientations_hold_against_wrong_images_of_control(seed: int
     result = adjusted(simulation, replace(inputs_of(simulation), observations=replace(seen, xy=xy), orientations=known))
     assert any(note.code == "not-formed" for note in result.notes)
     assert np.sqrt((errors(simulation, result) ** 2).sum(axis=1).mean()) < 0.3
+
+
+ROUGH = np.radians(2.0)  # standard deviation of angles that are given roughly
+
+
+def roughly(simulation: Simulation) -> GivenOrientations:
+    """Orientations for a start, their angles off by some degrees."""
+    given = orientations(simulation, observed=False)
+    return replace(given, angles=given.angles + np.random.default_rng(1).normal(0.0, ROUGH, given.angles.shape))
+
+
+def test_photos_that_their_rough_orientations_miss_are_adjusted() -> None:
+    """By its given angles photo 1008 misses all its points; its rays are no worse than those of others."""
+    flight = Flight(photos=8, strips=2, side_lap_percent=60.0, attitude_sigma_deg=(1.0, 1.0, 1.0))
+    spec = Spec(
+        ground=Ground(crs="local"),
+        flight=flight,
+        points=Points(extra_per_model=8),
+        control=Control(layout="bands", bands=2),
+    )
+    simulation = simulate(spec)
+    noise = np.random.default_rng(1).normal(0.0, 0.05, (16, 3))
+    inputs = replace(
+        singles(simulation), orientations=roughly(simulation), positions=positions(simulation, noise=noise)
+    )
+    result = adjusted(simulation, inputs)
+    assert document_of(result)["counts"]["photos"] == 16
+    assert verdict_of(document_of(result))["look_at"] == []
+
+
+@pytest.mark.parametrize("off", [5.0, 50.0])
+def test_control_that_contradicts_the_start_is_still_control(off: float) -> None:
+    """Six control points, each metres off for itself: some are rejected by name; a free network has none."""
+    simulation = simulate(
+        Spec(
+            flight=Flight(photos=4, strips=2, side_lap_percent=40.0),
+            points=Points(extra_per_model=8),
+            control=Control(layout="corners+centre"),
+        )
+    )
+    inputs = singles(simulation, with_control(simulation, [f"G0{number}" for number in range(1, 7)]))
+    control = inputs.control
+    shift = np.where(control.check[:, None], 0.0, np.random.default_rng(6).normal(0.0, off, control.enu.shape))
+    given = replace(control, enu=control.enu + shift)
+    result = adjusted(simulation, replace(inputs, control=given, orientations=orientations(simulation, observed=False)))
+    told = {note.code for note in result.notes if note.severity == "warning"}
+    assert told == {"control-rejected"}

@@ -20,8 +20,9 @@ from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
 
 SQUARED_SINE = 1e-10  # square of the sine of the angle between rays
-# standard deviation, as a part of the size of the network, from which a datum parameter is not determined
-LOOSE_SHARE = 0.1
+# standard deviations from which a shift, in sizes of the network, a turn, in radians, or the logarithm of the scale is
+# not determined; errors of given positions on one line look like a turn about it that is known to some tenths
+LOOSE = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1, 1.0])
 ALIKE = 0.95  # part of a named movement that lies among the undetermined ones
 COSINE_ALONG = 0.94  # cosine of 20 degrees: a line counts as the flight line
 LEFT_OVER = 1e-11  # part of its information that the other parameters leave a common parameter
@@ -32,6 +33,7 @@ ITERATIONS = 3
 MOST_FAILED = 8  # adjustments of a search that may fail: each takes six times as long as one that converges
 SHARE = 0.5  # of the largest element of a null vector: what is named with it
 UNMOVED = 1e-9
+OPEN = {"bundle-rank", "bundle-rays"}  # codes of what is not determined: the datum, photos, points
 MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll about x", "turn about y", "turn about z")
 
 
@@ -94,14 +96,14 @@ class Held:
 def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
     """Refuse parts of the network that what is given does not hold in place (``bundle-rank``).
 
-    The information of what is given on the seven parameters of a similarity of each part is taken apart by its
-    eigenvalues; what has less than a tenth of the size of the part is named: shift, rotation or scale.
+    The information of what is given on the seven parameters of a similarity of each part, each in units of ``LOOSE``,
+    is taken apart by its eigenvalues; what is below one is named: shift, rotation or scale.
     """
     parts = _parts(prepared)
     for photos in parts:
         held = _held(prepared, state, photos)
-        values, vectors = np.linalg.eigh(held.normal)
-        loose = vectors[:, values < LOOSE_SHARE**-2.0]
+        values, vectors = np.linalg.eigh(held.normal * LOOSE[:, None] * LOOSE)
+        loose = vectors[:, values < 1.0]
         if loose.shape[1]:
             names = [prepared.problem.photo_name(number) for number in photos.tolist()]
             reason = _reason(held, unknown_errors=bool(prepared.problem.positions.offset_sigma.any()))

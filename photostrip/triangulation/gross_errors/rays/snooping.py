@@ -20,7 +20,8 @@ from photostrip.frozen import dataclass, replace
 from photostrip.rejection import Rejection
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up
-from photostrip.triangulation.bundle.normal_equations.defects import refuse_endless
+from photostrip.triangulation.bundle.normal_equations import defects
+from photostrip.triangulation.bundle.normal_equations.datum import is_free
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
@@ -52,6 +53,7 @@ class ScreenedBundle:
     rejections: tuple[Rejection, ...] = ()  # what was taken out, in order; re-admitted ones are marked
     rounds: int = 1
     common: tuple[CommonError, ...] = ()  # what groups of observations share, taken up as unknowns
+    held: tuple[Rejection, ...] = ()  # given coordinates beyond the limit that stay: without them the adjustment fails
 
     @classmethod
     def of(
@@ -84,7 +86,7 @@ def screen_bundle(
     """Adjust a problem and take its gross errors out.
 
     ``begin`` takes part at first, the rest is put in at the end where it fits; the rays ``kept`` (n,) stay in whatever
-    the tests say.
+    the tests say, and so does what photos, points or the datum would be open without.
 
     rough: only the rays matter: adjust as well as their tests need it; two that only go together have ``BOTH_GO``.
     """
@@ -97,7 +99,9 @@ def screen_bundle(
     done = search.clean(chosen)
     while (more := search.fitting(done)) is not None:  # a point comes back once only
         done = search.clean(more)
-    return replace(done, rejections=tuple(search.log(done)), rounds=search.rounds, common=tuple(search.common))
+    held = tuple(each for each in search.tested(done)[1] if search.holds(each))
+    done = replace(done, rejections=tuple(search.log(done)), held=held)
+    return replace(done, rounds=search.rounds, common=tuple(search.common))
 
 
 class _Search:
@@ -110,7 +114,9 @@ class _Search:
         images = problem.images
         self.by_point = np.lexsort((images.photo, images.point))
         self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
+        self.free = is_free(problem)
         self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
+        self.held: set[tuple[str, int, int]] = set()  # given coordinates without which the adjustment fails
         self.spared[images.point[[] if kept is None else kept]] = True
         self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates not put in yet
         self.begin = begin.images
@@ -137,7 +143,9 @@ class _Search:
         return row if among is None else row[among[row]]
 
     def adjust(self, selection: Selection) -> ScreenedBundle:
-        """Adjust a selection, and start from there the next time."""
+        """Adjust a selection, and start from there the next time; what was given must not all be outside."""
+        if not self.free and is_free(selected(self.problem, selection)):
+            raise GeometryError("what is given contradicts the photos, all of it", code="bundle-rank")
         done = ScreenedBundle.of(self.problem, selection, self.settings, rough=self.rough)
         self.problem = restarted(self.problem, done.solution)
         self.rounds += 1
@@ -207,30 +215,34 @@ class _Search:
         return done
 
     def _without_given(self, done: ScreenedBundle, worst: list[Rejection]) -> ScreenedBundle:
-        """Take given coordinates out: the worst alone where the adjustment fails without all of them."""
+        """Take given coordinates out: the worst alone where the adjustment fails without all of them, else none."""
         selection = done.selection
         for each in worst:
             selection = selection.without(each.kind, each.row, each.axes[0])
-        found = self._tried(selection, last=len(worst) == 1)
-        if found is None:
+        found = self._tried(selection)
+        if found is None and len(worst) > 1:
             return self._without_given(done, worst[:1])
+        if found is None:
+            self.held.add((worst[0].kind, worst[0].row, worst[0].axes[0]))
+            return done
         for each in worst:
             self.out[each.kind, each.row, each.axes[0]] = each
             if each.kind == CONTROL:
                 self.control[each.row, each.axes[0]] = False
         return found
 
-    def _tried(self, selection: Selection, *, last: bool = False) -> ScreenedBundle | None:
-        """Adjust a selection; None where that fails, unless it is the last that can be tried."""
+    def _tried(self, selection: Selection) -> ScreenedBundle | None:
+        """Adjust a selection; None where that fails."""
         before = self.problem
         try:
             found = self.adjust(supported(self.problem, selection))
             reliability.require_regular(found.problem, found.solution, found.precision)
-        except GeometryError:
-            self.problem, self.failed = before, self.failed + 1
-            refuse_endless(before, [row for kind, row, _ in self.out if kind == IMAGE], self.rounds, self.failed)
-            if last:
-                raise
+        except GeometryError as error:
+            self.problem = before
+            if error.code not in defects.OPEN:
+                self.failed += 1
+                rows = [row for kind, row, _ in self.out if kind == IMAGE]
+                defects.refuse_endless(before, rows, self.rounds, self.failed)
             return None
         return found
 
@@ -239,12 +251,20 @@ class _Search:
 
         The more of these are out, the more go at a time: the work grows with the logarithm of their number.
         """
-        limit = done.limit
-        rays, given = np.zeros(0), []
+        rays, given = self.tested(done)
+        doubtful = self._doubtful(done.selection, rays, done.limit)
+        given = [each for each in given if not self.holds(each)]
+        if given and given[0].value >= doubtful.max(initial=0.0):
+            return given[: 1 + self._given_out() // OUT_TO_ONE_MORE]
+        return self._wrong_rays(done, np.flatnonzero(self._worst_nearby(done.selection, doubtful)), done.limit)
+
+    def tested(self, done: ScreenedBundle) -> tuple[Floats, list[Rejection]]:
+        """Test values of rays that took part, and the given coordinates beyond the limit, the worst first."""
+        limit, rays, given = done.limit, np.zeros(0), []
         for group in reliability.groups_of(done.problem, done.solution, done.precision):
             value = np.abs(np.nan_to_num(group.standardised)) / limit.unit
             if group.kind == IMAGE:
-                rays = self._doubtful(done.selection, value.max(axis=1), limit)
+                rays = value.max(axis=1)
                 continue
             given += [
                 Rejection(
@@ -258,10 +278,10 @@ class _Search:
                 )
                 for row, axis in np.argwhere(value > limit.value).tolist()
             ]
-        given.sort(key=lambda each: -each.value)
-        if given and given[0].value >= rays.max(initial=0.0):
-            return given[: 1 + self._given_out() // OUT_TO_ONE_MORE]
-        return self._wrong_rays(done, np.flatnonzero(self._worst_nearby(done.selection, rays)), limit)
+        return rays, sorted(given, key=lambda each: -each.value)
+
+    def holds(self, given: Rejection) -> bool:
+        return (given.kind, given.row, given.axes[0]) in self.held
 
     def _given_out(self) -> int:
         return sum(kind != IMAGE for kind, _, _ in self.out)
