@@ -28,6 +28,7 @@ OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustme
     "not-resected",
     "strip-contradicted",
     "weak-control",
+    "weak-pair",
 }
 
 

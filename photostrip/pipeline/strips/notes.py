@@ -15,11 +15,12 @@ from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
+from photostrip.triangulation.error_propagation.weak_pairs import WEAK_PAIR, times_a_good_pair
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
 from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
 from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
 from photostrip.triangulation.polynomial.correction import Polynomial
-from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING, Orientation
+from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.resection.resection import Resection
 from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -38,15 +39,17 @@ POLYNOMIAL_BANDS = 4  # bands of control below which the adjustment with the cov
 
 def pair_notes(strip: Strip, oriented: Orientation) -> Iterator[Note]:
     """Say which pairs check themselves too little."""
+    times = times_a_good_pair(oriented)
     for number, count in enumerate(oriented.points_used):
         names = strip.photos[number : number + 2]
         if count == MINIMUM_POINTS:
             text = f"photos {names[0]} and {names[1]} are oriented on 5 points only: there is no check"
             yield Note("no-check", text, strip=strip.id, photos=names)
-        if oriented.condition[number] > CONDITION_WARNING:
+        if times[number] > WEAK_PAIR:
             text = (
-                f"photos {names[0]} and {names[1]}: weak relative orientation (condition number "
-                f"{oriented.condition[number]:.0f}); the points lie in a narrow band"
+                f"photos {names[0]} and {names[1]}: weak relative orientation: the standard deviations of model points "
+                f"are {times[number]:.1f} times those of a good pair of the same base and height; the points lie in a "
+                "narrow band, or on one side: measure some towards the corners of the overlap"
             )
             yield Note("weak-pair", text, strip=strip.id, photos=names)
 

@@ -21,8 +21,7 @@ from photostrip.points import take_rows
 from photostrip.triangulation.relative_orientation import solution
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 
-CONDITION_WARNING = 100.0  # of the column-normalised Jacobian: a band much narrower than the base
-CONDITION_LIMIT = 1e6
+CONDITION_LIMIT = 1e6  # of the column-normalised Jacobian
 SMALLEST_PARALLAX = 1e-3  # of the principal distance, mean over a pair: below it there is no base to speak of
 LEAST_IN_FRONT = 0.5  # share of the points of a pair
 SCREENINGS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")  # searches for gross errors

@@ -43,15 +43,19 @@ class Linearised(NamedTuple):
     jacobian: Floats  # (5, m): dq/de, mm per radian
 
 
+def turns(elements: Floats) -> tuple[Floats, Floats]:
+    """Rotations of the left and the right photo against the base frame, (p, 3, 3) each."""
+    al1, ka1, al2, om2, ka2 = elements.T
+    return from_alpha_omega_kappa(al1, 0.0, ka1), from_alpha_omega_kappa(al2, om2, ka2)
+
+
 def base_rays(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
     """Image rays of the left and the right photo in the base frame, X, Y, Z in mm, shape (3, m) each.
 
     Source: [001] eq. 132-133, 137, relative to the base.
     """
-    al1, ka1, al2, om2, ka2 = elements.T
-    rotations = (from_alpha_omega_kappa(al1, 0.0, ka1), from_alpha_omega_kappa(al2, om2, ka2))
     turned: list[Floats] = []
-    for rotation, xy in zip(rotations, (pairs.left, pairs.right), strict=True):
+    for rotation, xy in zip(turns(elements), (pairs.left, pairs.right), strict=True):
         rays = np.empty((3, len(xy)))
         for row, (a, b, c) in enumerate(rotation.transpose(1, 2, 0)):
             along = a.take(pairs.pair) * xy[:, 0] + b.take(pairs.pair) * xy[:, 1]

@@ -498,7 +498,7 @@ def test_a_critical_cylinder_is_refused() -> None:
     assert "critical surface" in str(error)
 
 
-def notes_of_a_pair(plan: list[list[float]]) -> dict[str, str]:
+def notes_of_a_pair(plan: list[list[float]], adjustment: str = "similarity") -> dict[str, str]:
     """Notes of a run over two photos 700 m apart, 1000 m above points of which four are control."""
     rng = np.random.default_rng(1)
     xyz = np.column_stack([np.array(plan), rng.uniform(-60, 60, len(plan))])
@@ -511,7 +511,7 @@ def notes_of_a_pair(plan: list[list[float]]) -> dict[str, str]:
     at = {name: n for n, name in enumerate(observations.point_ids)}
     flown = Flown(observations, xyz, centers, rotations, 100.0, 700.0, 1000.0, at)
     control = control_points({f"p{n}": xyz[n] for n in range(4)})
-    return {note.code: note.message for note in triangulate(project(flown, control), Settings("similarity")).notes}
+    return {note.code: note.message for note in triangulate(project(flown, control), Settings(adjustment)).notes}
 
 
 STANDARD = [[0.0, 0.0], [700.0, 0.0], [0.0, 650.0], [700.0, 650.0], [0.0, -650.0], [700.0, -650.0]]
@@ -524,9 +524,12 @@ def test_a_pair_on_five_points_is_warned_of() -> None:
 
 
 def test_a_pair_on_a_narrow_band_is_warned_of() -> None:
-    said = notes_of_a_pair([[x, y / 8] for x, y in STANDARD])
-    assert "photos 1 and 2: weak relative orientation (condition number" in said["weak-pair"]
+    band = [[x, y / 8] for x, y in STANDARD]
+    said = notes_of_a_pair(band)
+    assert "photos 1 and 2: weak relative orientation" in said["weak-pair"]
+    assert "are 10.1 times those of a good pair of the same base and height" in said["weak-pair"]
     assert "weak-pair" not in notes_of_a_pair(STANDARD)
+    assert "weak-pair" not in notes_of_a_pair(band, "bundle")  # which holds it by everything else
 
 
 # ---------------------------------------------------------------------------------------------- refused
