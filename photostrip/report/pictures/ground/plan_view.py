@@ -74,9 +74,12 @@ def plan_of(document: Document) -> Plan:
     grid = DrawnGrid(document)
     # centres of independent models need not be known
     photos = [photo for photo in document["photos"] if photo["x"] is not None]
-    # single photos are strips of their own, which ``strips`` does not hold: they are drawn as one
+    # ``strips`` holds the strips that were formed, which are drawn first; photos of others stand for themselves
     names = [strip["id"] for strip in document["strips"]]
-    flown = [[photo for photo in photos if photo["strip"] == name] for name in names] or [photos]
+    by_strip: dict[str, list[Document]] = {name: [] for name in names}
+    for photo in photos:
+        by_strip.setdefault(photo["strip"], []).append(photo)
+    flown = [*by_strip.values()] if names else [photos]  # where all photos are single ones, they are drawn as one strip
     ends = [grid.place(photo) for photo in (flown[0][:1] + flown[0][-1:])] or [(0.0, 0.0)]
     start, end = ends[0], ends[-1]
     length = math.hypot(end[0] - start[0], end[1] - start[1])
