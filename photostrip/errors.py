@@ -11,8 +11,7 @@ Readers collect faults and raise one ``InputError`` for all of them; mathematics
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from photostrip.frozen import dataclass
@@ -99,22 +98,3 @@ class GeometryError(PhotostripError):
         """Points concerned."""
         self.code = code
         """Stable short name of the kind."""
-
-
-@contextmanager
-def faults_instead(file: str, doing: str) -> Iterator[None]:
-    """Turn what a document lacks, or has too much of, into a fault of its file: a user has cut or edited it.
-
-    doing: ``reported`` or ``compared``.
-    """
-    try:
-        yield
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise incomplete(error, file, doing) from None
-
-
-def incomplete(error: Exception, file: str, doing: str, fix: str = "run the project again") -> InputError:
-    """Return the fault of a file whose document is not whole."""
-    what = f"key {error} is missing" if isinstance(error, KeyError) else f"a value is of another kind ({error})"
-    message = f"cannot be {doing}: {what}"
-    return InputError(Fault(message, "result-incomplete", file, expected="a whole result.json", fix=fix))

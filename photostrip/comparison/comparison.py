@@ -15,9 +15,10 @@ from photostrip.comparison.ground import difference_in_plan_and_height, plan_and
 from photostrip.comparison.members import members_of, missing_and_new
 from photostrip.comparison.quantities import ComparedNumber, quantities_of
 from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
-from photostrip.errors import Fault, InputError, incomplete
+from photostrip.errors import Fault, InputError
 from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
+from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
 
 SCHEMA = 1
 # What is ours, what the other numbers are made of, and what is made of them.
@@ -51,15 +52,12 @@ def compare_results(
     """
     _require_comparable(document, baseline, files)
     tolerances = tolerances or Tolerances()
-    try:
+    with faults_of_edited("compared", (document, files[0]), (baseline, files[1]), errors=OF_VALUES):
         numbers = _Numbers(_by_place(document), _by_place(baseline))
         rows = [*_compared(numbers, tolerances), *_located(document, baseline, tolerances)]
         lacking = list(_lacking(numbers, tolerances))
         sets = [_set(kind, document, baseline, tolerances) for kind in SETS]
         name = document["name"]
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        fix = "run the project again, or renew the baseline with --update"
-        raise incomplete(error, _at_fault(document, files), "compared", fix) from None
     kinds = [_kind(kind, rows, tolerances) for kind in UNITS]
     differences = sorted((row for row in rows if row["differs"]), key=_rank)
     different = bool(differences) or any(each["differs"] for each in (*lacking, *sets))
@@ -74,18 +72,6 @@ def compare_results(
         "lacking": lacking,
         "differences": [_without_verdict(row) for row in differences],
     }
-
-
-def _at_fault(document: Document, files: tuple[str, str]) -> str:
-    """Return the file that kept two results from being compared: the result, or else the baseline."""
-    try:
-        list(quantities_of(document))
-        _ = document["name"]
-        for kind in SETS:
-            members_of(document, kind)
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-        return files[0]
-    return files[1]
 
 
 def _require_comparable(document: Document, baseline: Document, files: tuple[str, str]) -> None:

@@ -10,11 +10,12 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.comparison.ground import east_north_up, level, plan_and_height
-from photostrip.errors import Fault, InputError, incomplete
+from photostrip.errors import Fault, InputError
 from photostrip.frozen import replace
 from photostrip.notes import Document
 from photostrip.result.description import Quantity, Table
 from photostrip.result.reading import MOST_FAULTS, faults_of
+from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
 from photostrip.statistics import chi2_quantile
 
 SCHEMA = 1
@@ -51,7 +52,7 @@ def compare_with_truth(document: Document, truth: Document, files: tuple[str, st
     Raises InputError when they are of different strips or frames, or one is not whole.
     """
     _require_whole(truth, files[1])
-    try:
+    with faults_of_edited("compared with the truth", (document, files[0]), errors=OF_VALUES):
         _require_same_frame(document, truth, files)
         return {
             "photostrip_truth_comparison": SCHEMA,
@@ -62,8 +63,6 @@ def compare_with_truth(document: Document, truth: Document, files: tuple[str, st
             "photos": _photos(document, truth),
             "errors": _errors(document["rejected"], truth["errors"]),
         }
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise incomplete(error, files[0], "compared with the truth") from None
 
 
 def _require_whole(truth: Document, file: str) -> None:

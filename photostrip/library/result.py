@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.errors import Fault, InputError, faults_instead
+from photostrip.errors import Fault, InputError
 from photostrip.notes import Document, named
 from photostrip.result.records import as_lists
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import Result as Computed
 
 ReportForm = Literal["text", "md", "html", "json"]
-RESULT = "result.json"
+RESULT, PAGE = "result.json", "report.html"
 
 
 class Result:
@@ -177,10 +177,10 @@ class Result:
 
         sections: names of the sections that are wanted, as those of ``photostrip report --section``.
         everything: False for the short report that the command prints by default; the page always has everything.
-        Raises InputError when HTML is asked for and jinja2 is not installed; ValueError for another form.
+        Raises InputError for a saved result that is not whole; ValueError for another form.
         """
-        from photostrip.report.page import layout, text
-        from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, require_complete, title_of
+        from photostrip.report.sections.accuracy_report import SectionName, sections_of
+        from photostrip.result.statement.edited import as_reported, faults_of_edited
 
         _require_form(form, get_args(ReportForm))
         if form == "json":
@@ -190,17 +190,12 @@ class Result:
         if unknown := sorted(set(sections) - set(SectionName)):
             message = f"the report has no section {', '.join(unknown)}"
             raise InputError(Fault(message, "section", expected=f"one of {', '.join(SectionName)}"))
-        require_complete(self._document, self.name)
-        with faults_instead(self.name, "reported"):
-            if form == "html":
-                from photostrip.report.html import check_html, to_html
-
-                check_html("report")
-                return to_html(self.document)  # its tables are looped over often
-            names = [SectionName(each) for each in sections]
-            chosen = chosen_sections(self._document, names=names, everything=everything, width=layout.USUAL)
-            title = "" if sections else title_of(self._document)
-            return text.to_markdown(title, chosen) if form == "md" else text.to_text(title, chosen, layout.USUAL)
+        if self.computed is not None:
+            return _rendered(self._document, form, sections, everything=everything)
+        with faults_of_edited("reported", (self._document, self.name)):
+            document = as_reported(self._document, self.name)
+            sections_of(document, everything=True)  # what is incomplete is refused, whatever is asked for
+            return _rendered(document, form, sections, everything=everything)
 
     def statement(
         self,
@@ -224,8 +219,7 @@ class Result:
             from photostrip.project.profiles.classes import load_classes
 
             classes = load_classes(Path(profile))[0]
-        with faults_instead(self.name, "stated"):
-            return statement_document(self._document, self.name, classes_cm, classes, required)
+        return statement_document(self._document, self.name, classes_cm, classes, required)
 
     def trace(self, form: str = "text") -> str:
         """Return every iteration with the symbols of the formulas, as text, Markdown (``md``) or JSON.
@@ -249,26 +243,26 @@ class Result:
 
     def files(self, *, html: bool = False) -> dict[str, str]:
         """Return the files of the result, content by name: tables, the report as a page, result.json as the last."""
-        return {name: "".join(pieces) for name, pieces in self._files(html=html).items()}
+        page = {PAGE: self.report("html")} if html else {}
+        return page | {name: "".join(pieces) for name, pieces in self._files().items()}
 
-    def _files(self, *, html: bool) -> dict[str, Iterable[str]]:
+    def _files(self) -> dict[str, Iterable[str]]:
         from photostrip.formats.output.result_files import beside_json
         from photostrip.formats.output.result_json import json_pieces
 
-        pages = {"report.html": [self.report("html")]} if html else {}
         tables = beside_json(self._document, self._resolved, self.computed)
-        return pages | tables | {RESULT: json_pieces(self._document)}
+        return tables | {RESULT: json_pieces(self._document)}
 
     def pictures(self) -> dict[str, str]:
         """Return the pictures of the report as SVG, content by file name."""
         from photostrip.report.pictures.result.pictures import picture_files
 
-        with faults_instead(self.name, "reported"):
-            return picture_files(self.document)
+        return picture_files(self.document)
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> tuple[str, ...]:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none.
 
+        Where the report as a page fails, the others are written, and the error is raised then.
         Returns their names.
         Raises InputError where a file that the run read would be replaced.
         """
@@ -276,8 +270,15 @@ class Result:
 
         from photostrip.formats.text.writing import write_files
 
-        files = self._files(html=html)
-        write_files(Path(folder), files, map(Path, self._read))
+        page: dict[str, Iterable[str]] = {}
+        try:
+            if html:
+                page = {PAGE: [self.report("html")]}
+        finally:
+            files = page | self._files()
+            write_files(Path(folder), files, map(Path, self._read))
+            if html and not page:  # that of an earlier result would not be of this one
+                (Path(folder) / PAGE).unlink(missing_ok=True)
         return tuple(files)
 
     def __repr__(self) -> str:
@@ -300,6 +301,20 @@ class Result:
         table = f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>" if rows else ""
         verdict = f"<p><b>{escape(self.name)}: {self.status.upper()}</b> {escape(self.accuracy)}</p>"
         return verdict + table
+
+
+def _rendered(document: Document, form: ReportForm, sections: Sequence[str], *, everything: bool) -> str:
+    if form == "html":
+        from photostrip.report.html import to_html
+
+        return to_html(as_lists(document))  # its tables are looped over often
+    from photostrip.report.page import layout, text
+    from photostrip.report.sections.accuracy_report import SectionName, chosen_sections, title_of
+
+    names = [SectionName(each) for each in sections]
+    chosen = chosen_sections(document, names=names, everything=everything, width=layout.USUAL)
+    title = "" if sections else title_of(document)
+    return text.to_markdown(title, chosen) if form == "md" else text.to_text(title, chosen, layout.USUAL)
 
 
 def _require_form(form: str, known: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ from photostrip.formats.text.source import Source, digest, reading_from, seen_fr
 from photostrip.library.project import loaded_from
 from photostrip.notes import Document
 from photostrip.project.yaml.parsing import LARGEST_PROJECT
-from photostrip.result.statement.certificate import result_hash
+from photostrip.result.statement.edited import is_edited
 
 SCHEMA = 1
 SAME, DIFFERENT = "same", "different"
@@ -48,7 +48,7 @@ def verify(result: Path, project: Path | None = None) -> Document:
         "result": file,
         "project": str(place),
         "name": document["name"],
-        "edited": result_hash(document) != certificate["result_sha256"],
+        "edited": is_edited(document),
         "inputs": [],
         "grids": [],
         "versions": [],

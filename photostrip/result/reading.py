@@ -14,7 +14,7 @@ from math import hypot
 from types import NoneType
 from typing import Any, ClassVar
 
-from photostrip.errors import Fault
+from photostrip.errors import Fault, InputError
 from photostrip.result.description import Quantity, Table, described
 
 LARGEST_NUMBER = 1e100  # its square is a number yet
@@ -46,22 +46,25 @@ Wrong = tuple[str, str, str]  # key, what is wrong with it, what is expected the
 
 
 class Located(dict[str, Any]):
-    """A block of a result that knows the document it stands in, and says which keys lead to one that it lacks."""
+    """A block of a saved result, which says of what file it is and which keys lead to one that it lacks."""
 
     __slots__ = ()
     document: ClassVar[list[Any]]  # the only element; of a class for the blocks of each document
+    file: ClassVar[str]
 
     def __missing__(self, key: str) -> Any:  # noqa: ANN401 (it never returns)
         path = next(_paths_to(self, self.document[0], ""), "")
-        raise KeyError(f"{path}.{key}" if path else key)
+        message = f"key '{path}.{key}' is missing" if path else f"key '{key}' is missing"
+        fix = "run the project again"
+        raise InputError(Fault(message, "result-incomplete", self.file, expected="a whole result.json", fix=fix))
 
-    def __reduce__(self) -> tuple[Callable[[dict[str, Any]], Any], tuple[dict[str, Any]]]:
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         """Travel and be copied as a dictionary: the class is known to this document only."""
-        return _found_again if self is self.document[0] else dict, (dict(self),)
+        return (_found_again, (dict(self), self.file)) if self is self.document[0] else (dict, (dict(self),))
 
 
-def located(made: Callable[[type[Located]], Any]) -> Any:  # noqa: ANN401 (any document)
-    """Give a document whose blocks know it.
+def located(made: Callable[[type[Located]], Any], file: str) -> Any:  # noqa: ANN401 (any document)
+    """Give the document of a file, whose blocks know it.
 
     made: makes the document with the class of its blocks, which takes the dictionary of each.
     """
@@ -70,6 +73,7 @@ def located(made: Callable[[type[Located]], Any]) -> Any:  # noqa: ANN401 (any d
         __slots__ = ()
         document: ClassVar[list[Any]] = []
 
+    Block.file = file
     Block.document.append(made(Block))
     return Block.document[0]
 
@@ -81,8 +85,8 @@ def made_anew(value: Any, block: type[Located]) -> Any:  # noqa: ANN401 (any par
     return [made_anew(each, block) for each in value] if isinstance(value, list) else value
 
 
-def _found_again(document: dict[str, Any]) -> Any:  # noqa: ANN401 (any document)
-    return located(lambda block: made_anew(document, block))
+def _found_again(document: dict[str, Any], file: str) -> Any:  # noqa: ANN401 (any document)
+    return located(lambda block: made_anew(document, block), file)
 
 
 def _paths_to(block: Located, value: object, path: str) -> Iterator[str]:

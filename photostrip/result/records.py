@@ -141,7 +141,8 @@ class Records(Sequence[dict[str, Any]]):
 def as_lists(value: Plain) -> Plain:
     """Return a document with lists of records in place of columns, as it is read again."""
     if isinstance(value, dict):
-        return {key: as_lists(each) for key, each in value.items()}
+        found = {key: as_lists(each) for key, each in value.items()}
+        return value if all(found[key] is each for key, each in value.items()) else found  # saved ones hold lists
     return list(value) if isinstance(value, Records) else value
 
 

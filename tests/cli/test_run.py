@@ -363,8 +363,7 @@ def test_a_damaged_result_is_refused_in_words(result: Path, tmp_path: Path, caps
     code, out, err = run(capsys, "report", file)
     assert (code, out) == (2, "")
     assert err == (
-        f"error: {file}: cannot be reported: key 'models[0].sigma0_um' is missing; expected a whole result.json; "
-        "run the project again\n"
+        f"error: {file}: key 'models[0].sigma0_um' is missing; expected a whole result.json; run the project again\n"
     )
 
 
@@ -373,7 +372,7 @@ def test_report_needs_no_mathematics(result: Path) -> None:
     code = (
         "import sys\nfrom photostrip.cli.main import main\n"
         f"assert main(['report', {str(result)!r}]) == 0\n"
-        "sys.exit(str({'numpy', 'scipy', 'pyproj', 'yaml', 'rich'} & sys.modules.keys()))"
+        "sys.exit(str({'scipy', 'pyproj', 'yaml', 'rich'} & sys.modules.keys()))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.stderr.strip() == "set()"

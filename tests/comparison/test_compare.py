@@ -19,6 +19,7 @@ from photostrip.comparison.ground import plan_and_height
 from photostrip.comparison.tolerances import UNITS
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import to_json
+from photostrip.library.comparison import compare
 from tests.loops import nonempty
 from tests.results import case
 
@@ -377,8 +378,8 @@ def test_another_strip_is_not_compared() -> None:
 def test_a_document_that_is_not_whole_is_refused() -> None:
     now, before = documents()
     del now["models"]
-    with pytest.raises(InputError, match="key 'models' is missing"):
-        compare_results(now, before)
+    with pytest.raises(InputError, match="the result: key 'models' is missing"):
+        compare(now, before)
 
 
 def test_worst_comes_first() -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 from copy import deepcopy
 from random import Random
 
 import pytest
 
+from photostrip.errors import InputError
 from photostrip.result.description import described
 from photostrip.result.reading import _blocks_right, _wrong, located
 from tests.edited_results import edited
@@ -76,14 +78,14 @@ def test_columns_are_right_where_their_values_are(text: str, right: bool) -> Non
 
 def test_a_key_that_is_missing_is_told_after_a_copy_too() -> None:
     document = located(
-        lambda block: json.loads('{"summary": {"check": {}}, "points": [{"x": 1.0}]}', object_hook=block)
+        lambda block: json.loads('{"summary": {"check": {}}, "points": [{"x": 1.0}]}', object_hook=block), "one.json"
     )
-    other = located(lambda block: json.loads('{"check": {}}', object_hook=block))
+    other = located(lambda block: json.loads('{"check": {}}', object_hook=block), "other.json")
     for found in (document, deepcopy(document), pickle.loads(pickle.dumps(document))):  # noqa: S301 (our own)
         assert found == document
         for block, path in ((found["summary"]["check"], "summary.check.rms"), (found["points"][0], "points[0].rms")):
-            with pytest.raises(KeyError, match=path.replace("[", r"\[")):
+            with pytest.raises(InputError, match=rf"one\.json: key '{re.escape(path)}' is missing"):
                 block["rms"]
-    with pytest.raises(KeyError, match=r"'check\.rms'"):  # each document has blocks of its own
+    with pytest.raises(InputError, match=r"other\.json: key 'check\.rms'"):  # each document has blocks of its own
         other["check"]["rms"]
     assert type(deepcopy(document["points"])[0]) is dict

@@ -41,7 +41,7 @@ def compare(
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.jobs import baseline as baseline_job
-    from photostrip.errors import EXIT_DONE, EXIT_INPUT, EXIT_TOLERANCE, faults_instead
+    from photostrip.errors import EXIT_DONE, EXIT_INPUT, EXIT_TOLERANCE
     from photostrip.library.comparison import compare as compared
     from photostrip.project.profiles.tolerances import load_tolerances
     from photostrip.report.commands.comparisons import TRUTH
@@ -58,8 +58,7 @@ def compare(
         if TRUTH in found and form in {CompareFormat.JUNIT, CompareFormat.GITHUB}:
             message = "true errors have no tolerances that a test could keep: text, md or json"
             raise typer.BadParameter(message, param_hint="--format")
-        with faults_instead(str(result), "compared"):
-            _print(found, form, width, quiet=quiet, verbose=verbose)
+        _print(found, form, width, quiet=quiet, verbose=verbose)
     return {"refused": EXIT_INPUT, "different": EXIT_TOLERANCE}.get(found.get("status", ""), EXIT_DONE)
 
 

@@ -31,10 +31,11 @@ def report(  # noqa: PLR0913, PLR0917 (an argument for each option)
     whatever the verdict, as the report of a failed result is a report; with --strict it is 1 unless the verdict is
     GOOD.
     """
-    from photostrip.errors import EXIT_DONE, faults_instead
+    from photostrip.errors import EXIT_DONE
     from photostrip.formats.output.result_json import read_result
     from photostrip.formats.text.writing import write_files, write_text
-    from photostrip.report.sections.accuracy_report import require_complete
+    from photostrip.report.sections.accuracy_report import sections_of
+    from photostrip.result.statement.edited import as_reported, faults_of_edited
     from photostrip.result.verdict import exit_code
 
     page = output is not None and form is None and output.suffix.lower() == HTML
@@ -42,9 +43,10 @@ def report(  # noqa: PLR0913, PLR0917 (an argument for each option)
     parts = Parts(quiet, verbose, section or ())
     refuse_sections(section, "HTML" if page else wanted)
     file = str(result / "result.json" if result.is_dir() else result)
-    document = read_result(file)
-    require_complete(document, file)
-    with faults_instead(file, "reported"):
+    saved = read_result(file)
+    with faults_of_edited("reported", (saved, file)):
+        document = as_reported(saved, file)
+        sections_of(document, everything=True)  # what is incomplete is refused, whatever is printed
         if plots is not None:
             from photostrip.report.pictures.result.pictures import picture_files
 
@@ -52,9 +54,8 @@ def report(  # noqa: PLR0913, PLR0917 (an argument for each option)
         if output is None:
             print_result(document, wanted, width, parts)
         elif page:
-            from photostrip.report.html import check_html, to_html
+            from photostrip.report.html import to_html
 
-            check_html("--output")
             write_text(output, to_html(document))
         else:
             write_text(output, report_text(document, wanted, width, parts))

@@ -19,14 +19,14 @@ from photostrip.report.commands.compare import headline
 
 @contextmanager
 def told_how_to_write(baseline: Path) -> Iterator[None]:
-    """Where there is no baseline, let the fault say how it comes to be."""
+    """Where there is no baseline, or none that is whole, let the fault say how it comes to be."""
     place = str(place_of(baseline))
     try:
         yield
     except InputError as error:
         raise InputError(
             replace(fault, fix=f"{fault.fix + '; ' if fault.fix else ''}--update writes it")
-            if fault.code == "file-missing" and fault.file == place
+            if fault.code in {"file-missing", "result-incomplete"} and fault.file == place
             else fault
             for fault in error.faults
         ) from None

@@ -148,7 +148,7 @@ def read_result(file: str) -> Document:
 def _located(file: str) -> Any:  # noqa: ANN401 (any JSON)
     from photostrip.result.reading import located
 
-    return located(lambda block: parsed(file, block))
+    return located(lambda block: parsed(file, block), file)
 
 
 def checked(document: Any, file: str) -> Document:  # noqa: ANN401 (any JSON)
@@ -173,5 +173,5 @@ def checked(document: Any, file: str) -> Document:  # noqa: ANN401 (any JSON)
         raise InputError(faults)
     if isinstance(document, Located):
         return document
-    whole: Document = located(lambda block: made_anew(document, block))  # of a script
+    whole: Document = located(lambda block: made_anew(document, block), file)  # of a script
     return whole

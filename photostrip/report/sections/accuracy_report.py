@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from enum import StrEnum
 
-from photostrip.errors import faults_instead
 from photostrip.notes import Document
 from photostrip.report.page.layout import USUAL
 from photostrip.report.page.parts import Section, Words
@@ -157,13 +156,6 @@ def chosen_sections(
     if quiet:
         return (Section("", (Words(last, document["status"]), accuracy(document))),)
     return (*(sections_of(document, everything=True) if everything else overview(document, width)), end)
-
-
-def require_complete(document: Document, file: str) -> None:
-    """Refuse a document whose file a user has cut or edited so that it cannot be reported."""
-    with faults_instead(file, "reported"):
-        title_of(document)
-        sections_of(document, everything=True)
 
 
 def title_of(document: Document) -> str:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, Fault, InputError
 from photostrip.notes import Document, listed
-from photostrip.result.statement.certificate import result_hash
 from photostrip.result.statement.classes import ClassProfile, classified
+from photostrip.result.statement.edited import EDITED, is_edited
 from photostrip.result.statement.stating import NOT_MET, REFUSED, STANDARD, TESTED, stated
 
 SCHEMA = 1
@@ -45,9 +45,8 @@ def statement_document(
         raise InputError(Fault("holds nothing on its check points", "result-incomplete", file, fix=fix))
     if not document.get("certificate"):
         raise InputError(Fault("has no certificate", "no-certificate", file, fix=fix))
-    if result_hash(document) != document["certificate"]["result_sha256"]:
-        message = "its numbers are not those of its certificate: it was edited, no accuracy can be stated"
-        raise InputError(Fault(message, "result-edited", file, fix=fix))
+    if is_edited(document):
+        raise InputError(Fault(f"no accuracy can be stated: {EDITED}", "result-edited", file, fix=fix))
     # reasons that depend on the class are found anew for the class that is claimed
     reasons = [each for each in document["statement"]["reasons"] if each["code"] != "statement-survey"]
     block = stated({**document["statement"], "reasons": reasons}, wanted)

@@ -45,7 +45,6 @@ def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
     .json.
     """
     from photostrip.cli.failures import failures_as
-    from photostrip.errors import faults_instead
     from photostrip.formats.output.result_json import read_result
     from photostrip.project.profiles.classes import load_classes
     from photostrip.result.statement.accuracy_statement import exit_code, statement_document
@@ -56,7 +55,7 @@ def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
     wanted = Format(form.value) if form else form_of(output) if output is not None and not page else Format.TEXT
     given = {"plan": class_plan, "height": class_height}
     file = str(result / "result.json" if result.is_dir() else result)
-    with failures_as(wanted), faults_instead(file, "stated"):
+    with failures_as(wanted):
         classes = None if profile is None else load_classes(profile)[0]
         asked = {part: size for part, size in given.items() if size is not None}
         found = statement_document(read_result(file), file, asked, classes, require)
@@ -74,10 +73,9 @@ def statement(  # noqa: PLR0913, PLR0917 (an argument for each option)
 
 
 def _page(found: Document) -> str:
-    from photostrip.report.html import check_html, sections_html
+    from photostrip.report.html import sections_html
     from photostrip.report.statements.statement import statement_report
 
-    check_html("--output")
     title, sections = statement_report(found)
     return sections_html(title, found["version"], sections)
 

@@ -30,12 +30,12 @@ def verify(
     is not found. Other versions of photostrip and its libraries are named.
     """
     from photostrip.cli.failures import failures_as
-    from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, faults_instead
+    from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
     from photostrip.library.verification import SAME
     from photostrip.library.verification import verify as verified
     from photostrip.report.commands.verification import verification_report
 
-    with failures_as(Format(form.value)), faults_instead(str(result), "verified"):
+    with failures_as(Format(form.value)):
         found = verified(result, project)
         if form is StatementFormat.JSON:
             print_json(found)
