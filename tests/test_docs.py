@@ -26,6 +26,13 @@ def test_the_page_does_what_it_shows(page: Path, tmp_path: Path, forked: Path) -
     assert "\n".join(faults_of_page(page, tmp_path, None if page.name in WITHOUT_FORKS else forked)) == ""
 
 
+def test_the_first_commands_set_everything_up() -> None:
+    first = next(block for block in blocks(ROOT / "README.md") if block.kind == "sh")
+    assert [line.split("#")[0].strip() for line in first.lines] == ["make demo", "make test"]
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "install" not in text[: text.index("make demo")]
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page: Path) -> None:
     targets = LINK.findall(page.read_text(encoding="utf-8"))

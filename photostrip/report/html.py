@@ -11,9 +11,7 @@ from base64 import b64encode
 from collections.abc import Iterable, Iterator, Sequence
 from hashlib import sha256
 from importlib import resources
-from importlib.util import find_spec
 
-from photostrip.errors import Fault, InputError
 from photostrip.notes import Document
 from photostrip.report.commands.batch import batch_page_sections
 from photostrip.report.commands.methods import methods_sections
@@ -25,19 +23,7 @@ from photostrip.report.pictures.svg import Picture
 from photostrip.report.sections.accuracy_report import named_sections, title_of
 from photostrip.visible import visible
 
-INSTALL = "pip install 'photostrip[report]'"
 FOREMOST = "verdict", "findings"  # sections before the pictures
-
-
-def check_html(key: str = "--html") -> None:
-    """Refuse HTML without jinja2, before anything is computed."""
-    try:
-        found = find_spec("jinja2") is not None
-    except ValueError:  # put out of action: sys.modules["jinja2"] is None
-        found = False
-    if not found:
-        message = "a report as HTML needs jinja2, which is not installed"
-        raise InputError(Fault(message, "extra", key=key, fix=INSTALL))
 
 
 def to_html(document: Document) -> str:

@@ -6,7 +6,6 @@ import copy
 import json
 import math
 import re
-import sys
 from functools import cache
 from html.parser import HTMLParser
 from typing import TYPE_CHECKING, Any
@@ -361,19 +360,3 @@ def test_what_to_look_at_leads_to_the_rows_of_its_points() -> None:
 def test_html_needs_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", str(write_project(tmp_path, spec())), "--html"]) == 2
     assert "--output" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("command", ["run", "report"])
-def test_without_the_extra_the_way_to_it_is_told_before_anything_is_done(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
-) -> None:
-    project = write_project(tmp_path, spec())
-    assert main(["run", str(project), "-o", str(tmp_path / "out"), "--quiet"]) == 0
-    monkeypatch.setitem(sys.modules, "jinja2", None)
-    if command == "run":
-        code = main(["run", str(project), "-o", str(tmp_path / "new"), "--html"])
-    else:
-        code = main(["report", str(tmp_path / "out"), "-o", str(tmp_path / "new/report.html")])
-    assert code == 2
-    assert "jinja2, which is not installed; pip install 'photostrip[report]'" in capsys.readouterr().err
-    assert not (tmp_path / "new").exists()

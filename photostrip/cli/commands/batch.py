@@ -61,12 +61,8 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.errors import Fault, InputError
 
     require_target(depfile, output)
-    if html:
-        if output is None:
-            raise typer.BadParameter("summary.html needs a folder: give --output as well", param_hint="--html")
-        from photostrip.report.html import check_html
-
-        check_html()
+    if html and output is None:
+        raise typer.BadParameter("summary.html needs a folder: give --output as well", param_hint="--html")
     if executor != "local" and not executor.startswith("dask:"):
         raise typer.BadParameter(f"'{executor}' is not 'local' and does not begin with 'dask:'", param_hint="executor")
     try:

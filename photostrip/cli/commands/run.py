@@ -67,10 +67,6 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
 
         return compare_methods(project, assignments, output, form, width, messages, html=html)
     with failures_as(form), progress(sys.stderr, quiet=quiet) as waiting:
-        if html:
-            from photostrip.report.html import check_html
-
-            check_html()
         waiting.at(f"reading {project}")
         read = loaded_from(project, assignments)
         inputs = read.loaded.inputs

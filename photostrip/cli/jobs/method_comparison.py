@@ -41,10 +41,6 @@ def compare_methods(
     failures: list[PhotostripError] = []
     name = ""
     with failures_as(form), progress(sys.stderr, quiet=messages.quiet) as waiting:
-        if html:
-            from photostrip.report.html import check_html, methods_html
-
-            check_html()
         stages = Stages("pairs", "strip", "control", "covariance", "shifted", "failure")
         for adjustment in METHODS:
             waiting.at(f"adjusting: {adjustment}")
@@ -68,6 +64,8 @@ def compare_methods(
             chosen = []
         document = methods_document(name, found, chosen)
         if html and output is not None:
+            from photostrip.report.html import methods_html
+
             write_text(output / "methods.html", methods_html(document))
     if form is Format.JSON:
         print_json(document)
