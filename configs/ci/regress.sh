@@ -6,7 +6,7 @@
 # PHOTOSTRIP  the command                      (default photostrip)
 # TOLERANCES  a tolerance profile              (default: the last digits)
 # STRICT      not empty: a verdict other than GOOD is an error, too
-# FORMAT      text, or github for annotations  (default text)
+# FORMAT      text; md, json; github for annotations; junit, as in compare.xml  (default text)
 #
 # OUT/NAME/compare.xml is JUnit for the server's table of tests. All strips are done; the exit code is the worst of
 # them: 0 all agree; 1 a tolerance failed, a result differs, or STRICT and a verdict that is not GOOD; 2 faults in files; 3 a geometry is too weak.
@@ -21,7 +21,12 @@ keep_worst() { [ "$1" -le "$worst" ] || worst=$1; }
 one_strip() {
     local name=$1 code=0 where=$strips/$1
     [ "$format" != text ] || printf '== %s\n' "$name"
-    $photostrip run "$where/project.yaml" -o "$out/$name" --quiet --format "$format" $strict || code=$?
+    local run=("$where/project.yaml" -o "$out/$name" --quiet $strict)
+    if [ "$format" = junit ]; then # of comparisons only: the verdict goes to stderr
+        $photostrip run "${run[@]}" --format text >&2 || code=$?
+    else
+        $photostrip run "${run[@]}" --format "$format" || code=$?
+    fi
     keep_worst "$code"
     [ "$code" -le 1 ] && [ -e "$where/baseline.json" ] || return 0
     local compare=("$out/$name" "$where/baseline.json" --quiet)

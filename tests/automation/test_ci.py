@@ -99,3 +99,16 @@ def test_the_script_goes_on_after_a_failure_and_ends_with_the_worst_code(tmp_pat
 def test_the_script_refuses_an_empty_folder(tmp_path: Path) -> None:
     done = run_script(tmp_path, "photostrip")
     assert (done.returncode, done.stderr) == (2, "no ./*/project.yaml\n")
+
+
+@pytest.mark.slow
+def test_the_script_writes_junit(tmp_path: Path, forked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_project(tmp_path / "line", spec())
+    write = [str(forked), "run", str(tmp_path / "line/project.yaml"), "-o", str(tmp_path / "whole"), "-q"]
+    subprocess.run(write, capture_output=True, check=True)
+    shutil.copy(tmp_path / "whole/result.json", tmp_path / "line/baseline.json")
+    monkeypatch.setenv("FORMAT", "junit")
+    done = run_script(tmp_path, forked)
+    assert (done.returncode, done.stderr.startswith("GOOD")) == (0, True), done.stderr
+    assert done.stdout == (tmp_path / "build/line/compare.xml").read_text(encoding="utf-8")
+    assert ET.fromstring(done.stdout).get("failures") == "0"  # noqa: S314 (our own)
