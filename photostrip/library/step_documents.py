@@ -32,7 +32,7 @@ def interior(ids: Sequence[str], found: Interior) -> Document:
     """Return an interior orientation: the coefficients of both axes, and the residuals of the marks."""
     names = ("x", "y", "x y", "1")
     rows = zip(("x", "y", "denominator"), found.transform.coefficients, strict=True)
-    values = [_value(f"{axis}: {term}", c) for axis, row in rows for term, c in zip(names, row, strict=True) if c]
+    values = [_coefficient(f"{axis}: {term}", c) for axis, row in rows for term, c in zip(names, row, strict=True) if c]
     values += _fit(found.sigma0 * MICROMETRES, "um", found.redundancy)
     return _document("interior", values, ids, _image_residuals(found.residuals))
 
@@ -109,7 +109,7 @@ def polynomial(
     ids: Sequence[str], terms: Sequence[str], coefficients: Floats, residuals: Floats, unit: str
 ) -> Document:
     """Return the coefficients of a polynomial, and what it leaves."""
-    values = [_value(term, coefficient) for term, coefficient in zip(terms, coefficients, strict=True)]
+    values = [_coefficient(term, coefficient) for term, coefficient in zip(terms, coefficients, strict=True)]
     redundancy = len(ids) - len(values)
     values += _fit(sigma0_of(residuals, redundancy), unit, redundancy)
     return _document("polynomial", values, ids, [("v", unit, 4, residuals)])
@@ -126,6 +126,11 @@ def resection(ids: Sequence[str], found: OrientedPhoto, unit: str) -> Document:
 
 def _value(name: str, value: float, unit: str = "", sigma: float | None = None) -> Document:
     return {"name": name, "value": _number(value), "unit": unit, "sigma": None if sigma is None else _number(sigma)}
+
+
+def _coefficient(name: str, value: float) -> Document:
+    """Return a value that is shown as it stands: what it multiplies is larger than what the result is good for."""
+    return _value(name, value) | {"digits": DIGITS}
 
 
 def _fit(sigma0: float, unit: str, redundancy: int) -> list[Document]:

@@ -562,3 +562,18 @@ def test_a_missing_table_and_wrong_numbers_are_told(tmp_path: Path, capsys: pyte
     (tmp_path / "points.csv").write_text("point,x,y\n1,2,3\n", encoding="utf-8")
     assert main(["step", "refine", str(tmp_path / "points.csv"), "-f", "153", "--k", "1,nan,0"]) == 2
     assert "'1,nan,0' is not 3 numbers with commas between them" in capsys.readouterr().err
+
+
+def test_the_coefficients_of_an_interior_orientation_can_be_used_as_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measured = np.array([[100.012, -99.982], [-111.97, -100.01], [-112.0, 112.03], [100.03, 112.05]])
+    calibrated = np.array([[106.0, -106.0], [-106.0, -106.0], [-106.0, 106.0], [106.0, 106.0]])
+    marks = table(tmp_path / "marks.csv", "mark x y x_photo y_photo", ["1", "2", "3", "4"], measured, calibrated)
+    assert main(["step", "interior", marks]) == 0
+    lines = [line.rsplit(None, 1) for line in capsys.readouterr().out.splitlines() if line[:3] in {"x: ", "y: "}]
+    printed = {name: float(value) for name, value in lines}
+    terms = {"x": measured[:, 0], "y": measured[:, 1], "1": np.ones(4)}
+    by_hand = np.array([sum(printed[f"{axis}: {term}"] * terms[term] for term in terms) for axis in "xy"]).T
+    fitted = calibrated + steps.interior(measured, calibrated).residuals
+    assert np.abs(by_hand - fitted).max() < 1e-6  # mm; of four decimals 0.004

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from photostrip.notes import Document
-from photostrip.report.page.numbers import fixed, power
+from photostrip.report.page.numbers import fixed, power, short
 from photostrip.report.page.parts import DASH, Facts, Part, Section, Words
 from photostrip.report.page.tables import Shown, number, tabulated, words
 
@@ -67,6 +67,8 @@ def _cell(place: int, row: list[float]) -> float:
 def _written(value: Document) -> str:
     if value["value"] is None:
         return DASH
+    if "digits" in value:
+        return short(value["value"], value["digits"])
     digits = 6 if value["unit"] == "deg" else 4
     text = str(value["value"]) if isinstance(value["value"], int) else _digits(value["value"], digits)
     sigma = "" if value["sigma"] is None else f" ± {_digits(value['sigma'], digits)}"
