@@ -8,9 +8,8 @@ others; so a result that was interrupted, mixed with an older one, edited or dam
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.output.batch import SCHEMA, parsed_record, record_text
 from photostrip.formats.text.files import LARGEST_FILE, from_disk
 from photostrip.formats.text.source import digest
-from photostrip.formats.text.writing import write_files
+from photostrip.formats.text.writing import sweep, write_files
 from photostrip.notes import Document
 
 LOCK = ".batch.lock"
@@ -29,7 +28,6 @@ RECORD = "batch.json"
 PAGE = "report.html"
 SUMMARIES = ("summary.txt", "summary.csv", "summary.json", "summary.html", "junit.xml")
 LIBRARIES = ("numpy", "scipy", "pyproj")  # whose version can change a number
-_TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
 
 
 @cache
@@ -59,7 +57,7 @@ class ResultFolder:
         with_page: whether its report must be there as a page, too.
         """
         place = self.path / chosen.output
-        _sweep(place)
+        sweep(place)
         record = self._record(place)
         if record is None or record["program"] != program() or record["set"] != self.overrides:
             return None
@@ -113,13 +111,13 @@ class ResultFolder:
             "outputs": {name: digest(text.encode()) for name, text in sorted(answer.files.items())},
             "outcome": answer.outcome,
         }
-        _sweep(place)
+        sweep(place)
         read = [name for name, content in answer.inputs.items() if content is not None]
         write_files(place, {**answer.files, RECORD: record_text(record)}, read)
 
     def forget_summaries(self) -> None:
         """Remove the summary of an earlier batch, which would not be true while this one runs, or if it is killed."""
-        _sweep(self.path)
+        sweep(self.path)
         for name in SUMMARIES:
             (self.path / name).unlink(missing_ok=True)
 
@@ -154,14 +152,6 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[ResultFolder]:
         folder = ResultFolder(path, overrides)
         folder.forget_summaries()
         yield folder
-
-
-def _sweep(folder: Path) -> None:
-    """Remove temporary files that a batch left behind when it was killed."""
-    with suppress(OSError), os.scandir(folder) as entries:  # what cannot be removed does no harm
-        for entry in entries:
-            if _TEMPORARY.fullmatch(entry.name):
-                Path(entry.path).unlink()
 
 
 def _is(file: Path, content: str | None) -> bool:

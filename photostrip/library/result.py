@@ -268,8 +268,9 @@ class Result:
         """
         from pathlib import Path
 
-        from photostrip.formats.text.writing import write_files
+        from photostrip.formats.text.writing import sweep, write_files
 
+        sweep(Path(folder))
         page: dict[str, Iterable[str]] = {}
         try:
             if html:

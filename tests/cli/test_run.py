@@ -367,6 +367,22 @@ def test_a_damaged_result_is_refused_in_words(result: Path, tmp_path: Path, caps
     )
 
 
+def test_what_a_killed_run_left_behind_is_removed_by_the_next(project: Path, tmp_path: Path) -> None:
+    dying = "import os; from photostrip.formats.text import writing; from photostrip.cli.main import main\n"
+    dying += (
+        f"writing._rename = lambda _: os.kill(os.getpid(), 9)\nmain(['run', {str(project)!r}, '-o', 'out', '--html'])"
+    )
+    done = subprocess.run([sys.executable, "-c", dying], cwd=tmp_path, capture_output=True, check=False)
+    assert done.returncode == -9
+    left = [path.name for path in (tmp_path / "out").iterdir()]
+    assert len(left) > 5
+    assert all(name.endswith(".tmp") for name in left)
+    at_work = tmp_path / f"out/.points.csv.{os.getppid()}.tmp"  # of a process that is there
+    at_work.write_text("half", encoding="utf-8")
+    assert main(["run", str(project), "-o", str(tmp_path / "out"), "-q"]) == 0
+    assert [path for path in (tmp_path / "out").iterdir() if path.suffix == ".tmp"] == [at_work]
+
+
 @pytest.mark.slow
 def test_report_needs_no_mathematics(result: Path) -> None:
     code = (

@@ -18,6 +18,7 @@ from photostrip.errors import Fault, InputError
 Content = str | bytes | Iterable[str]  # the last: a text in pieces, each made when it is written
 
 PIECE = 1_000_000  # characters that are encoded at a time
+TEMPORARY = re.compile(r"\..+\.(\d{1,9})\.tmp")  # with the process that writes it
 
 
 def write_text(path: Path, text: str | bytes, read: Iterable[str | Path] = ()) -> None:
@@ -65,6 +66,29 @@ def write_files(folder: Path, files: Mapping[str, Content], read: Iterable[str |
             with suppress(OSError):
                 temporary.unlink()
         raise
+
+
+def sweep(folder: Path) -> None:
+    """Remove the temporary files of processes that were killed while they wrote into a folder."""
+    with suppress(OSError), os.scandir(folder) as entries:  # what cannot be removed does no harm
+        for entry in entries:
+            found = TEMPORARY.fullmatch(entry.name)
+            if found and not _at_work(int(found[1])):
+                Path(entry.path).unlink()
+
+
+def _at_work(process: int) -> bool:
+    """Whether another process, which may be writing just now, is there; where the system cannot be asked, it is."""
+    if process == os.getpid():  # of an earlier one with the same number, as in a container
+        return False
+    if os.name == "posix":
+        try:
+            os.kill(process, 0)  # sends nothing
+        except ProcessLookupError:
+            return False
+        except PermissionError:  # of another user
+            return True
+    return True
 
 
 def _rename(waiting: Iterable[tuple[Path, Path]]) -> None:
