@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.formats.measured.control import ControlTable
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable
 from photostrip.formats.measured.measurements import Measurements
+from photostrip.formats.text.findings import meant
 from photostrip.formats.text.tables import Table
 from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Note, counted, listed
@@ -298,5 +299,5 @@ def _twins(near: dict[str, str]) -> str:
     """Say which other names may be meant."""
     if not near:
         return ""
-    pairs = [f"`{name}`, did you mean `{twin}`?" for name, twin in list(near.items())[:NEAR_NAMED]]
+    pairs = [f"`{name}`, {meant(name, twin)}" for name, twin in list(near.items())[:NEAR_NAMED]]
     return "; " + " ".join(pairs)

@@ -14,7 +14,7 @@ from photostrip.formats.measured.control import ControlTable, read_control, refu
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable, read_orientations, read_positions
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.measured.observations import Manner, read_measurements
-from photostrip.formats.text.findings import Findings, suggestion
+from photostrip.formats.text.findings import Findings, meant, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.frozen import dataclass, replace
@@ -146,7 +146,7 @@ def _some_photo(
     if not known or known & set(read.ids) or not len(read.table):
         return
     near = alike([photo.id for photo in photos], read.ids)
-    named = f"; did you mean `{next(iter(near.values()))}`?" if near else ""
+    named = f"; {meant(*next(iter(near.items())))}" if near else ""
     message = f"{read.table.file} has none of the photos of the strips; its photos are {listed(read.ids, 4)}{named}"
     fix = "write the ids of the photos the same way in both files"
     yield fault_at(root, (section, "file"), message, "not-measured", fix=fix)
@@ -168,7 +168,7 @@ def _every_photo(root: Node, photos: list[ListedPhoto], read: Measurements, noth
     near = alike([photo.id for photo in missing], strangers)
     for photo in missing:
         twin = near.get(photo.id)
-        fix = f"did you mean `{twin}`?" if twin else "measure it, or remove it from the strip"
+        fix = meant(photo.id, twin) if twin else "measure it, or remove it from the strip"
         message = f"{file} has {nothing} on photo {photo.id}"
         yield fault_at(root, photo.path, message, "not-measured", fix=fix)
 

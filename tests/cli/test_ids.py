@@ -128,3 +128,26 @@ def test_the_report_shows_them(
     short = [row["id"] for row in document["control"] if len(row["id"]) < 12]
     assert short
     assert all(name in out for name in nonempty(short))
+
+
+@pytest.mark.parametrize(
+    ("measured", "given", "words"),
+    [
+        ("Tégé", "Te\u0301ge\u0301", "it looks the same, but is NFC in Unicode, and here NFD"),
+        ("Te\u0301ge\u0301", "Tégé", "it looks the same, but is NFD in Unicode, and here NFC"),
+        ("A12", "А12", "its `A` is Latin, and here `А` is Cyrillic"),
+        ("P-1", "P1", ""),
+    ],
+)
+def test_of_ids_that_look_the_same_the_difference_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], measured: str, given: str, words: str
+) -> None:
+    project = write_project(tmp_path, spec())
+    for name, new in (("observations.csv", measured), ("control.csv", given)):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        (tmp_path / name).write_text(text.replace("G01,", f"{new},"), encoding="utf-8")
+    main(["check", str(project)])
+    said = " ".join("".join(capsys.readouterr()).split())
+    assert f"`{given}`, did you mean `{measured}`?" in said
+    assert words in said
+    assert words or "looks the same" not in said

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Literal
+from unicodedata import is_normalized, normalize
+from unicodedata import name as unicode_name
 
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Note
 
+FORMS: tuple[Literal["NFC"], Literal["NFD"]] = (
+    "NFC",
+    "NFD",
+)  # of Unicode: a letter with its accent, or both after each other
 MOST_FAULTS_KEPT = 200  # faults kept of one file; a wrong export has one in every row
 
 
@@ -72,6 +79,35 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     from difflib import get_close_matches  # takes a millisecond to load, and is needed where a name is not known
 
     names = list(known)
-    folded = {each.casefold(): each for each in reversed(names)}
-    close = get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.65)
-    return f"did you mean `{folded[close[0]]}`?" if close else ""
+    folded = {_folded(each): each for each in reversed(names)}
+    close = get_close_matches(_folded(name), list(folded), n=1, cutoff=0.65)
+    return meant(name, folded[close[0]]) if close else ""
+
+
+def meant(name: str, other: str) -> str:
+    """Ask whether another name was meant; of names that look the same, say what they differ in."""
+    return f"did you mean `{other}`?{_unseen(name, other)}"
+
+
+def _folded(name: str) -> str:
+    return normalize("NFC", name).casefold()
+
+
+def _unseen(one: str, other: str) -> str:
+    """Return in which Unicode forms a name is written, or which letters are of different alphabets."""
+    if normalize("NFC", one) == normalize("NFC", other):
+        here, there = (
+            next((form for form in FORMS if is_normalized(form, each)), "of both forms") for each in (one, other)
+        )
+        return f" it looks the same, but is {there} in Unicode, and here {here}"
+    if len(one) == len(other):
+        for here, there in zip(one, other, strict=True):
+            alphabets = _alphabet(here), _alphabet(there)
+            if all(alphabets) and alphabets[0] != alphabets[1]:
+                return f" its `{there}` is {alphabets[1]}, and here `{here}` is {alphabets[0]}"
+    return ""
+
+
+def _alphabet(letter: str) -> str:
+    """Return the alphabet of a letter, as Latin or Cyrillic."""
+    return unicode_name(letter, "").partition(" ")[0].capitalize() if letter.isalpha() else ""

@@ -14,7 +14,7 @@ from photostrip.project.yaml.tree import Node, Path, fault_at, key_path
 Model = type[Section]
 
 T = TypeVar("T", bound=Section)
-MEANT = re.compile(r"did you mean `(.+)`\?")  # a suggestion
+MEANT = re.compile(r"did you mean `(.+?)`\?.*")  # a suggestion
 MOST_EXPLAINED = 1000  # errors of one file; more of them are only counted
 KINDS = {  # of files, by the key that holds the number of their schema
     "photostrip": "a project for `photostrip run`",
