@@ -12,10 +12,8 @@ from unicodedata import name as unicode_name
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Note
 
-FORMS: tuple[Literal["NFC"], Literal["NFD"]] = (
-    "NFC",
-    "NFD",
-)  # of Unicode: a letter with its accent, or both after each other
+# of Unicode: a letter with its accent, or both after each other
+FORMS: tuple[Literal["NFC"], Literal["NFD"]] = ("NFC", "NFD")
 MOST_FAULTS_KEPT = 200  # faults kept of one file; a wrong export has one in every row
 
 
