@@ -53,7 +53,7 @@ def described() -> Table:
     blocks = [found]
     for line in Path(__file__).with_name("quantities.txt").read_text(encoding="utf-8").splitlines():
         if line.startswith("["):
-            blocks = [table_at(path, found) for path in _expanded(line[1:-1])]
+            blocks = [table_at(path, found) for path in _expanded(line.strip("[]"))]
         elif line and not line.startswith("#"):
             key, form, meaning = line.split(" | ")
             entry = Quantity.of(form, meaning)
@@ -62,6 +62,13 @@ def described() -> Table:
                 for block in blocks:
                     table_at(above, block)[last] = entry
     return found
+
+
+@cache
+def lists() -> frozenset[str]:
+    """Return the blocks that are lists of records, by the keys that lead to them."""
+    lines = Path(__file__).with_name("quantities.txt").read_text(encoding="utf-8").splitlines()
+    return frozenset(path for line in lines if line.startswith("[[") for path in _expanded(line.strip("[]")))
 
 
 def _expanded(path: str) -> Iterator[str]:

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
-from itertools import chain
+from itertools import chain, islice
 from math import hypot
 from types import NoneType
 from typing import Any, ClassVar
 
 from photostrip.errors import Fault, InputError
-from photostrip.result.description import Quantity, Table, described
+from photostrip.result.description import Quantity, Table, described, lists
 
 LARGEST_NUMBER = 1e100  # its square is a number yet
 LARGEST_COUNT = 10**15
 MOST_FAULTS = 20
 DEEPEST = 50  # lists and blocks in each other
+MAY_BE_NULL = {"choices.left_out", "corrections.interior", "models.elements", "photos.sigma"}  # blocks of keys
 WORDS = {"text": "a text", "word": "a text", "count": "a whole number", "flag": "true or false", "number": "a number"}
 
 
@@ -32,10 +33,11 @@ def faults_of(
     Keys that are missing are not among them: a baseline holds a part of a result only.
     """
     whole = described() if table is None else table
-    if _blocks_right([document], whole):
+    shapes = [] if table else list(islice(_misshapen(document, whole, ""), MOST_FAULTS))
+    if not shapes and _blocks_right([document], whole):
         return []
     found: list[Fault] = []
-    for key, message, expected in _wrong(document, whole, ""):
+    for key, message, expected in shapes or _wrong(document, whole, ""):
         found.append(Fault(message, "result-value", file, key=key, expected=expected, fix=fix))
         if len(found) == MOST_FAULTS:
             break
@@ -98,6 +100,28 @@ def _paths_to(block: Located, value: object, path: str) -> Iterator[str]:
     elif isinstance(value, list):
         for number, each in enumerate(value):
             yield from _paths_to(block, each, f"{path}[{number}]")
+
+
+def _misshapen(block: dict[str, Any], table: Table, path: str, place: str = "") -> Iterator[Wrong]:
+    """Check that lists of records are lists, and other blocks are none; a null is one of few.
+
+    path, place: the keys that lead to the block, without and with the numbers of records.
+    """
+    for key, below in table.items():
+        if not isinstance(below, dict) or key not in block:
+            continue
+        value, name, here = block[key], f"{path}{key}", f"{place}{key}"
+        if name in lists():
+            if not isinstance(value, list):
+                yield here, f"holds {_shown(value)}", "a list of blocks"
+            elif any(isinstance(each, dict) for each in below.values()):
+                for number, record in enumerate(value):
+                    if isinstance(record, dict):
+                        yield from _misshapen(record, below, f"{name}.", f"{here}[{number}].")
+        elif isinstance(value, dict):
+            yield from _misshapen(value, below, f"{name}.", f"{here}.")
+        elif value is not None or name not in MAY_BE_NULL:
+            yield here, f"holds {_shown(value)}", "a block of keys"
 
 
 def _blocks_right(blocks: Sequence[dict[str, Any]], table: Table) -> bool:
@@ -249,8 +273,8 @@ def _shown(value: object) -> str:
         return "a list"
     if isinstance(value, str):
         return f"the text {value[:40]!a}" if _unwritable(value) else f"the text {value[:40]!r}"
-    if isinstance(value, bool):
-        return str(value).lower()
+    if value is None or isinstance(value, bool):
+        return "null" if value is None else str(value).lower()
     if isinstance(value, int) and abs(value) > LARGEST_COUNT:
         return "a whole number that is too large"
     return f"{value}"

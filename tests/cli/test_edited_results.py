@@ -49,7 +49,12 @@ def test_edited_results_are_printed_or_refused(command: tuple[str, ...], tmp_pat
         ("residuals[0].vx_um[2]", '"3"', "holds the text '3'; expected a number"),
         ("control[2].measured", '"yes"', "holds the text 'yes'; expected true or false"),
         ("strips[0]", "3", "holds 3; expected a block of keys"),
-        ("frame", "3", "holds 3; expected a block of keys, or a list of them"),
+        ("frame", "3", "holds 3; expected a block of keys"),
+        ("frame", "[{}]", "holds a list; expected a block of keys"),
+        ("summary", "null", "holds null; expected a block of keys"),
+        ("notes", "null", "holds null; expected a list of blocks"),
+        ("points", "{}", "holds a block of keys; expected a list of blocks"),
+        ("precision.check", "[]", "holds a list; expected a block of keys"),
         ("settings.relative", "[NaN]", "holds nan; expected a number"),
     ],
 )
