@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 CODE = re.compile(r"[a-z]+(-[a-z0-9]+)*")
 # What is called, and which of its positional arguments is the code, the likeliest first; as a keyword it is `code`.
 FUNCTIONS: dict[str, tuple[int, ...]] = {
-    "Fault": (1,), "GeometryError": (), "Note": (0,), "Refusal": (), "_note": (0,), "_refuse": (2,), "fault": (0,),
-    "fault_at": (3,), "reason": (0,), "refuse": (1,), "wrong": (),
+    "Fault": (1,), "GeometryError": (), "Note": (0,), "Refusal": (), "_note": (0,), "_of_images": (0,), "_refuse": (2,),
+    "fault": (0,), "fault_at": (3,), "reason": (0,), "refuse": (1,), "wrong": (),
 }  # fmt: skip
 # A place in the project file knows where it stands; a table takes row and column before message and code.
 METHODS: dict[str, tuple[int, ...]] = {"_add": (3,), "_refuse": (2,), "fault": (3, 1), "note": (0, 1), "refuse": (2, 1)}

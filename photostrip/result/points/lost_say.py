@@ -50,7 +50,7 @@ def _lost(role: str, lost: dict[str, str]) -> Iterator[Note]:
         reasons.setdefault(why, []).append(name)
     if reasons:
         texts = [f"{named(f'{role} point', names, len(names))} took no part: {why}" for why, names in reasons.items()]
-        yield Note(f"{role}-lost", "; ".join(texts), points=tuple(lost))
+        yield Note("check-lost" if ROLES[role] else "control-lost", "; ".join(texts), points=tuple(lost))
 
 
 def _rejected(rejected: Iterable[Document], *, in_bundle: bool) -> Images:
