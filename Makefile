@@ -43,8 +43,8 @@ lowest: ## all tests on exactly the lower bounds of pyproject.toml, in a venv of
 	.venv-lowest/bin/python -m pip install --quiet --only-binary :all: --constraint .venv-lowest/constraints.txt ".[test]"
 	.venv-lowest/bin/python -m pytest -n $(WORKERS) --dist worksteal
 
-bench: $(VENV)/dev.installed ## tables of seconds, memory and accuracy (mutations.py and gate_constants.py take hours: by hand)
-	@for program in $(filter-out benchmarks/mutations.py benchmarks/gate_constants.py,$(wildcard benchmarks/*.py)); do printf '\n==> %s\n' "$$program"; $(BIN)/python "$$program" || exit $$?; done
+bench: $(VENV)/dev.installed ## tables of seconds, memory and accuracy (by hand: mutations.py and gate_constants.py take hours, oracle.py compares)
+	@for program in $(filter-out benchmarks/mutations.py benchmarks/gate_constants.py benchmarks/oracle%,$(wildcard benchmarks/*.py)); do printf '\n==> %s\n' "$$program"; $(BIN)/python "$$program" || exit $$?; done
 
 mutations: $(VENV)/dev.installed ## change the program in 120 places, one at a time: which changes does no test notice? (hours)
 	$(BIN)/python benchmarks/mutations.py --count 120 --jobs $(WORKERS)
