@@ -10,7 +10,7 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.given_points import axes_of, compare_with_given
 from photostrip.pipeline.results import AdjustedStrips, Bundle
 from photostrip.points import ControlPoints
-from photostrip.triangulation.bundle.quality.joint_points import joint_cofactors
+from photostrip.triangulation.bundle.quality.cofactors import coordinates_of, joint_cofactors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 
 MOST_TESTED = 40  # check points that are tested together; in a block of 400 photos 60 of them take 11 % of a run
@@ -31,7 +31,10 @@ def check_errors(
     at = places[rows]
     axes = axes_of(given.frame[rows], frames, points.cartesian[at])
     solution = bundle.screened.solution
-    joint = joint_cofactors(solution, points.number[at]).reshape(len(at), 3, len(at), 3) * bundle.unit**2
+    joint = (
+        joint_cofactors(solution, coordinates_of(solution, points.number[at])).reshape(len(at), 3, len(at), 3)
+        * bundle.unit**2
+    )
     turned = np.einsum("iap,ipjq,jbq->iajb", axes, joint, axes).reshape(3 * len(at), 3 * len(at))
     difference = differences[rows].ravel()
     known = np.flatnonzero(np.isfinite(difference))

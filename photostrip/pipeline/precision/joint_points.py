@@ -31,12 +31,12 @@ def joint_covariance(result: Result, rows: Numbers) -> Floats:
 
 
 def _of_bundle(result: Result, rows: Numbers, axes: Floats) -> Floats:
-    from photostrip.triangulation.bundle.quality.joint_points import joint_cofactors
+    from photostrip.triangulation.bundle.quality.cofactors import coordinates_of, joint_cofactors
 
     if result.bundle is None or result.bundle.start.free:
         raise _refused("a free network has no covariances on the ground", "tie it to the ground")
     solution = result.bundle.screened.solution
-    joint = joint_cofactors(solution, result.points.number[rows]) * result.bundle.unit**2
+    joint = joint_cofactors(solution, coordinates_of(solution, result.points.number[rows])) * result.bundle.unit**2
     turned: Floats = np.einsum("iap,ipjq,jbq->iajb", axes, joint.reshape(len(rows), 3, len(rows), 3), axes)
     return turned
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from photostrip.arrays import Floats, distinct
 from photostrip.errors import GeometryError
@@ -22,7 +23,7 @@ from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.observations.calibration import PRINCIPAL_DISTANCE
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
-from photostrip.triangulation.bundle.quality.joint_points import sum_cofactors
+from photostrip.triangulation.bundle.quality.cofactors import coordinates_of, joint_cofactors
 from photostrip.triangulation.bundle.quality.reliability import Limit
 from photostrip.triangulation.bundle.selection import Selection, selected, supported
 from photostrip.triangulation.bundle.settings import CALIBRATION
@@ -176,7 +177,8 @@ def _shift_of(number: int, solution: BundleSolution) -> _Shift | None:
     np.add.at(factors, at, (weight[:, :, None] * control.axes[rows]).swapaxes(1, 2))
     pull = (weight * solution.control_residuals[rows]).sum(axis=0)[axes]
     total = weight.sum(axis=0)
-    normal = (np.diag(total) - sum_cofactors(solution, point, factors))[np.ix_(axes, axes)]
+    sums = csr_array(factors.reshape(-1, 3).T) @ coordinates_of(solution, point)
+    normal = (np.diag(total) - joint_cofactors(solution, sums))[np.ix_(axes, axes)]
     if np.linalg.eigvalsh(normal)[0] < LEAST_SHARE * total.max():
         return None
     inverse = np.linalg.inv(normal)

@@ -1,25 +1,38 @@
-"""A problem made ready: its structure, the values of all parameters, and a step of them."""
+"""A problem made ready: what does not change during the adjustment, and the values of all parameters."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from photostrip.arrays import Floats
-from photostrip.frozen import dataclass
+from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.frozen import NamedTuple, dataclass
 from photostrip.triangulation.bundle.observations import calibration
 from photostrip.triangulation.bundle.observations.calibration import Calibrated
-from photostrip.triangulation.bundle.observations.collinearity import Rays, view
-from photostrip.triangulation.bundle.observations.problem import BundleProblem
-from photostrip.triangulation.bundle.observations.ray_batches import RayBatch
-from photostrip.triangulation.bundle.structure import BandStructure, band_structure
+from photostrip.triangulation.bundle.observations.problem import BundleProblem, ImageObservations
+
+TOGETHER = 64  # points that are worked on together: twice and half as many take as long
+COMPARED = 8  # first photos by which points are put beside others on the same ones
 
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    centers: Floats  # (m, 3): perspective centres in the order of the problem, metres
-    rotations: Floats  # (m, 3, 3): rotations in that order, photo to Cartesian frame
-    xyz: tuple[Floats, ...]  # (3, S): points of each batch
+    centers: Floats  # (m, 3): perspective centres, metres
+    rotations: Floats  # (m, 3, 3): rotations, photo to Cartesian frame
+    points: Floats  # (q, 3): points, metres
     common: Floats  # (p,): calibration parameters, offsets, drifts
+
+
+class NearPoints(NamedTuple):
+    """Some points on nearly the same photos: their photos are few, and fill a small dense matrix."""
+
+    points: Numbers  # (s,): the points
+    photos: Numbers  # (u,): their photos, by rank
+    ray: Numbers  # (n,): rays of these points
+    # (n,): photo and point of each of them, as places in the above
+    photo: Numbers
+    point: Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,56 +40,79 @@ class PreparedProblem:
     """A problem with everything about it that does not change during the adjustment."""
 
     problem: BundleProblem
-    structure: BandStructure
     calibrated: Calibrated
     prior: Floats  # (p,): a-priori sigmas of all common parameters
+    measured: Flags  # (q,): points with rays
+    joined: csr_array  # (m, m): how many points each pair of photos shares; every photo with itself
+    rank: Numbers  # (m,): place of each photo in an order in which photos that share points are near each other
+    # row, column: (b,): pairs of photos that share points, by rank, row >= column, sorted
+    row: Numbers
+    column: Numbers
+    own: Numbers  # (m,): which of the pairs is each photo with itself
+    near: tuple[NearPoints, ...]
 
-    def table(self, state: Parameters) -> Floats:
-        """Columns of ``view`` for all photos in the order of the band, shape (13, m)."""
-        cameras, order = self.problem.cameras, self.structure.order
-        focal = cameras.focal.astype(float)
-        distance = self.calibrated.kind == calibration.PRINCIPAL_DISTANCE
-        np.add.at(focal, self.calibrated.camera[distance], state.common[: len(distance)][distance])
-        turn = state.rotations[order].transpose(2, 1, 0).reshape(9, -1)
-        return np.concatenate([turn, state.centers[order].T, focal[cameras.of_photo[order]][None]])
-
-    def rays(self, batch: RayBatch, xyz: Floats, table: Floats, common: Floats) -> tuple[Rays, Floats | None]:
-        """View a batch; its partials by calibration parameters in units of sigma, or None."""
-        rays = view(batch, xyz, table)
-        if not len(self.calibrated):
-            return rays, None
-        camera = self.problem.cameras.of_photo[self.structure.order][batch.photo]
-        partials = calibration.partials(self.calibrated, batch.xy, rays.ratio, camera)
-        partials *= batch.weight
-        bends = self.calibrated.kind != calibration.PRINCIPAL_DISTANCE
-        bent = np.einsum("p,pakr->akr", common[: len(bends)][bends], partials[bends])
-        np.subtract(rays.misfit, bent, out=rays.misfit)
-        return rays, partials
-
-
-@dataclass(frozen=True, eq=False)
-class ParameterStep:
-    photos: Floats  # (m, 6): steps of the photos in the order of the band, in their own axes
-    common: Floats  # (p,): steps of the common parameters
-    points: tuple[Floats, ...]  # (3, S): steps of the points of each batch, metres
-    length: float  # length in standard deviations
+    def pair(self, row: Numbers, column: Numbers) -> Numbers:
+        """Which of the pairs two photos are, by rank; -1: they share no point, or row < column."""
+        size = len(self.rank)
+        keys, wanted = self.row * size + self.column, row * size + column
+        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return np.where(keys[place] == wanted, place, -1)
 
 
 def prepare(problem: BundleProblem) -> PreparedProblem:
-    """Find what does not change during the adjustment: structure, calibrated parameters, a-priori sigmas."""
+    """Find what does not change during the adjustment."""
     calibrated = calibration.parameters(problem.cameras)
     drifts = (problem.positions.offset_sigma, problem.positions.drift_sigma)
     sigmas = [calibrated.sigma, *(sigma[sigma > 0.0] for sigma in drifts)]
+    images, m, q = problem.images, problem.photos, problem.points
+    shown = csr_array((np.ones(len(images)), (images.photo, images.point)), shape=(m, q))
+    joined = csr_array(shown @ shown.T + csr_array((np.ones(m), (np.arange(m), np.arange(m))), shape=(m, m)))
+    rank = _order(joined)
+    one, other = (rank[each] for each in joined.nonzero())
+    row, column = np.divmod(np.sort((one * m + other)[one >= other]), m)
+    own = np.flatnonzero(row == column)
     return PreparedProblem(
-        problem=problem, structure=band_structure(problem), calibrated=calibrated, prior=np.concatenate(sigmas)
+        problem=problem,
+        calibrated=calibrated,
+        prior=np.concatenate(sigmas),
+        measured=np.bincount(images.point, minlength=q) > 0,
+        joined=joined,
+        rank=rank,
+        row=row,
+        column=column,
+        own=own[rank],
+        near=tuple(_near_points(images, rank, q)),
     )
 
 
-def parameters_from(
-    prepared: PreparedProblem, centers: Floats, rotations: Floats, points: Floats, common: Floats
-) -> Parameters:
-    """Lay values of all parameters out for a prepared problem."""
-    xyz = tuple(np.ascontiguousarray(points[batch.point].T) for batch in prepared.structure.batches)
-    return Parameters(
-        centers=np.asarray(centers, float), rotations=np.asarray(rotations, float), xyz=xyz, common=common
-    )
+def _order(joined: csr_array) -> Numbers:
+    """Place of each photo in the narrower of two orders: as given, and reverse Cuthill-McKee."""
+    row, column = joined.nonzero()
+    rank = np.empty(joined.shape[0], np.intp)
+    rank[reverse_cuthill_mckee(joined, symmetric_mode=True)] = np.arange(len(rank))
+    narrower = np.abs(rank[row] - rank[column]).max(initial=0) < np.abs(row - column).max(initial=0)
+    return rank if narrower else np.arange(len(rank))
+
+
+def _near_points(images: ImageObservations, rank: Numbers, points: int) -> list[NearPoints]:
+    """Cut the points with rays into pieces on nearly the same photos."""
+    photo = rank[images.photo]
+    rays = np.lexsort((photo, images.point))
+    count = np.bincount(images.point, minlength=points)
+    place = np.arange(len(rays)) - np.repeat(np.cumsum(count) - count, count)
+    first = np.full((COMPARED, points), -1)
+    shown = place < COMPARED
+    first[place[shown], images.point[rays[shown]]] = photo[rays[shown]]
+    by_photos = np.lexsort(first[::-1])
+    by_photos = by_photos[count[by_photos] > 0]
+    at = np.empty(points, np.intp)
+    at[by_photos] = np.arange(len(by_photos))
+    rays = np.argsort(at[images.point], kind="stable")
+    edges = np.searchsorted(at[images.point[rays]], np.arange(TOGETHER, len(by_photos), TOGETHER))
+    found = []
+    for piece, ray in enumerate(np.split(rays, edges)):
+        photos, own = np.unique(photo[ray], return_inverse=True)
+        begin = piece * TOGETHER
+        some = by_photos[begin : begin + TOGETHER]
+        found.append(NearPoints(some, photos, ray, own, at[images.point[ray]] - begin))
+    return found

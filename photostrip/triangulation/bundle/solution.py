@@ -5,10 +5,16 @@ from __future__ import annotations
 from functools import cached_property
 
 from photostrip.arrays import Floats
+from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass
-from photostrip.triangulation.bundle.normal_equations.factored import Factored
-from photostrip.triangulation.bundle.normal_equations.reduced import Reduced, reduce
-from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
+from photostrip.triangulation.bundle.normal_equations import datum
+from photostrip.triangulation.bundle.normal_equations.equations import (
+    FactoredEquations,
+    NormalEquations,
+    equations_at,
+    factored,
+)
+from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
 
 @dataclass(frozen=True)
@@ -41,18 +47,21 @@ class BundleSolution:
     free: bool  # true when the datum came from inner constraints on the points: no control, no positions
     steps: tuple[IterationStep, ...]  # the way from the start, one entry for each step that was taken or refused
     prepared: PreparedProblem  # the problem as it was laid out; spares the precision that work
-    reduced: Reduced | None  # the normal equations at the solution, where the last steps of a rough one left them
+    equations: NormalEquations | None  # at the solution, where the last steps of a rough one left them
 
     @property
     def state(self) -> Parameters:
-        """The values of all parameters, laid out for the prepared problem."""
-        return parameters_from(self.prepared, self.centers, self.rotations, self.points, self.common)
+        return Parameters(self.centers, self.rotations, self.points, self.common)
 
     @cached_property
-    def factored(self) -> Factored:
-        """The normal equations at the solution."""
-        reduced = self.reduced or reduce(self.prepared, self.state)
-        return Factored.of(self.prepared, self.state, reduced, free=self.free)
+    def factored(self) -> FactoredEquations:
+        """The normal equations at the solution in factors; ``bundle-rank`` where they are singular."""
+        equations = self.equations or equations_at(self.prepared, self.state)
+        anchor = datum.anchor(equations.own, self.prepared.rank, self.state) if self.free else None
+        found = factored(equations, anchor)
+        if found is None:
+            raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
+        return found
 
     @property
     def sigma0(self) -> float:

@@ -1,8 +1,8 @@
 """Cholesky factor of normal equations in a band, solutions with it, and the elements of the inverse within the band.
 
-The band is stored as LAPACK wants it: column by column, the diagonal first. Element (i, j) of the matrix then stands
-at place ``i + j * width`` of the flat array (width: elements below the diagonal), so that any block within the band can
-be looked at as a plain matrix without copying; what such a view shows beyond the band is another column's.
+The band is stored as scipy wants it: column by column, the diagonal first. Element (i, j) of the matrix then stands at
+place ``i + j * width`` of the flat array (width: elements below the diagonal), so that any block within the band can be
+looked at as a plain matrix without copying; what such a view shows beyond the band is another column's.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
+from scipy.linalg import cho_solve_banded, cholesky_banded, solve_triangular
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.triangulation.bundle.normal_equations.lapack import lapack
-from photostrip.triangulation.bundle.observations.collinearity import PHOTO
+from photostrip.triangulation.bundle.observations.rays import PHOTO
 
 COLUMNS_AT_A_TIME = 48  # columns of the inverse that are found at a time
 
@@ -65,15 +65,15 @@ class Band:
 
     def factor(self) -> bool:
         """Replace the matrix by its factor; False when it is not positive definite."""
-        factor, info = lapack().dpbtrf(self.columns, lower=1, overwrite_ab=1)
-        if factor.base is not self.flat and not np.shares_memory(factor, self.flat):
-            self.columns[...] = factor
-        return bool(info == 0)
+        try:
+            self.columns[...] = cholesky_banded(self.columns, overwrite_ab=True, lower=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            return False
+        return True
 
     def solve(self, right: Floats) -> Floats:
         """Solve for columns (size, c) with the factor."""
-        solution, _ = lapack().dpbtrs(self.columns, right, lower=1)
-        return np.asarray(solution)
+        return np.asarray(cho_solve_banded((self.columns, True), right, check_finite=False))
 
     def inverse(self) -> Band:
         """Find the elements of the inverse within the band, lower half; what stands outside the band is not defined.
@@ -86,7 +86,8 @@ class Band:
         for first in range((self.size - 1) // COLUMNS_AT_A_TIME * COLUMNS_AT_A_TIME, -1, -COLUMNS_AT_A_TIME):
             count = min(COLUMNS_AT_A_TIME, self.size - first)
             below = min(self.width, self.size - first - count)
-            diagonal, _ = lapack().dtrtri(np.tril(np.triu(self.look(first, first, count, count), -self.width)), lower=1)
+            own = np.tril(np.triu(self.look(first, first, count, count), -self.width))
+            diagonal = solve_triangular(own, np.eye(count), lower=True, check_finite=False)
             # Below the diagonal blocks, what is within the band: first + count + row - (first + column) <= width.
             coupling = np.triu(self.look(first + count, first, below, count), count - self.width) @ diagonal
             under = -window[:below, :below] @ coupling

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct, median
 from photostrip.errors import Fault, GeometryError, InputError
@@ -13,11 +14,15 @@ from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import counted, named
 from photostrip.triangulation.bundle.normal_equations import datum
-from photostrip.triangulation.bundle.normal_equations.reduced import Reduced, control_residuals, factored, given_at
-from photostrip.triangulation.bundle.observations.collinearity import PHOTO
-from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
+from photostrip.triangulation.bundle.normal_equations.equations import NormalEquations, factored, linearise
+from photostrip.triangulation.bundle.observations.given_orientations import (
+    LinearisedOrientations,
+    attitudes_at,
+    positions_at,
+)
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
-from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem, parameters_from
+from photostrip.triangulation.bundle.observations.rays import PHOTO
+from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
 SQUARED_SINE = 1e-10  # square of the sine of the angle between rays
 # standard deviations from which a shift, in sizes of the network, a turn, in radians, or the logarithm of the scale is
@@ -55,16 +60,13 @@ def refuse_repeated(problem: BundleProblem) -> None:
         )
 
 
-def refuse_weak_points(prepared: PreparedProblem, reduced: Reduced) -> None:
+def refuse_weak_points(equations: NormalEquations) -> None:
     """Refuse points whose rays, with their control, do not meet at an angle (``bundle-rays``).
 
     The normal equations are those without damping.
     """
-    weak = [
-        prepared.problem.point_name(number)
-        for batch, each in zip(prepared.structure.batches, reduced.points, strict=True)
-        for number in batch.point[batch.real][~(each.strength[batch.real] > SQUARED_SINE)].tolist()
-    ]
+    problem = equations.prepared.problem
+    weak = [problem.point_name(number) for number in np.flatnonzero(~(equations.strength > SQUARED_SINE)).tolist()]
     if weak:
         message = (
             f"rays and control do not determine {named('point', weak)}: "
@@ -131,10 +133,10 @@ def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> Geomet
     """
     message = f"the bundle adjustment did not converge in {counted(steps, 'step')}"
     control, start = prepared.problem.control, prepared.problem.start
-    begun = parameters_from(prepared, start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
+    begun = Parameters(start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
     loose = "" if datum.is_free(prepared.problem) else weak(prepared, begun)
     with np.errstate(invalid="ignore"):
-        off = np.nan_to_num(np.abs(control_residuals(prepared, state)) / control.sigma)
+        off = np.nan_to_num(np.abs(linearise(prepared, state).control))
     if loose:
         message += f": {loose}"
     elif off.max(initial=0.0) > ODD_SIGMAS:
@@ -163,17 +165,8 @@ def refuse_endless(problem: BundleProblem, rejected: Sequence[int], adjustments:
 
 def _parts(prepared: PreparedProblem) -> list[Numbers]:
     """Photos of the parts of the network that share no points."""
-    structure = prepared.structure
-    label = np.arange(len(structure.order))
-    while True:
-        least = label.copy()
-        np.minimum.at(least, structure.rows, label[structure.columns])
-        np.minimum.at(least, structure.columns, label[structure.rows])
-        least = least[least]
-        if (least == label).all():
-            break
-        label = least
-    return [np.sort(structure.order[label == first]) for first in distinct(label)]
+    count, label = connected_components(prepared.joined, directed=False)
+    return [np.flatnonzero(label == part) for part in range(count)]
 
 
 def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held:
@@ -189,7 +182,9 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     with_rays[problem.images.point[inside[problem.images.photo]]] = True
     control = problem.control
     given = with_rays[control.point] & np.isfinite(control.sigma).any(axis=1)
-    positions, attitudes = given_at(prepared, state)
+    with_common = len(prepared.calibrated)
+    positions = positions_at(problem.positions, state.centers, state.rotations, state.common, with_common)
+    attitudes = attitudes_at(problem.attitudes, state.rotations, len(state.common))
     at = inside[positions.photo] & (positions.weight > 0.0).any(axis=1)
     places = np.concatenate([control.xyz[given], problem.positions.xyz[at]])
     around = state.centers[photos]
@@ -200,7 +195,7 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     rows = np.einsum("nij,njd->nid", control.axes[given], similarity_derivatives(control.xyz[given], origin)) * units
     rows /= control.sigma[given][:, :, None]
     normal = np.einsum("nad,nae->de", rows, rows)
-    of_photos = datum.photo_generators(prepared, state, origin)[prepared.structure.rank] * units
+    of_photos = datum.photo_generators(state, origin) * units
     for linear in (positions, attitudes):
         normal += _information(linear, of_photos, inside, prepared)
     motions = similarity_derivatives(everything, origin).reshape(-1, datum.DEFECT) * units
@@ -283,28 +278,29 @@ def _reason(held: Held, *, unknown_errors: bool) -> str:
     return "too few coordinates are given" + (", and unknown errors stand for some of them" if unknown_errors else "")
 
 
-def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats | None) -> NoReturn:
+def refuse_singular(equations: NormalEquations, extra: Floats | None) -> NoReturn:
     """Refuse normal equations that cannot be factored (``bundle-rank``), naming the photos that are not determined.
 
     They are those with large elements in the null vector, found by inverse iteration on the matrix made regular with a
     trifle of its diagonal. ``extra`` (m, 6, 6) is what was added to them as a datum.
     """
-    blocks = reduced.blocks[prepared.structure.diagonal] + (0.0 if extra is None else extra)
+    problem = equations.prepared.problem
+    blocks = equations.own + (0.0 if extra is None else extra)
     diagonal = np.maximum(np.einsum("nii->ni", blocks), 0.0)
     least = UNMOVED * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1.0))
     add = np.zeros_like(blocks)
     add[:, range(PHOTO), range(PHOTO)] = least
-    band = factored(prepared, reduced, add if extra is None else add + extra)
+    found = factored(equations, add if extra is None else add + extra)
     photos, names = [], []
-    if band is not None:
+    if found is not None:
         vector = np.sqrt(diagonal + least).reshape(-1, 1)
         for _ in range(ITERATIONS):
-            vector = band.solve(vector * np.maximum(diagonal, least).reshape(-1, 1))
+            vector = found.by_photos(vector * np.maximum(diagonal, least).reshape(-1, 1))
             vector /= np.abs(vector).max()
         size = np.abs(vector.reshape(-1, PHOTO)) * np.sqrt(np.maximum(diagonal, least))
         worst = size.max(axis=1)
-        numbers = prepared.structure.order[worst > SHARE * worst.max()]
-        photos = [prepared.problem.photo_name(number) for number in np.sort(numbers).tolist()]
+        numbers = np.flatnonzero(worst > SHARE * worst.max())
+        photos = [problem.photo_name(number) for number in numbers.tolist()]
         names = [MOVES[int(np.argmax(size[int(np.argmax(worst))]))]]
     what = f"; least of all the {names[0]}" if names else ""
     message = (

@@ -1,4 +1,4 @@
-"""Self-calibration: what the parameters of a camera change at an image point, and their partials."""
+"""Self-calibration: what the parameters of a camera change at an image point."""
 
 from __future__ import annotations
 
@@ -60,14 +60,3 @@ def corrections(xy: Floats) -> Floats:
             [y, zero],
         ]
     )
-
-
-def partials(wanted: Calibrated, xy: Floats, ratio: Floats, camera: Numbers) -> Floats:
-    """Differentiate the computed image coordinates by the parameters: (c, 2, ...), mm by the unit.
-
-    ``ratio`` is the computed image point divided by the principal distance. A correction of the measurement counts as
-    a change of the computed coordinate with the opposite sign.
-    """
-    table = -corrections(xy)
-    table[PRINCIPAL_DISTANCE] = ratio
-    return np.asarray(table[wanted.kind] * (camera == wanted.camera.reshape(-1, *[1] * camera.ndim))[:, None])

@@ -7,8 +7,8 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import cross_matrix, to_vector
-from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
 from photostrip.triangulation.bundle.observations.problem import AttitudeObservations, PositionObservations
+from photostrip.triangulation.bundle.observations.rays import PHOTO
 
 LITTLE = 1e-4  # radians: below it the series of the rotation's derivative is exact
 
@@ -19,15 +19,14 @@ class LinearisedOrientations:
 
     photo: Numbers  # (g,): photo of each row
     residual: Floats  # (g, 3): computed minus given, metres or radians
-    by_photo: Floats  # (g, 3, 6): partials by the photo's parameters, as ``collinearity`` counts them
+    by_photo: Floats  # (g, 3, 6): partials by the photo's parameters, as ``rays`` counts them
     by_common: Floats  # (g, 3, p): partials by the common parameters
     weight: Floats  # (g, 3): reciprocal sigmas
 
-    def scaled(self) -> tuple[Floats, Floats]:
-        """Divide by sigma: partials by photo (g, 3, 6); by common parameters, the misfit last (g, 3, p + 1)."""
-        whole = np.concatenate([self.by_photo, self.by_common, -self.residual[:, :, None]], axis=2)
-        whole *= self.weight[:, :, None]
-        return whole[:, :, :PHOTO], whole[:, :, PHOTO:]
+    def scaled(self) -> tuple[Floats, Floats, Floats]:
+        """Divide by sigma: partials by photo (g, 3, 6) and by common parameters (g, 3, p), misfits (g, 3)."""
+        weight = self.weight[:, :, None]
+        return self.by_photo * weight, self.by_common * weight, -self.residual * self.weight
 
 
 def drift_columns(positions: PositionObservations, first: int) -> tuple[Numbers, Numbers]:
@@ -54,7 +53,7 @@ def positions_at(
     turn = positions.axes @ rotations[positions.photo]
     arm = np.einsum("gij,gj->gi", turn, positions.lever)
     residual = np.einsum("gij,gj->gi", positions.axes, centers[positions.photo] - positions.xyz) + arm
-    by_photo = np.concatenate([turn, -turn @ cross_matrix(positions.lever)], axis=2) * SIGNS
+    by_photo = np.concatenate([turn, -turn @ cross_matrix(positions.lever)], axis=2)
     by_common = np.zeros((len(positions), 3, len(common)))
     factors = (np.ones(len(positions)), positions.time)
     for columns, factor in zip(drift_columns(positions, calibrated), factors, strict=True):
@@ -75,7 +74,7 @@ def attitudes_at(attitudes: AttitudeObservations, rotations: Floats, common: int
     return LinearisedOrientations(
         photo=attitudes.photo,
         residual=turn,
-        by_photo=by_photo * SIGNS,
+        by_photo=by_photo,
         by_common=np.zeros((len(attitudes), 3, common)),
         weight=1.0 / attitudes.sigma,
     )

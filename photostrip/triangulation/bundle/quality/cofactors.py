@@ -1,8 +1,10 @@
-"""Cofactors of everything that was adjusted, from the elements of the inverse within the band.
+"""Cofactors of everything that was adjusted: of single points, photos and residuals, and joint ones.
 
-The photos of a point lie within the band, so that the joint cofactors of its photos are at hand, and with them those of
-the point and of its residuals: with T, L as in ``point_elimination`` and Z of the photos and common parameters,
-Y = Z T and M = I + T'Y give the cofactors L^-T M L^-1 of the point and -Y L^-1 between photos and point.
+With Z the inverse of the photos' part of the normal matrix, W = Z times the border and K the cofactors of the common
+parameters, the inverse is that without common parameters and E K E', E what a common parameter does to everything else:
+-W to the photos, M W - V^-1 B'C to the points. The photos of a point lie within the band, where the elements of Z are
+known; with M = V^-1 B'A of each ray, A and B its derivatives by photo and point, V the normal matrix of the point, the
+cofactors of a point are V^-1 + sum M_i Z_ij M_j', those between its photos and it -sum Z_ij M_j'.
 """
 
 from __future__ import annotations
@@ -10,18 +12,14 @@ from __future__ import annotations
 from typing import Self
 
 import numpy as np
+from scipy.sparse import csr_array
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import dataclass
-from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.bundle.normal_equations import datum
-from photostrip.triangulation.bundle.normal_equations.factored import Inverse, solved_for
-from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
-from photostrip.triangulation.bundle.normal_equations.reduced import given_at
-from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS, by_photo, by_point
+from photostrip.triangulation.bundle.normal_equations.equations import FactoredEquations
 from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
-from photostrip.triangulation.bundle.observations.ray_batches import RayBatch
-from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
+from photostrip.triangulation.bundle.observations.rays import PHOTO
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 
@@ -30,200 +28,112 @@ def cofactors_of(solution: BundleSolution, *, rough: bool = False) -> Cofactors:
 
     rough: leave points and photos of a free network in the datum of its band, which no residual feels.
     """
-    prepared = solution.prepared
-    state, reduced, inverse = solution.state, solution.factored.reduced, solution.factored.inverse
-    points = np.full((prepared.problem.points, 3, 3), np.nan)
-    residuals = np.zeros((len(prepared.problem.images), 2, 2))
-    table = prepared.table(state)
-    for batch, xyz, eliminated in zip(prepared.structure.batches, state.xyz, reduced.points, strict=True):
-        of_points, of_rays = _batch(prepared, batch, eliminated, inverse, xyz, table)
-        points[batch.point[batch.real]] = of_points[batch.real]
-        residuals[batch.row[:, batch.real].ravel()] = of_rays[:, batch.real].reshape(-1, 2, 2)
-    of_photos = inverse.cofactors(np.arange(len(table[0]))[:, None], len(state.common))
-    positions, attitudes = (_given(prepared, linear, of_photos) for linear in given_at(prepared, state))
+    prepared, found = solution.prepared, solution.factored
+    problem, at, p = prepared.problem, found.equations.linearised, len(solution.common)
+    m, q = problem.photos, problem.points
+    inverse, rank = found.inverse, prepared.rank
+    photos = inverse.blocks(rank, rank)
+    points, cross = _of_points(solution)
+
+    # what common parameters do to everything else
+    to_photos = -found.cross.reshape(m, PHOTO, p)
+    back = found.equations.common_points.toarray() - found.equations.carried.T @ found.cross
+    to_points = -(found.equations.root.swapaxes(1, 2) @ back.reshape(q, 3, p))
+    by_photo, by_point, image = at.rays.by_photo, at.rays.by_point, problem.images
+    to_rays = by_photo @ to_photos[image.photo] + by_point @ to_points[image.point]
+    to_rays[..., : len(prepared.calibrated)] += at.rays.by_common.toarray().reshape(len(image), 2, -1)
+    half = by_photo @ cross @ by_point.swapaxes(1, 2)
+    of_rays = np.eye(2) - by_photo @ photos[image.photo] @ by_photo.swapaxes(1, 2) - half - half.swapaxes(1, 2)
+    of_rays -= by_point @ points[image.point] @ by_point.swapaxes(1, 2)
+    of_rays -= to_rays @ found.common @ to_rays.swapaxes(1, 2)
+    points = points + to_points @ found.common @ to_points.swapaxes(1, 2)
+    of_photos = np.empty((m, PHOTO + p, PHOTO + p))
+    of_photos[:, :PHOTO, :PHOTO] = photos + to_photos @ found.common @ to_photos.swapaxes(1, 2)
+    of_photos[:, :PHOTO, PHOTO:] = to_photos @ found.common
+    of_photos[:, PHOTO:, :PHOTO] = of_photos[:, :PHOTO, PHOTO:].swapaxes(1, 2)
+    of_photos[:, PHOTO:, PHOTO:] = found.common
+    positions, attitudes = (_given(each, of_photos) for each in (at.positions, at.attitudes))
     if solution.free and not rough:
-        points, of_photos = _inner(solution, state, points, of_photos)
-    photos, cross = _turned(prepared, state, of_photos)
+        points, of_photos = _inner(solution, points, of_photos)
+    points[~prepared.measured] = np.nan
+    turn = _turns(solution.rotations)
     weights = prepared.prior**-2.0
-    residuals *= prepared.problem.images.sigma[:, :, None] * prepared.problem.images.sigma[:, None, :]
     return Cofactors(
         points=points,
-        photos=photos,
-        common=inverse.common,
-        image_residuals=residuals,
-        control_residuals=_control(prepared, points),
+        photos=turn @ of_photos[:, :PHOTO, :PHOTO] @ turn.swapaxes(1, 2),
+        common=found.common,
+        image_residuals=of_rays * (image.sigma[:, :, None] * image.sigma[:, None, :]),
+        control_residuals=_control(solution, points),
         position_residuals=positions,
         attitude_residuals=attitudes,
-        common_residuals=np.where(weights > 0.0, prepared.prior**2 - np.diag(inverse.common), 0.0),
-        photo_common=cross,
+        common_residuals=np.where(weights > 0.0, prepared.prior**2 - np.diag(found.common), 0.0),
+        photo_common=turn @ of_photos[:, :PHOTO, PHOTO:],
     )
 
 
-@dataclass(frozen=True, eq=False)
-class JointCofactors:
-    """Joint cofactors of several photos; of a free network in some datum, which nothing feels that can be observed."""
-
-    inverse: Inverse
-    rank: Numbers  # (m,): places of the photos in the band
-    rotations: Floats  # (m, 3, 3): photo to Cartesian frame
-
-    @classmethod
-    def of_solution(cls, solution: BundleSolution) -> Self:
-        return cls(solution.factored.inverse, solution.prepared.structure.rank, solution.rotations)
-
-    def of(self, photos: Numbers, partials: Floats) -> Floats:
-        """Joint cofactors (g, k c, k c) of c functions of each of k photos, in g sets of photos (g, k).
-
-        partials: (g, k, c, 6): by shift (m) and rotation vector (rad) of the photo in the Cartesian frame.
-        """
-        (g, k, c, _), sets = partials.shape, self.rank[photos]
-        inner = partials @ _own_axes(self.rotations)[photos]
-        half = inner @ self.inverse.blocks(sets).swapaxes(2, 3).reshape(g, k, PHOTO, -1)
-        whole = half.reshape(g, k * c, k, PHOTO).swapaxes(1, 2) @ inner.swapaxes(2, 3)
-        found = whole.swapaxes(1, 2).reshape(g, k * c, -1)
-        if len(self.inverse.common):
-            cross = (inner @ self.inverse.cross[sets]).reshape(g, k * c, -1)
-            found += cross @ self.inverse.common @ cross.swapaxes(1, 2)
-        return np.asarray(found, float)
+def _of_points(solution: BundleSolution) -> tuple[Floats, Floats]:
+    """Cofactors of points (q, 3, 3) and between the photo of each ray and its point (n, 6, 3), common ones held."""
+    found, prepared = solution.factored, solution.prepared
+    rays, inverse = found.equations.linearised.rays, found.inverse
+    inner = found.equations.root.swapaxes(1, 2) @ found.equations.root
+    share = rays.by_photo.swapaxes(1, 2) @ (rays.by_point @ inner[prepared.problem.images.point])  # (n, 6, 3): M'
+    points, cross = inner.copy(), np.empty_like(share)
+    for near in prepared.near:
+        u, s = len(near.photos), len(near.points)
+        row, column = near.photos[:, None], near.photos[None, :]
+        held = inverse.holds(row, column)  # others share no point
+        blocks = np.where(held[..., None, None], inverse.blocks(row, np.where(held, column, row)), 0.0)
+        pull = np.zeros((u, PHOTO, s, 3))
+        pull[near.photo, :, near.point] = share[near.ray]
+        carried = blocks.swapaxes(1, 2).reshape(PHOTO * u, -1) @ pull.reshape(PHOTO * u, -1)
+        carried = carried.reshape(u, PHOTO, s, 3)
+        cross[near.ray] = -carried[near.photo, :, near.point]
+        points[near.points] += np.einsum("upsi,upsj->sij", pull, carried)
+    return points, cross
 
 
-def _batch(
-    prepared: PreparedProblem, batch: RayBatch, eliminated: Eliminated, inverse: Inverse, xyz: Floats, table: Floats
-) -> tuple[Floats, Floats]:
-    """Cofactors of the points (S, 3, 3), m^2, and of the residuals (k, S, 2, 2), in units of sigma."""
-    more, k, slots = len(prepared.calibrated), *batch.photo.shape
-    rays, common = prepared.rays(batch, xyz, table, np.zeros(0) if not more else np.zeros(more))
-    white = by_point(rays)
-    eliminated.root.forward(white)
-    of_sets = inverse.cofactors(batch.sets, more)
-    spread = _carried(batch, of_sets, eliminated.rows[:-1])
-    of_point = np.einsum("pcs,pds->cds", eliminated.rows[:-1], spread)
-    of_point[range(3), range(3)] += 1.0
-    partials = by_photo(rays, more)[:-1]
-    if common is not None:
-        partials[PHOTO:] = common
-    mixed = np.einsum(
-        "pakr,kpcr->ackr", partials[:PHOTO], spread[: PHOTO * k].reshape(k, PHOTO, 3, slots), optimize=False
-    )
-    if more:
-        mixed += np.einsum("pakr,pcr->ackr", partials[PHOTO:], spread[PHOTO * k :])
-    fitted = _quadratic(batch, of_sets, partials)
-    # white M white' - B Y white' - (B Y white')' + B Z B'
-    half = 0.5 * np.einsum("cds,daks->caks", of_point, white) - mixed.transpose(1, 0, 2, 3)
-    product = np.einsum("caks,cbks->abks", half, white)
-    fitted += product + product.transpose(1, 0, 2, 3)
-    found = -fitted.transpose(2, 3, 0, 1)
-    found[..., range(2), range(2)] += 1.0
-    eliminated.root.backward(of_point)
-    of_point = of_point.transpose(1, 0, 2)
-    eliminated.root.backward(of_point)
-    return of_point.transpose(2, 0, 1), found
-
-
-def _carried(batch: RayBatch, of_sets: Floats, rows: Floats) -> Floats:
-    """Multiply the rows T of a batch with the joint cofactors of their photos: Z T, shape (q, 3, S)."""
-    product = np.empty_like(rows)
-    q, done = len(rows), 0
-    for first, last, count, size in batch.runs:
-        part = rows[..., first:last].reshape(q, 3, count, size).transpose(1, 2, 0, 3)
-        carried = of_sets[done : done + count] @ part
-        product[..., first:last] = carried.transpose(2, 0, 1, 3).reshape(q, 3, -1)
-        done += count
-    return product
-
-
-def _quadratic(batch: RayBatch, of_sets: Floats, partials: Floats) -> Floats:
-    """Give B Z B' of each ray, with the photo's and the common parameters, shape (2, 2, k, S)."""
-    q, _, k, slots = partials.shape
-    n = PHOTO * k
-    found, done = np.empty((2, 2, k, slots)), 0
-    for first, last, count, size in batch.runs:
-        groups = slice(done, done + count)
-        of_rays = np.empty((k, count, q, q))
-        for ray in range(k):
-            number = np.r_[PHOTO * ray : PHOTO * (ray + 1), n : n + q - PHOTO]
-            of_rays[ray] = of_sets[groups][:, number[:, None], number]
-        part = partials[..., first:last].reshape(q, 2, k, count, size)
-        product = of_rays @ part.transpose(1, 2, 3, 0, 4)
-        found[..., first:last] = np.einsum("pakgn,bkgpn->abkgn", part, product).reshape(2, 2, k, -1)
-        done += count
-    return found
-
-
-def _control(prepared: PreparedProblem, points: Floats) -> Floats:
+def _control(solution: BundleSolution, points: Floats) -> Floats:
     """Cofactors of the residuals of control, along its axes."""
-    control = prepared.problem.control
+    control = solution.prepared.problem.control
     found = -control.axes @ points[control.point] @ control.axes.swapaxes(1, 2)
     found[:, range(3), range(3)] += np.where(np.isfinite(control.sigma), control.sigma, 0.0) ** 2
     return found
 
 
-def _given(prepared: PreparedProblem, linear: LinearisedOrientations, of_photos: Floats) -> Floats:
+def _given(linear: LinearisedOrientations, of_photos: Floats) -> Floats:
     """Cofactors of the residuals of camera positions or attitudes."""
     partials = np.concatenate([linear.by_photo, linear.by_common], axis=2)
-    found: Floats = -partials @ of_photos[prepared.structure.rank[linear.photo]] @ partials.swapaxes(1, 2)
+    found: Floats = -partials @ of_photos[linear.photo] @ partials.swapaxes(1, 2)
     with np.errstate(divide="ignore"):
-        variance = np.where(linear.weight > 0.0, linear.weight**-2.0, 0.0)
-    found[:, range(3), range(3)] += variance
+        found[:, range(3), range(3)] += np.where(linear.weight > 0.0, linear.weight**-2.0, 0.0)
     return found
 
 
-def _turned(prepared: PreparedProblem, state: Parameters, of_photos: Floats) -> tuple[Floats, Floats]:
-    """Turn the cofactors of photos (and common parameters) into the Cartesian frame and the problem's order."""
-    rank, turn = prepared.structure.rank, _own_axes(state.rotations)
-    alone = turn @ of_photos[rank, :PHOTO, :PHOTO] @ turn.swapaxes(1, 2)
-    return alone, turn @ of_photos[rank, :PHOTO, PHOTO:]
-
-
-def _own_axes(rotations: Floats) -> Floats:
-    """Turn steps of photos in their own axes and signs into the Cartesian frame: matrices (m, 6, 6)."""
+def _turns(rotations: Floats) -> Floats:
+    """Turn steps of photos in their own axes into the Cartesian frame: matrices (m, 6, 6)."""
     turn = np.zeros((len(rotations), PHOTO, PHOTO))
     turn[:, :3, :3] = turn[:, 3:, 3:] = rotations
-    return turn * SIGNS
+    return turn
 
 
-def _inner(solution: BundleSolution, state: Parameters, points: Floats, of_photos: Floats) -> tuple[Floats, Floats]:
-    """Carry cofactors of points and photos over to inner constraints on the points.
+def _inner(solution: BundleSolution, points: Floats, of_photos: Floats) -> tuple[Floats, Floats]:
+    """Carry cofactors of points and photos (with common parameters) over to inner constraints on the points.
 
     With G the generators of the similarity, E the choice of the points, H = (G'EG)^-1 and P = Q E G H: the cofactors
     are Q - G P' - P G' + G (H G'E P) G'.
     """
-    prepared, reduced = solution.prepared, solution.factored.reduced
-    origin, inverse = datum.inner(prepared, state)
-    p = len(state.common)
-    moves = [similarity_derivatives(xyz.T, origin).transpose(1, 2, 0) for xyz in state.xyz]  # (3, 7, S)
-    right = np.zeros((len(prepared.structure.order), PHOTO, datum.DEFECT))
-    corner = np.zeros((p, datum.DEFECT))
-    white = []
-    for batch, eliminated, move in zip(prepared.structure.batches, reduced.points, moves, strict=True):
-        pushed = move.copy()
-        pushed[..., batch.dummy] = 0.0
-        eliminated.root.forward(pushed)
-        white.append(pushed)
-        _push(batch, eliminated, pushed, right, corner)
-    photos, common = solved_for(solution.factored, right, corner)
-    total = np.zeros((datum.DEFECT, datum.DEFECT))
-    shifts = []
-    for batch, eliminated, pushed, move in zip(prepared.structure.batches, reduced.points, white, moves, strict=True):
-        k = len(batch.photo)
-        of_sets = photos[batch.photo]  # (k, S, 6, 7)
-        rows = eliminated.rows[: PHOTO * k].reshape(k, PHOTO, 3, -1)
-        shift = pushed - np.einsum("kpcs,kspd->cds", rows, of_sets)
-        if len(prepared.calibrated):
-            shift -= np.einsum("pcs,pd->cds", eliminated.rows[PHOTO * k : -1], common[: len(prepared.calibrated)])
-        eliminated.root.backward(shift)
-        total += np.einsum("cas,cbs->ab", move[..., batch.real], shift[..., batch.real])
-        shifts.append(shift)
-    middle = inverse @ total @ inverse
-    found = points.copy()
-    for batch, move, shift in zip(prepared.structure.batches, moves, shifts, strict=True):
-        real = batch.real
-        moved, swept = move[..., real].transpose(2, 0, 1), shift[..., real].transpose(2, 0, 1) @ inverse
-        found[batch.point[real]] += _carried_over(moved, swept, middle)
-    turned = np.zeros((len(photos), PHOTO + p, datum.DEFECT))
-    turned[:, :PHOTO] = datum.photo_generators(prepared, state, origin)
-    swept = np.concatenate([photos, np.broadcast_to(common, (len(photos), *common.shape))], axis=1) @ inverse
-    return found, of_photos + _carried_over(turned, swept, middle)
+    state, m, p = solution.state, len(of_photos), len(solution.common)
+    origin, moves = datum.point_generators(solution.prepared, state)
+    flat = moves.reshape(-1, datum.DEFECT)
+    inverse = np.asarray(np.linalg.inv(flat.T @ flat), float)
+    swept = solution.factored.solved_for_points(flat)
+    middle = inverse @ (flat.T @ swept.points) @ inverse
+    found = points + _carried_over(moves, (swept.points @ inverse).reshape(moves.shape), middle)
+    turned = np.zeros((m, PHOTO + p, datum.DEFECT))
+    turned[:, :PHOTO] = datum.photo_generators(state, origin)
+    shared = np.broadcast_to(swept.common, (m, p, datum.DEFECT))
+    own = np.concatenate([swept.photos.reshape(m, PHOTO, -1), shared], axis=1) @ inverse
+    return found, of_photos + _carried_over(turned, own, middle)
 
 
 def _carried_over(moves: Floats, swept: Floats, middle: Floats) -> Floats:
@@ -232,10 +142,64 @@ def _carried_over(moves: Floats, swept: Floats, middle: Floats) -> Floats:
     return np.asarray(moves @ middle @ moves.swapaxes(1, 2) - product - product.swapaxes(1, 2))
 
 
-def _push(batch: RayBatch, eliminated: Eliminated, pushed: Floats, right: Floats, corner: Floats) -> None:
-    """Subtract what right-hand sides (3, c, S) of points, multiplied with L^-1, leave for photos and common."""
-    k, n = len(batch.photo), PHOTO * len(batch.photo)
-    left = np.einsum("kpcs,cds->kspd", eliminated.rows[:n].reshape(k, PHOTO, 3, -1), pushed)
-    np.subtract.at(right, batch.photo, left)
-    calibrated = len(eliminated.rows) - 1 - n
-    corner[:calibrated] -= np.einsum("pcs,cds->pd", eliminated.rows[n:-1], pushed)
+def joint_cofactors(solution: BundleSolution, functions: csr_array) -> Floats:
+    """Joint cofactors (k, k) of k linear functions (k, 3 q) of the points' coordinates; not of a free network.
+
+    With F the functions and L L' the normal matrices of the points: F L^-T L^-1 F' + G Q G', where G = F L^-T T' and Q
+    are the cofactors of photos and common parameters.
+    """
+    found = solution.factored
+    white = found.equations.roots @ functions.T
+    by_photos = (found.equations.carried @ white).toarray()
+    by_common = (found.equations.common_points.T @ white).toarray()
+    photos, common = found.shared(by_photos, by_common)
+    joint = by_photos.T @ photos + by_common.T @ common + (white.T @ white).toarray()
+    return np.asarray(0.5 * (joint + joint.T), float)
+
+
+def coordinates_of(solution: BundleSolution, points: Numbers) -> csr_array:
+    """Functions (3 k, 3 q) that are the coordinates of k points."""
+    columns = (3 * points[:, None] + np.arange(3)).ravel()
+    shape = (len(columns), 3 * len(solution.points))
+    return csr_array((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=shape)
+
+
+@dataclass(frozen=True, eq=False)
+class JointCofactors:
+    """Joint cofactors of several photos; of a free network in some datum, which nothing feels that can be observed."""
+
+    factored: FactoredEquations
+    rotations: Floats  # (m, 3, 3): photo to Cartesian frame
+
+    @classmethod
+    def of_solution(cls, solution: BundleSolution) -> Self:
+        return cls(solution.factored, solution.rotations)
+
+    def of(self, photos: Numbers, partials: Floats) -> Floats:
+        """Joint cofactors (g, k c, k c) of c functions of each of k photos, in g sets of photos (g, k).
+
+        partials: (g, k, c, 6): by shift (m) and rotation vector (rad) of the photo in the Cartesian frame.
+        """
+        (g, k, c, _), found = partials.shape, self.factored
+        inner = partials @ _turns(self.rotations)[photos]
+        half = inner @ self._blocks(found.equations.prepared.rank[photos]).swapaxes(2, 3).reshape(g, k, PHOTO, -1)
+        whole = half.reshape(g, k * c, k, PHOTO).swapaxes(1, 2) @ inner.swapaxes(2, 3)
+        joint = whole.swapaxes(1, 2).reshape(g, k * c, -1)
+        cross = (inner @ found.cross.reshape(len(self.rotations), PHOTO, -1)[photos]).reshape(g, k * c, -1)
+        return np.asarray(joint + cross @ found.common @ cross.swapaxes(1, 2), float)
+
+    def _blocks(self, sets: Numbers) -> Floats:
+        """Blocks (g, k, k, 6, 6) of Z between the photos of sets (g, k) of places in the band."""
+        inverse, factor = self.factored.inverse, self.factored.band
+        row, column = np.broadcast_arrays(sets[:, :, None], sets[:, None, :])
+        near = inverse.holds(row, column)
+        if near.all():
+            return inverse.blocks(row, column)
+        found = np.empty((*row.shape, PHOTO, PHOTO))
+        found[near] = inverse.blocks(row[near], column[near])
+        far, m = distinct(column[~near]), factor.size // PHOTO
+        unit = np.zeros((m, PHOTO, len(far), PHOTO))
+        unit[far, :, np.arange(len(far))] = np.eye(PHOTO)
+        solved = factor.solve(unit.reshape(m * PHOTO, -1)).reshape(unit.shape)
+        found[~near] = solved[row[~near], :, np.searchsorted(far, column[~near])]
+        return found

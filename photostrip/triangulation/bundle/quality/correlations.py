@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
-from photostrip.triangulation.bundle.observations.collinearity import PHOTO
+from photostrip.triangulation.bundle.observations.rays import PHOTO
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 LIMIT = 0.95

@@ -18,10 +18,10 @@ from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.bundle.normal_equations.factored import Factored
-from photostrip.triangulation.bundle.normal_equations.reduced import reduce
+from photostrip.triangulation.bundle.normal_equations import datum
+from photostrip.triangulation.bundle.normal_equations.equations import equations_at, factored
 from photostrip.triangulation.bundle.observations.problem import BundleCameras, BundleProblem
-from photostrip.triangulation.bundle.parameters import parameters_from, prepare
+from photostrip.triangulation.bundle.parameters import Parameters, prepare
 from photostrip.triangulation.bundle.quality.reliability import limit_of
 from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.settings import CALIBRATION, BundleSettings
@@ -114,13 +114,14 @@ class _Network:
         freed = restarted(self._freed(photos), self.solution)
         prepared = prepare(selected(freed, self.plain))
         start = prepared.problem.start
-        state = parameters_from(prepared, start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
-        factored = Factored.of(prepared, state, reduce(prepared, state), free=True)
-        p = len(state.common)
-        border = factored.reduced.border.reshape(-1, p + 1)
-        rest = factored.reduced.corner[:p] - border[:, :p].T @ factored.band.solve(border)
-        normal = rest[:, :p].reshape(len(photos), 2, len(photos), 2)[photos, :, photos]
-        pull = rest[:, p].reshape(len(photos), 2, 1)
+        state = Parameters(start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
+        equations = equations_at(prepared, state)
+        found = factored(equations, datum.anchor(equations.own, prepared.rank, state))
+        if found is None:
+            return np.zeros(len(photos))
+        normal = found.left.reshape(len(photos), 2, len(photos), 2)[photos, :, photos]
+        pull = equations.right_common - found.cross.T @ equations.right_photos
+        pull = pull.reshape(len(photos), 2, 1)
         return np.asarray((pull * np.linalg.solve(normal, pull)).sum(axis=(1, 2)), float)
 
     def _freed(self, photos: Sequence[int] | Numbers) -> BundleProblem:
