@@ -46,7 +46,6 @@ from photostrip.simulation import (
     Terrain,
 )
 from photostrip.simulation.simulation import simulate
-from photostrip.triangulation.bundle.settings import BundleSettings
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
@@ -319,7 +318,7 @@ def calibrating(seed: int) -> Sound:
     camera = simulation.camera
     off = replace(camera, principal_distance=camera.principal_distance + float(rng.normal(0, 0.05)))
     inputs = replace(inputs, strips=tuple(replace(each, camera=off, calibrate=FREE) for each in inputs.strips))
-    settings = replace(settings_of(simulation), adjustment="bundle", bundle=BundleSettings(self_calibration=FREE))
+    settings = replace(settings_of(simulation), adjustment="bundle")
     return Sound(inputs, settings, simulation.spec)
 
 

@@ -96,7 +96,7 @@ CASES: dict[str, tuple[Spec, Callable[[Path], None], tuple[str, ...]]] = {
     ),
     "block, 20 % 5 mm wrong, self-calibration": (
         spec(BLOCK, 100, 2), images(0.2, 5.0),
-        (*BUNDLE, "--set", "processing.bundle.self_calibration=[principal_distance, principal_point, k1]"),
+        (*BUNDLE, "--set", "processing.self_calibration=[principal_distance, principal_point, k1]"),
     ),
     "block, camera positions 20 m off": (spec(BLOCK, 100, 2, gnss=True), cameras, BUNDLE),
     "block, a third of images and cameras off": (spec(BLOCK, 150, 2, gnss=True), a_third, (ALL,)),

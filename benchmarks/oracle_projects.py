@@ -307,7 +307,7 @@ def blocks() -> list[Project]:
             },
             keys={
                 "cameras": {"digital": {"principal_distance": 100.52, "distortion": {"k": [0, 0, 0]}}},
-                **bundle_keys(self_calibration=["principal_distance", "principal_point", "k1", "k2", "p1", "p2"]),
+                "processing": {"self_calibration": ["principal_distance", "principal_point", "k1", "k2", "p1", "p2"]},
             },
             quick=True,
         ),
@@ -318,10 +318,10 @@ def blocks() -> list[Project]:
             gnss={"use": True},
             keys={
                 "camera_positions": {"correction": "offset"},
-                **bundle_keys(
-                    self_calibration=["principal_distance", "k1", "affinity", "shear"],
-                    calibration_sigma={"principal_distance": 0.02},
-                ),
+                "processing": {
+                    "self_calibration": ["principal_distance", "k1", "affinity", "shear"],
+                    "bundle": {"calibration_sigma": {"principal_distance": 0.02}},
+                },
             },
         ),
         # standard deviations, tests

@@ -369,6 +369,22 @@ def with_camera(case: Case, factor: float) -> Inputs:
     return replace(case.inputs, strips=strips)
 
 
+def lens(case: Case) -> Planted | None:
+    """Bend the images by 20 to 40 µm at three quarters of half the diagonal, which nobody states."""
+    o = case.inputs.observations
+    radius = 0.75 * float(np.hypot(*o.xy.T).max())
+    k1 = float(case.rng.choice([-1.0, 1.0])) * float(case.rng.uniform(0.02, 0.04)) / radius**3
+    bent = o.xy * (1.0 + k1 * (o.xy**2).sum(axis=1)[:, None])
+    return replace(case.inputs, observations=replace(o, xy=bent)), NOBODY
+
+
+def principal_point(case: Case) -> Planted | None:
+    """Shift all images by half a millimetre to a millimetre."""
+    o = case.inputs.observations
+    shift = case.rng.choice([-1.0, 1.0], 2) * case.rng.uniform(0.5, 1.0, 2)
+    return replace(case.inputs, observations=replace(o, xy=o.xy + shift)), NOBODY
+
+
 def distance_by_ten(case: Case) -> Planted | None:
     """Misplace the decimal point of the principal distance."""
     return with_camera(case, float(case.rng.choice([10.0, 0.1, 1000.0, 0.001]))), NOBODY
@@ -1092,6 +1108,8 @@ MISTAKES = (
     Mistake("principal distance of another lens", distance, ("P105",)),
     Mistake("principal distance off by 1 to 3 %", distance_by_percents, ("P107", "P105")),
     Mistake("principal distance of one strip off by 10 %", distance_of_one_strip, ("P105",), block, "bundle"),
+    Mistake("lens distortion that is not stated, bundle", lens, ("P110",), adjustment="bundle"),
+    Mistake("principal point elsewhere, bundle", principal_point, ("P111",), block, "bundle"),
     Mistake("two neighbours exchanged in the list", pair_exchanged, ("P201",)),
     Mistake("a photo listed elsewhere", moved, ("P201",)),
     Mistake("all photos out of order", shuffled, ("P201",)),

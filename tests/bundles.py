@@ -67,8 +67,13 @@ def _calibrated(names: Sequence[str]) -> int:
 
 
 def _bent(problem: BundleProblem, common: Floats, camera: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Principal distances of the rays and corrections of their coordinates."""
-    x, y = problem.images.xy.T
+    """Principal distances of the rays and corrections of their coordinates; distortion is about the principal point."""
+    center = np.zeros((len(camera), 2))
+    for name, value in zip(problem.common_names(), common, strict=True):
+        title, _, kind = name.partition(": ")
+        if kind in {"x0", "y0"}:
+            center[camera == int(title.rpartition(" ")[2]), "xy".index(kind[0])] = value
+    x, y = (problem.images.xy - center).T
     r2 = x**2 + y**2
     zero = np.zeros_like(x)
     focal = problem.cameras.focal[camera].astype(float)

@@ -21,7 +21,7 @@ from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geometry.rotation import from_angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints, concatenated
-from photostrip.project.schema.cameras import Camera, Distortion, FirstPhoto
+from photostrip.project.schema.cameras import AUTO, Camera, Distortion, FirstPhoto
 from photostrip.project.schema.ground import CameraPositions as PositionsBlock
 from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
 from photostrip.project.schema.sections import Section
@@ -94,7 +94,8 @@ def distortion_of(given: Distortion) -> camera.Distortion:
 
 
 def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[Strip, ...]:
-    usual = project.processing.bundle.self_calibration
+    asked = project.processing.self_calibration
+    usual = [] if isinstance(asked, str) else asked
     return tuple(
         Strip(
             id=str(each.id),
@@ -337,7 +338,7 @@ def settings(project: ProjectFile) -> Settings:
         ),
         polynomial=_laid_over(usual.polynomial, wanted.polynomial),
         covariance=_laid_over(usual.covariance, wanted.covariance),
-        bundle=_laid_over(usual.bundle, wanted.bundle),
+        bundle=replace(_laid_over(usual.bundle, wanted.bundle), search_cameras=wanted.self_calibration == AUTO),
         interior=_laid_over(usual.interior, wanted.interior),
         refinement=replace(
             usual.refinement,

@@ -67,7 +67,7 @@ CONDITIONS = (  # of several that a key has, the first that fails is told
         ("polynomial",), _adjusted("auto", "polynomial", "bundle"), "`processing.adjustment: polynomial` or `auto`"
     ),
     Condition(("covariance",), _adjusted("auto", "covariance"), "`processing.adjustment: covariance` or `auto`"),
-    Condition(("bundle",), _adjusted("bundle"), "`processing.adjustment: bundle`"),
+    Condition(("bundle", "self_calibration"), _adjusted("bundle"), "`processing.adjustment: bundle`"),
     Condition(
         ("earth_radius", "earth_latitude", "earth_azimuth"),
         _curved("model", "image"),

@@ -212,7 +212,7 @@ def test_too_little_control_is_the_geometry(capsys: pytest.CaptureFixture[str], 
 
 
 def test_an_unknown_parameter_is_the_project(capsys: pytest.CaptureFixture[str]) -> None:
-    code, _, err = run(capsys, PROJECT, *BUNDLE, "--set", "processing.bundle.self_calibration=[k4]")
+    code, _, err = run(capsys, PROJECT, *BUNDLE, "--set", "processing.self_calibration=[k4]")
     assert code == 2
     assert "`k4` is not known" in err
 

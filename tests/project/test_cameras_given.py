@@ -110,7 +110,7 @@ def test_a_bundle_does_without_control_and_takes_single_photos(tmp_path: Path) -
 
 def test_self_calibration_of_each_camera(tmp_path: Path) -> None:
     project = given(tmp_path)
-    project.change(Y, "  adjustment: bundle\n", "  adjustment: bundle\n  bundle: {self_calibration: [k1, p1]}\n")
+    project.change(Y, "  adjustment: bundle\n", "  adjustment: bundle\n  self_calibration: [k1, p1]\n")
     assert [strip.calibrate for strip in project.load().inputs.strips] == [("k1", "p1")] * 2
     project.change(Y, "    format:", "    self_calibration: [principal_distance]\n    format:")
     assert [strip.calibrate for strip in project.load().inputs.strips] == [("principal_distance",)] * 2
@@ -135,7 +135,9 @@ WRONG = [
     (I, ",-100,", ",,", "imu.csv:3", "kappa"),
     (Y, "  sigma_angles: [0.02, 0.02, 0.04]\n", "", "imu.csv:2", "orientations.sigma_angles"),
     (Y, "system: omega-phi-kappa, unit: gon}\n  s", "system: opk, unit: gon}\n  s", "project.yaml:38:20:", "opk"),
-    (Y, "adjustment: bundle", "bundle: {self_calibration: [k4]}", "project.yaml:44:", "`k4` is not known"),
+    (Y, "adjustment: bundle", "self_calibration: [k4]", "project.yaml:44:", "`k4` is not known"),
+    (Y, "adjustment: bundle", "self_calibration: nevr", "project.yaml:44:", "did you mean `never`?"),
+    (Y, "adjustment: bundle", "bundle: {self_calibration: [k1]}", "project.yaml:44:", "`processing.self_calibration`"),
     (Y, "adjustment: bundle", "bundle: {calibration_sigma: {k4: 1}}", "project.yaml:44:", "no parameter"),
     (Y, "adjustment: bundle", "bundle: {test: t}", "project.yaml:44:", "tau"),
     (Y, "adjustment: bundle", "bundle: {alpha: 5}", "project.yaml:44:", "between 0 and 1"),

@@ -60,13 +60,13 @@ processing:
     degree: auto
   covariance:
     distances: true
+  self_calibration: auto
   bundle:
     screening: snooping
     test: tau
     level: 0.01
     power: 0.8
     variance_components: false
-    self_calibration: []
   relative:
     screening: auto
     grubbs_alpha: 0.05

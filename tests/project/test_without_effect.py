@@ -25,7 +25,7 @@ CASES: list[tuple[str, object, dict[str, Any]]] = [
     ("polynomial.degree", "1", {"adjustment": "polynomial"}),
     ("covariance.distances", False, {"adjustment": "covariance"}),
     ("bundle.level", 0.5, {"adjustment": "bundle"}),
-    ("bundle.self_calibration", ["k1"], {"adjustment": "bundle"}),
+    ("self_calibration", ["k1"], {"adjustment": "bundle"}),
     ("earth_radius", 1e6, {"earth_curvature": "model"}),
     ("earth_latitude", 10.0, {"earth_curvature": "model"}),
     ("flying_height", 9000.0, {"refraction": True}),

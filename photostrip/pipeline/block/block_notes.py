@@ -9,10 +9,11 @@ import numpy as np
 from photostrip.notes import Note
 from photostrip.pipeline.results import Bundle
 from photostrip.rejection import Rejection
-from photostrip.triangulation.bundle.common_errors import DISTANCE
+from photostrip.triangulation.bundle.common_errors import OF_CAMERAS
 from photostrip.triangulation.bundle.normal_equations import defects
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.quality import reliability
+from photostrip.triangulation.bundle.settings import CALIBRATION
 
 OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustment
     "control-doubtful",
@@ -58,9 +59,10 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
         )
         yield Note("unit-weight", text, severity="note")
     yield from _given_notes(bundle)
-    unasked = any(each.kind == DISTANCE for each in bundle.screened.common)
+    kinds = list(CALIBRATION.values())
+    taken_up = {kinds[k].title for each in bundle.screened.common for k in OF_CAMERAS.get(each.kind, ())}
     for parameter in bundle.parameters:
-        if not parameter.significant and not (unasked and parameter.name == "principal_distance"):
+        if not parameter.significant and parameter.name not in taken_up:
             text = (
                 f"camera {parameter.camera}: {parameter.name} is {parameter.value:.3g} {parameter.unit} with a "
                 f"standard deviation of {parameter.sigma:.3g}: it does not differ significantly from "

@@ -27,6 +27,7 @@ from photostrip.triangulation.bundle.observations.problem import (
 )
 from photostrip.triangulation.bundle.quality.self_calibration import sigmas
 from photostrip.triangulation.bundle.selection import Selection
+from photostrip.triangulation.bundle.settings import ASKED
 from photostrip.triangulation.resection.collinearity import KnownPhotos, project
 
 FAR_FROM_RAY = 5.0  # times the median: a ray of no pair that misses its point by more waits outside at first
@@ -96,7 +97,15 @@ def _cameras(inputs: Inputs, settings: Settings) -> BundleCameras:
     of_photo = locate([strip.camera.name for strip in inputs.strips for _ in strip.photos], cameras)
     focal = np.array([strip.camera.principal_distance for strip in cameras.values()])
     asked = [strip.calibrate for strip in cameras.values()]
-    return BundleCameras(of_photo, focal, sigmas(asked, settings.bundle.calibration_sigma))
+    stated = settings.bundle.calibration_sigma
+    taken_out = settings.refinement.distortion
+    return BundleCameras(
+        of_photo=of_photo,
+        focal=focal,
+        sigma=sigmas(asked, stated),
+        prior=sigmas([ASKED] * len(focal), stated),
+        distortion=tuple(strip.camera.distortion if taken_out else None for strip in cameras.values()),
+    )
 
 
 class GivenPositions(NamedTuple):

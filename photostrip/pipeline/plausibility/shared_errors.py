@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -12,7 +12,17 @@ from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
 from photostrip.pipeline.plausibility.shared_control import shifted_list
 from photostrip.pipeline.results import Bundle
-from photostrip.triangulation.bundle.common_errors import ALL, DISTANCE, DRIFT, LIST, OFFSET, SHOWN_SIGMAS, CommonError
+from photostrip.triangulation.bundle.common_errors import (
+    ALL,
+    DISTANCE,
+    DRIFT,
+    LENS,
+    LIST,
+    OFFSET,
+    POINT,
+    SHOWN_SIGMAS,
+    CommonError,
+)
 from photostrip.triangulation.bundle.observations.given_orientations import drift_columns
 from photostrip.triangulation.bundle.quality.reliability import CONTROL
 from photostrip.triangulation.bundle.quality.self_calibration import Parameter
@@ -24,11 +34,13 @@ KEY = "camera_positions.correction"
 
 
 def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
-    """Name what a group of observations shares (P105, P107, P208, P404, P407)."""
+    """Name what a group of observations shares (P105, P107, P110, P111, P208, P404, P407)."""
     shared = bundle.screened.common
     yield from (_list(each, inputs) for each in shared if each.kind == LIST)
     if any(each.kind == DISTANCE for each in shared):
         yield from (_distance(each, inputs) for each in bundle.parameters if _is_distance(each))
+    yield from (_lens(each, bundle, inputs) for each in shared if each.kind == LENS)
+    yield from (_point(each, bundle, inputs) for each in shared if each.kind == POINT)
     of_positions = [each for each in shared if each.kind in {OFFSET, DRIFT}]
     if of_positions:
         yield from _positions(bundle, inputs, of_positions[-1])
@@ -55,9 +67,53 @@ def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
         f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {camera.principal_distance:g} mm is given. "
         "The adjustment continued with the one that fits"
     )
-    fix = f"{FIX}; if that agrees with what is given, name it in `self_calibration`"
+    fix = f"{FIX}; if that agrees with what is given, {_decision(['principal_distance'])}"
     numbers: Evidence = {"standard_deviation_mm": parameter.sigma}
     return other_distance(camera, would_fit, message, fix, numbers, [each.id for each in strips])
+
+
+def _decision(names: Sequence[str]) -> str:
+    return (
+        f"write `processing.self_calibration: [{', '.join(names)}]` to have it estimated, or `never` to keep the "
+        "camera as it is given"
+    )
+
+
+def _parameters(error: CommonError, bundle: Bundle, asked: str) -> list[Parameter]:
+    """Return what was estimated of the camera that an error is of."""
+    camera = bundle.screened.problem.camera_ids[error.number]
+    return [each for each in bundle.parameters if each.camera == camera and each.name.startswith(asked)]
+
+
+def _lens(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
+    (k1,) = _parameters(error, bundle, "k1")
+    images = bundle.screened.problem.images
+    radius = float(np.hypot(*images.xy.T).max())
+    um, sigma_um = (each * radius**3 * 1000 for each in (k1.value, k1.sigma))
+    message = (
+        f"photos of camera {k1.camera} agree with each other and with what is given at a radial distortion that is not "
+        f"stated: k1 = {k1.value:.3g} mm^-2, {um:+.1f} µm at {radius:.0f} mm from the principal point (standard "
+        f"deviation {sigma_um:.1f} µm). The adjustment continued with it"
+    )
+    fix = f"look at the lens in the calibration certificate of the camera; {_decision(['k1'])}"
+    numbers: Evidence = {"k1": k1.value, "standard_deviation": k1.sigma, "radius_mm": radius, "distortion_um": um}
+    return found("P110", message, fix, numbers, strips=_strips_of(k1.camera, inputs), key="processing.self_calibration")
+
+
+def _point(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
+    x, y = _parameters(error, bundle, "principal_point")
+    message = (
+        f"photos of camera {x.camera} agree with each other and with what is given at a principal point that lies "
+        f"{x.value:+.3f}, {y.value:+.3f} mm from the given one (standard deviations {x.sigma:.3f}, {y.sigma:.3f} mm). "
+        "The adjustment continued with it"
+    )
+    fix = f"look at the principal point and the origin of the image coordinates; {_decision(['principal_point'])}"
+    numbers: Evidence = {"x_mm": x.value, "y_mm": y.value, "standard_deviation_mm": max(x.sigma, y.sigma)}
+    return found("P111", message, fix, numbers, strips=_strips_of(x.camera, inputs), key="processing.self_calibration")
+
+
+def _strips_of(camera: str, inputs: Inputs) -> list[str]:
+    return [each.id for each in inputs.strips if each.camera.name == camera]
 
 
 def _positions(bundle: Bundle, inputs: Inputs, error: CommonError) -> Iterator[Finding]:

@@ -3,13 +3,40 @@
 from typing import Annotated
 
 from photostrip.project.schema.ground import Angles
-from photostrip.project.schema.sections import Before, Length, Rule, Section, key, wrong
-from photostrip.project.schema.values import Id, Number, Pair, Positive, Triple, choice, if_empty, quoted
+from photostrip.project.schema.sections import Before, Length, Read, Rule, Section, key, wrong
+from photostrip.project.schema.values import (
+    Id,
+    Number,
+    Pair,
+    Positive,
+    Triple,
+    choice,
+    if_empty,
+    known_word,
+    quoted,
+    single,
+)
 from photostrip.triangulation.bundle.settings import ASKED
 from photostrip.triangulation.image_coordinates.certificate import PLACES
 
 Place = Annotated[str, choice(tuple(PLACES))]
 Parameter = Annotated[str, choice(ASKED)]
+AUTO, NEVER = "auto", "never"
+
+
+def _self_calibration(value: object) -> str | list[str]:
+    if isinstance(value, list):
+        return [known_word(single(each, f"one of {', '.join(ASKED)}"), ASKED) for each in value]
+    return known_word(single(value, f"{AUTO}, {NEVER} or a list of parameters"), (AUTO, NEVER))
+
+
+SelfCalibration = Annotated[
+    str | list[str],
+    Read(
+        _self_calibration,
+        {"anyOf": [{"enum": [AUTO, NEVER]}, {"type": "array", "items": {"enum": list(ASKED)}}]},
+    ),
+]
 
 
 class Distortion(Section):
@@ -61,7 +88,7 @@ class Camera(Section):
     )
     distortion: Distortion | None = key("Lens distortion", None)
     self_calibration: list[Parameter] | None = key(
-        "Parameters of this camera that the bundle adjustment estimates. Default: `processing.bundle.self_calibration`",
+        "Parameters of this camera that the bundle adjustment estimates. Default: `processing.self_calibration`",
         None,
     )
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.pipeline.inputs import ADJUSTMENTS, Settings
-from photostrip.project.schema.cameras import Parameter
+from photostrip.project.schema.cameras import AUTO, SelfCalibration
 from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong
 from photostrip.project.schema.values import (
     Flag,
@@ -120,7 +120,7 @@ class Bundle(Section):
         "Estimate the standard deviations of image coordinates, control and camera positions",
         DEFAULTS.bundle.variance_components,
     )
-    self_calibration: list[Parameter] = key(f"Parameters of the cameras that are estimated: {quoted(ASKED)}", [])
+    moved = {"self_calibration": "processing.self_calibration"}  # noqa: RUF012 (a class variable of Section)
     calibration_sigma: Annotated[dict[str, Positive], Before(if_empty)] = key(
         "A-priori standard deviations of these parameters, by name; free without one",
         {},
@@ -150,6 +150,12 @@ class Processing(Section):
     )
     polynomial: Polynomial = key("Polynomial adjustment", Polynomial())
     covariance: Covariance = key("Adjustment of a strip with its own covariance", Covariance())
+    self_calibration: SelfCalibration = key(
+        "`auto`: lens distortion, principal point and principal distance of a camera are estimated where the "
+        "measurements contradict what is given; `never`; or a list of parameters that are estimated: "
+        f"{quoted(ASKED)}",
+        AUTO,
+    )
     bundle: Bundle = key("Bundle adjustment", Bundle())
     relative: Relative = key("Relative orientation", Relative())
     links: Links = key("Links of independent models", Links())

@@ -110,6 +110,7 @@ class Section:
 
     keys: ClassVar[dict[str, Key]] = {}
     rules: ClassVar[tuple[Rule, ...]] = ()
+    moved: ClassVar[dict[str, str]] = {}  # keys of earlier versions, and which key of the project stands in their place
     types: ClassVar[dict[str, Any]]  # once they are asked for: the annotation of each key, and what reads it
     readers: ClassVar[dict[str, Reader]]
     given: frozenset[str]  # keys that are not left to their defaults
@@ -146,7 +147,7 @@ def read_section(kind: type[T], value: object, problems: list[Problem], path: Pa
     found = {name: readers[name](value[name], (*path, name), problems) for name in kind.keys if name in value}
     missing = [name for name, entry in kind.keys.items() if entry.default is ... and name not in value]
     problems += [Problem((*path, name), _missing(name, kind.keys[name])) for name in missing]
-    problems += [Problem((*path, name), _unknown(name, list(kind.keys))) for name in value if name not in kind.keys]
+    problems += [Problem((*path, name), _unknown(name, kind)) for name in value if name not in kind.keys]
     if len(problems) > before:
         return None
     section = kind(**found)
@@ -165,11 +166,11 @@ def _missing(name: str, entry: Key) -> WrongValueError:
     return wrong(f"`{name}` is missing", code="missing-key", expected=expected)
 
 
-def _unknown(name: str, known: list[str]) -> WrongValueError:
+def _unknown(name: str, kind: type[Section]) -> WrongValueError:
+    known = list(kind.keys)
     expected = f"one of {', '.join(known)}"
-    return wrong(
-        f"the key `{shown(name)}` is not known", code="unknown-key", expected=expected, fix=suggestion(name, known)
-    )
+    fix = f"write `{kind.moved[name]}`" if name in kind.moved else suggestion(name, known)
+    return wrong(f"the key `{shown(name)}` is not known", code="unknown-key", expected=expected, fix=fix)
 
 
 def types(kind: type[Section]) -> dict[str, Any]:

@@ -30,7 +30,14 @@ from photostrip.triangulation.bundle.settings import CALIBRATION
 from photostrip.triangulation.bundle.solution import BundleSolution
 from photostrip.triangulation.bundle.solve import solve
 
-OFFSET, DRIFT, DISTANCE, LIST = "offset", "drift", "principal distance", "control list"
+OFFSET, DRIFT, LIST = "offset", "drift", "control list"
+LENS, POINT, DISTANCE = "lens distortion", "principal point", "principal distance"
+OF_CAMERAS = {
+    LENS: [list(CALIBRATION).index("k1")],
+    POINT: [list(CALIBRATION).index("x0"), list(CALIBRATION).index("y0")],
+    DISTANCE: [PRINCIPAL_DISTANCE],
+}
+"""What may be wrong with a camera, with the columns of its parameters."""
 ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group, or every camera, have one of their own
 LEAST_SHARE = 1e-6  # of the weight of a list that other observations leave to its shift
@@ -42,11 +49,11 @@ UP_AXIS = 2
 class CommonError:
     """What a group of observations shares beside the truth."""
 
-    # ``OFFSET`` or ``DRIFT`` (which has an offset too) of camera positions, ``DISTANCE`` of cameras, or ``LIST``
+    # ``OFFSET`` or ``DRIFT`` (which has an offset too) of camera positions, one of ``OF_CAMERAS``, or ``LIST``
     kind: str
     of: str  # ``ALL`` or ``EACH``
     rival: str = ""  # kind of another error that explains nearly as much
-    number: int = -1  # of a control list
+    number: int = -1  # of a control list, or of a camera; -1: of all cameras
     # shift, sigma: how it lies beside everything else, along its axes, metres; NaN where it gives nothing
     shift: tuple[float, ...] = ()
     sigma: tuple[float, ...] = ()
@@ -60,10 +67,9 @@ def taken_up(problem: BundleProblem, error: CommonError) -> BundleProblem:
         outside = (problem.control.frame == error.number)[:, None] & (off[:UP_AXIS].any() | (np.arange(3) == UP_AXIS))
         control = replace(problem.control, sigma=np.where(outside, np.inf, problem.control.sigma))
         return replace(problem, control=control)
-    if error.kind == DISTANCE:
-        sigma = np.zeros((len(cameras.focal), len(CALIBRATION))) if cameras.sigma is None else cameras.sigma.copy()
-        sigma[:, PRINCIPAL_DISTANCE] = np.inf
-        return replace(problem, cameras=replace(cameras, sigma=sigma))
+    if error.kind in OF_CAMERAS:
+        which = np.arange(len(cameras.focal)) if error.number < 0 else np.array([error.number])
+        return replace(problem, cameras=cameras.with_unknown(which, OF_CAMERAS[error.kind]))
     group = np.where(positions.group >= 0, 0 if error.of == ALL else positions.group, -1)
     count = 1 if error.of == ALL else len(positions.offset_sigma)
     members = np.zeros((count, 3), np.intp)
@@ -71,6 +77,13 @@ def taken_up(problem: BundleProblem, error: CommonError) -> BundleProblem:
     drift = np.where((members > 1) & (error.kind == DRIFT), np.inf, 0.0)
     changed = replace(positions, group=group, offset_sigma=np.where(members > 0, np.inf, 0.0), drift_sigma=drift)
     return replace(problem, positions=changed, group_ids=("of the block",) if error.of == ALL else problem.group_ids)
+
+
+def given_up(problem: BundleProblem, error: CommonError) -> BundleProblem:
+    """Take the unknowns of an error of a camera back: the camera is as it is given."""
+    sigma = np.array(problem.cameras.sigma, float)
+    sigma[slice(None) if error.number < 0 else error.number, OF_CAMERAS[error.kind]] = 0.0
+    return replace(problem, cameras=replace(problem.cameras, sigma=sigma if sigma.any() else None))
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,8 @@ class BundleSettings:
     alpha: float | None = None
     power: float = 0.80  # probability with which an error of the size of the minimal detectable one is found
     variance_components: bool = False  # whether the standard deviations of the groups of observations are estimated
-    self_calibration: tuple[str, ...] = ()  # parameters of every camera that are estimated, of ``ASKED``
+    # whether lens distortion, principal point and principal distance are asked for before observations are thrown out
+    search_cameras: bool = True
     # a-priori standard deviations of these parameters about the given calibration, in their units; without one a
     # parameter is free
     calibration_sigma: dict[str, float] = field(default_factory=dict)

@@ -27,6 +27,8 @@ KINDS: dict[str, Kind] = {
     "P107": Kind("another principal distance fits better", WARNING),
     "P108": Kind("standard deviations in another unit", WARNING),
     "P109": Kind("image coordinates of one photo shifted", WARNING),
+    "P110": Kind("lens distortion that is not stated", WARNING),
+    "P111": Kind("another principal point fits better", WARNING),
     "P201": Kind("photos out of flight order", ERROR),
     "P202": Kind("neighbouring photos that do not overlap", ERROR),
     "P203": Kind("the same photo twice", ERROR),

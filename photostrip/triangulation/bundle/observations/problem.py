@@ -9,12 +9,14 @@ A sigma that is infinite switches an observation off; a sigma of zero is refused
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import field
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import dataclass
+from photostrip.camera import Distortion
+from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.triangulation.bundle.settings import CALIBRATION
 
@@ -118,6 +120,28 @@ class BundleCameras:
     # (cameras, 10), or None: a-priori standard deviations of the parameters ``CALIBRATION`` about zero, in mm and
     # powers of mm; infinite: free; 0: not a parameter. None: no calibration
     sigma: Floats | None = None
+    # (cameras, 10), or None: the same for parameters that an adjustment takes up unasked; None: free
+    prior: Floats | None = None
+    # of each camera: the given distortion, taken out of the image coordinates; (): none
+    distortion: tuple[Distortion | None, ...] = ()
+
+    @property
+    def unknown(self) -> Numbers:
+        """Place of each parameter among the unknowns, (cameras, 10); -1: not an unknown."""
+        found = np.full((len(self.focal), len(CALIBRATION)), -1)
+        if self.sigma is not None:
+            free = self.sigma > 0.0
+            found[free] = np.arange(int(free.sum()))
+        return found
+
+    def with_unknown(self, cameras: Numbers, columns: Sequence[int]) -> BundleCameras:
+        """Return the cameras with more parameters of some of them unknown."""
+        sigma = np.zeros((len(self.focal), len(CALIBRATION))) if self.sigma is None else self.sigma.copy()
+        prior = np.full(sigma.shape, np.inf) if self.prior is None else self.prior
+        for column in columns:
+            new = cameras[sigma[cameras, column] == 0.0]
+            sigma[new, column] = prior[new, column]
+        return replace(self, sigma=sigma)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from photostrip.arrays import Floats
+from photostrip.arrays import Floats, distinct
 from photostrip.frozen import dataclass
-from photostrip.triangulation.bundle.observations.calibration import PRINCIPAL_DISTANCE, Calibrated, corrections
+from photostrip.triangulation.bundle.observations.calibration import (
+    PRINCIPAL_DISTANCE,
+    Calibrated,
+    corrected,
+    partials,
+    values_of,
+)
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
 
 PHOTO = 6  # parameters of a photo
@@ -50,34 +56,31 @@ def view(
     by_photo[:, 0, 3], by_photo[:, 0, 4], by_photo[:, 0, 5] = -u * v, 1.0 + u * u, v
     by_photo[:, 1, 3], by_photo[:, 1, 4], by_photo[:, 1, 5] = -1.0 - v * v, u * v, -u
     by_photo *= pull[:, :, None]
-    by_common = _by_calibration(problem, calibrated, ratio, weight)
-    bent = by_common @ np.where(distance, 0.0, common)
+    values = values_of(cameras, common)
+    measured = images.xy if not len(calibrated) else corrected(cameras, values, images.xy, cameras.of_photo[photo])
     return Rays(
-        misfit=images.xy * weight - ratio * pull - bent.reshape(-1, 2),
+        misfit=measured * weight - ratio * pull,
         by_photo=by_photo,
         by_point=-by_photo[:, :, :3] @ back,
-        by_common=by_common,
+        by_common=_by_calibration(problem, calibrated, values, ratio, weight),
     )
 
 
-def _by_calibration(problem: BundleProblem, calibrated: Calibrated, ratio: Floats, weight: Floats) -> csr_array:
-    """Differentiate the computed image coordinates by the calibration parameters: (2 n, c), in units of sigma.
-
-    A correction of the measurement counts as a change of the computed coordinate with the opposite sign; ``ratio``
-    (n, 2) is the computed image point divided by the principal distance.
-    """
+def _by_calibration(
+    problem: BundleProblem, calibrated: Calibrated, values: Floats, ratio: Floats, weight: Floats
+) -> csr_array:
+    """Differentiate computed minus corrected image coordinates by the calibration parameters: (2 n, c), in sigmas."""
     shape = (2 * len(ratio), len(calibrated))
     if not len(calibrated):
         return csr_array(shape)
     camera = problem.cameras.of_photo[problem.images.photo]
-    values, rows, columns = [], [], []
-    for number in np.unique(calibrated.camera):
+    entries, rows, columns = [], [], []
+    for number in distinct(calibrated.camera).tolist():
         ray, column = np.flatnonzero(camera == number), np.flatnonzero(calibrated.camera == number)
-        table = -corrections(problem.images.xy[ray].T)
-        table[PRINCIPAL_DISTANCE] = ratio[ray].T
-        values.append((table[calibrated.kind[column]] * weight[ray].T).ravel())
+        table = partials(problem.cameras, values, number, problem.images.xy[ray], ratio[ray])
+        entries.append((table[calibrated.kind[column]] * weight[ray].T).ravel())
         places = np.broadcast_arrays(column[:, None, None], 2 * ray + np.arange(2)[:, None])
         columns.append(places[0].ravel())
         rows.append(places[1].ravel())
-    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    return csr_array(coo_array(entries, shape=shape))
+    place = (np.concatenate(rows), np.concatenate(columns))
+    return csr_array(coo_array((np.concatenate(entries), place), shape=shape))

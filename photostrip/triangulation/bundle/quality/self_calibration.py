@@ -9,7 +9,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.statistics import t_p_value
-from photostrip.triangulation.bundle.observations.calibration import corrections
+from photostrip.triangulation.bundle.observations.calibration import PRINCIPAL_DISTANCE, corrected, values_of
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
 from photostrip.triangulation.bundle.settings import CALIBRATION
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
@@ -56,27 +56,18 @@ def millimetre(xy: Floats) -> Floats:
     return np.array([edge**-each.power for each in CALIBRATION.values()])
 
 
-def values_of(problem: BundleProblem, common: Floats) -> Floats:
-    """Calibration parameters camera by camera, (cameras, 10); 0 for what was not estimated."""
-    sigma = problem.cameras.sigma
-    found = np.zeros((len(problem.cameras.focal), len(CALIBRATION)))
-    if sigma is not None:
-        found[sigma > 0.0] = common[: int((sigma > 0.0).sum())]
-    return found
-
-
 def image_shift(problem: BundleProblem, common: Floats, xy: Floats, photo: Numbers) -> Floats:
     """Correction (n, 2) that makes ideal image coordinates of the given principal distance, to be added to them, mm.
 
     A change of the principal distance is turned into a change of scale of the photo.
     """
-    values = values_of(problem, common)
+    values = values_of(problem.cameras, common)
     if not values.any():
         return np.zeros_like(xy)
     camera = problem.cameras.of_photo[photo]
-    shifted = xy + np.einsum("nij,nj->ni", corrections(xy.T).transpose(2, 1, 0), values[camera])
     focal = problem.cameras.focal[camera]
-    return np.asarray(shifted * (focal / (focal + values[camera, 0]))[:, None] - xy, float)
+    shifted = corrected(problem.cameras, values, xy, camera)
+    return np.asarray(shifted * (focal / (focal + values[camera, PRINCIPAL_DISTANCE]))[:, None] - xy, float)
 
 
 def parameters_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Parameter, ...]:

@@ -18,8 +18,14 @@ from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import dataclass, replace
 from photostrip.rejection import Rejection
-from photostrip.triangulation.bundle import robust
-from photostrip.triangulation.bundle.common_errors import CommonError, find_common_error, taken_up
+from photostrip.triangulation.bundle import camera_errors, robust
+from photostrip.triangulation.bundle.common_errors import (
+    OF_CAMERAS,
+    CommonError,
+    find_common_error,
+    given_up,
+    taken_up,
+)
 from photostrip.triangulation.bundle.normal_equations import defects
 from photostrip.triangulation.bundle.normal_equations.datum import is_free
 from photostrip.triangulation.bundle.observations.problem import BundleProblem
@@ -96,9 +102,11 @@ def screen_bundle(
     chosen = supported(problem, begin)
     if settings.screening == "robust":
         chosen = search.robust(chosen)
-    done = search.clean(chosen)
+    done = search.clean(search.with_doubted_control(chosen))
     while (more := search.fitting(done)) is not None:  # a point comes back once only
         done = search.clean(more)
+    while search.put_back(done):
+        done = search.clean(supported(search.problem, done.selection))
     held = tuple(each for each in search.tested(done)[1] if search.holds(each))
     done = replace(done, rejections=tuple(search.log(done)), held=held)
     return replace(done, rounds=search.rounds, common=tuple(search.common))
@@ -134,6 +142,8 @@ class _Search:
         self.rounds = self.failed = 0
         self.common: list[CommonError] = []
         self.next_trial = 0  # given coordinates that are out when a common error, tried in vain, is tried again
+        # observations that are out when errors of cameras, asked for in vain, are asked for again
+        self.next_question = float("inf") if rough or not settings.search_cameras else 0
 
     def rays_of(self, points: Numbers, among: Flags | None = None) -> Numbers:
         """Rows of all rays of points, or of those `among` them (n,), by point, then photo."""
@@ -170,6 +180,9 @@ class _Search:
         done = self.adjust(selection)
         while True:
             worst = self._worst(done)
+            if self._take_up_camera(done, worst):
+                done = self.adjust(supported(self.problem, done.selection))
+                continue
             if isinstance(worst, WrongRays) and len(worst):
                 done = self._without_rays(done, worst)
                 continue
@@ -183,6 +196,69 @@ class _Search:
                 return done
             done = self._without_given(done, given)
 
+    def with_doubted_control(self, selection: Selection) -> Selection:
+        """Put in what the strips by themselves left out of the control, where an error of a camera explains it better.
+
+        Their search knows nothing of cameras: of a lens that is not as stated it throws out sound control.
+        """
+        if self.next_question or not self.waiting.any():
+            return selection
+        before = self.problem
+        everything = Selection.everything(before).control
+        try:
+            without, done = (
+                self.adjust(selection),
+                self.adjust(supported(before, replace(selection, control=everything))),
+            )
+        except GeometryError:
+            self.problem = before
+            return selection
+        unit = done.limit.unit
+        fall = max(done.solution.chi_square - without.solution.chi_square, 0.0) / unit**2
+        doubted = camera_errors.log_probability(fall, int(self.waiting.sum()))
+        likely = camera_errors.most_likely(done.problem, done.solution, unit)
+        if likely is None or likely.log_p > min(doubted, self._level_of_common()):
+            self.problem = before
+            return selection
+        self._take_up(likely.error)
+        self.waiting[:], self.control = False, everything
+        self.began = {key: each for key, each in self.began.items() if key[0] != CONTROL}
+        return supported(self.problem, done.selection)
+
+    def _level_of_common(self) -> float:
+        """Logarithm of the level at which anything but single observations is taken up: half of that of all tests."""
+        return float(np.log(self.settings.level / 2))
+
+    def _take_up(self, error: CommonError) -> None:
+        self.common.append(error)
+        self.problem = taken_up(self.problem, error)
+
+    def _take_up_camera(self, done: ScreenedBundle, worst: list[Rejection] | WrongRays) -> bool:
+        """Take up an error of a camera where it explains more, by its probability, than the worst observation."""
+        out = int((~done.selection.images).sum()) + self._given_out()
+        value = float(worst.value.max(initial=0.0)) if isinstance(worst, WrongRays) else worst[0].value
+        if out < self.next_question or not (value or reliability.sigma0_test(done.solution).too_large):
+            return False
+        likely = camera_errors.most_likely(done.problem, done.solution, done.limit.unit)
+        of_worst = camera_errors.log_probability_of_worst(value, done.solution.redundancy)
+        if likely is None or likely.log_p > min(of_worst, self._level_of_common()):
+            self.next_question = 2 * out + 1
+            return False
+        self._take_up(likely.error)
+        return True
+
+    def put_back(self, done: ScreenedBundle) -> bool:
+        """Give up errors of cameras that mean nothing in the end; whether there were any."""
+        errors = [each for each in self.common if each.kind in OF_CAMERAS]
+        unit = done.limit.unit
+        found = camera_errors.log_probabilities(done.problem, done.solution, done.precision, unit, errors)
+        gone = [each for each, log_p in zip(errors, found, strict=True) if log_p > self._level_of_common()]
+        for each in gone:
+            self.common.remove(each)
+            self.problem = given_up(self.problem, each)
+        self.next_question = float("inf")
+        return bool(gone)
+
     def _take_up_common(self, done: ScreenedBundle, worst: Rejection | None = None) -> bool:
         """Take up what a group of observations shares, where that explains more than the worst given coordinate."""
         if worst and self._given_out() < self.next_trial:
@@ -191,8 +267,7 @@ class _Search:
         if found is None:
             self.next_trial = 2 * self._given_out() + 1
             return False
-        self.common.append(found)
-        self.problem = taken_up(self.problem, found)
+        self._take_up(found)
         return True
 
     def _without_rays(self, done: ScreenedBundle, worst: WrongRays) -> ScreenedBundle:

@@ -1,0 +1,99 @@
+"""A camera that is not as stated: named, estimated beside what is given, at no cost for sound control."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, norm
+
+from photostrip.camera import Distortion
+from photostrip.pipeline.run import triangulate
+from photostrip.simulation import FILM, Control, Flight, GrossError, Points, Spec, simulate
+from photostrip.triangulation.bundle.camera_errors import log_probability, log_probability_of_worst
+from tests.pipeline.blocks import errors
+from tests.simulated import inputs_of, settings_of
+
+if TYPE_CHECKING:
+    from photostrip.pipeline.results import Result
+    from photostrip.simulation import Simulation
+
+K1 = -2e-8  # mm^-2: 20 µm at 100 mm
+LENS = Distortion("brown", "image_to_ideal", k=(K1, 0.0, 0.0))
+
+
+def strip(seed: int, photos: int = 30, *wrong: GrossError) -> Spec:
+    return Spec(
+        seed=seed,
+        flight=Flight(photos=photos),
+        points=Points(extra_per_model=6),
+        control=Control(bands=8),
+        gross_errors=wrong,
+    )
+
+
+def adjusted(simulation: Simulation, **settings: object) -> Result:
+    """Adjust a simulation as if its camera had no distortion."""
+    inputs = inputs_of(simulation)
+    strips = tuple(replace(each, camera=replace(each.camera, distortion=None)) for each in inputs.strips)
+    asked = replace(settings_of(simulation), adjustment="bundle")
+    asked = replace(asked, bundle=replace(asked.bundle, **settings))  # type: ignore[arg-type]
+    return triangulate(replace(inputs, strips=strips), asked)
+
+
+def taken_up(result: Result) -> list[str]:
+    assert result.bundle is not None
+    return [each.name for each in result.bundle.parameters]
+
+
+def control_lost(result: Result) -> int:
+    assert result.bundle is not None
+    return sum(each.kind == "control" and not each.readmitted for each in result.bundle.screened.rejections)
+
+
+def up(simulation: Simulation, result: Result) -> float:
+    """Rms of the errors in height, metres."""
+    return float(np.sqrt((errors(simulation, result)[:, 2] ** 2).mean()))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [21, 22])
+def test_an_unstated_lens_is_named_and_costs_nothing(seed: int) -> None:
+    spec = strip(seed)
+    sound, bent = simulate(spec), simulate(replace(spec, camera=replace(FILM, distortion=LENS)))
+    result = adjusted(bent)
+    (finding,) = result.findings
+    assert finding.code == "P110"
+    assert finding.key == "processing.self_calibration"
+    assert "[k1]" in finding.fix
+    assert finding.evidence["k1"] == pytest.approx(K1, abs=4 * float(finding.evidence["standard_deviation"]))
+    assert control_lost(result) == 0
+    assert up(bent, result) < 1.1 * up(sound, adjusted(sound))
+    left = adjusted(bent, search_cameras=False)
+    assert taken_up(left) == []
+    assert up(bent, left) > 1.3 * up(bent, result)
+
+
+@pytest.mark.slow
+def test_gross_errors_are_no_error_of_a_camera() -> None:
+    for seed in range(31, 35):
+        wrong = (GrossError("image", count=8, size_um=150.0), GrossError("control", count=2, size_m=3.0))
+        assert taken_up(adjusted(simulate(strip(seed, 20, *wrong)))) == []
+
+
+@pytest.mark.slow
+def test_a_lens_is_told_among_gross_errors() -> None:
+    wrong = (GrossError("image", count=8, size_um=300.0), GrossError("control", count=1, size_m=3.0))
+    result = adjusted(simulate(replace(strip(41, 30, *wrong), camera=replace(FILM, distortion=LENS))))
+    assert taken_up(result) == ["k1"]
+    assert control_lost(result) <= 3
+
+
+def test_probabilities_are_those_of_scipy_and_go_on_where_numbers_end() -> None:
+    for squares, freedom in ((3.0, 1), (30.0, 2), (200.0, 12)):
+        assert log_probability(squares, freedom) == pytest.approx(chi2.logsf(squares, freedom), rel=1e-9)
+    assert log_probability(4000.0, 1) == pytest.approx(norm.logsf(4000.0**0.5) + np.log(2.0), rel=1e-5)
+    assert log_probability_of_worst(6.0, 100) == pytest.approx(norm.logsf(6.0) + np.log(200.0), rel=1e-9)
+    assert log_probability_of_worst(0.0, 100) == 0.0
