@@ -1,4 +1,4 @@
-"""The sparse rows of the precision written out in full, for strips small enough for that."""
+"""Derivatives of a whole run by differences, and the errors of its strips."""
 
 from __future__ import annotations
 
@@ -7,24 +7,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.pipeline.precision.photo_precision import propagation
+from photostrip.pipeline.precision.photo_precision import fitted
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
-from photostrip.triangulation.error_propagation.derivatives import MOVED
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.sparse import csr_array
 
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline.inputs import Inputs
-    from photostrip.pipeline.precision.check_points import Propagation
     from photostrip.pipeline.results import Result
-    from photostrip.triangulation.error_propagation.derivatives import ErrorRows, PointRows
+    from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
@@ -51,9 +50,9 @@ def without_noise(wanted: Spec) -> Inputs:
     return replace(inputs, observations=replace(inputs.observations, sigma=sigma))
 
 
-def errors_of(result: Result, number: int = 0) -> Propagation:
-    """Rows and operators of a strip of a result."""
-    return propagation(result.strips[number], oriented_of(result, number), result.refined.observations)
+def fitted_strip(result: Result, factor: float = 1.0) -> FittedStrip:
+    """Errors of the strip of a result after its fit to the control."""
+    return fitted(result.strips[0], oriented_of(result), factor)
 
 
 def oriented_of(result: Result, number: int = 0) -> OrientedStrip[StripErrors]:
@@ -80,33 +79,13 @@ def oriented_of(result: Result, number: int = 0) -> OrientedStrip[StripErrors]:
     )
 
 
-def every(points: PointRows) -> ErrorRows:
-    """Give the rows of all points."""
-    return points.take(np.arange(len(points.first)))
-
-
-def written_out(rows: ErrorRows, errors: StripErrors) -> Floats:
-    """Derivatives of things by all image coordinates in units of their sigmas, shape (n, d, images * 2)."""
-    images, models = errors.images, errors.models
-    count = len(images.row)
-    units = np.zeros((models + 3, 6, count, 2))
-    for image in range(count):
-        components = np.zeros((2, 18))
-        components[:, MOVED] = images.components[image]
-        for slot in range(3):
-            model = images.photo[image] - 2 + slot
-            if 0 <= model < models:
-                units[model, :, image] = components[:, 6 * slot : 6 * slot + 6].T
-    flat = units.reshape(models + 3, 6, -1)
-    steps = np.einsum("kab,kbc->kac", errors.steps, flat[:models])
-    frames = np.concatenate([np.zeros((1, 7, count * 2)), np.cumsum(steps, axis=0)])
-    result = np.einsum("nda,nac->ndc", rows.by_similarity, frames[rows.first])
-    for slot in range(rows.by_component.shape[1]):
-        result += np.einsum("nda,nac->ndc", rows.by_component[:, slot], flat[np.minimum(rows.first + slot, models)])
-    split: Floats = result.reshape(*result.shape[:2], count, 2)
-    for item, image, own in zip(rows.item, rows.image, rows.by_image, strict=True):
-        split[item, :, image] += own
-    return split.reshape(*split.shape[:2], -1)
+def written_out(errors: StripErrors, rows: csr_array) -> Floats:
+    """Derivatives of sparse rows by all errors: each frame is the sum of the steps before it."""
+    components = errors.components.toarray().reshape(errors.models, 6, -1)
+    steps, elements = errors.steps @ components, components[:, :5]
+    frames = np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
+    count = steps.shape[2]
+    return np.asarray(rows @ np.concatenate([frames.reshape(-1, count), elements.reshape(-1, count), np.eye(count)]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
 from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-from photostrip.pipeline.strips.notes import precision_beyond_control
+from photostrip.pipeline.strips.notes import precision_beyond_control, precision_of_long_strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips
 
@@ -44,12 +44,15 @@ def join_strips(
     """
     points = _joined(strips, observations.point_ids, output)
     each: list[strip_precision.StripPrecision] = []
-    if settings.precision:
+    notes: list[Note] = []
+    too_long = [strip for strip in strips if photo_precision.too_long(strip) and not of_checks]
+    if settings.precision and too_long:
+        notes += [precision_of_long_strip(strip.of_photos.strip, photo_precision.MOST_PHOTOS) for strip in too_long]
+    elif settings.precision:
         each = [
             _precision_of(strip, before.oriented, observations, given, of_checks=of_checks)
             for strip, before in zip(strips, screened, strict=True)
         ]
-    notes: list[Note] = []
     for strip, found in zip_longest(strips, each):
         notes += strip.notes
         solved = None if strip.photo_stages is None else strip.photo_stages.solved

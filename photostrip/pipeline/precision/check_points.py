@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,34 +17,12 @@ from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
-from photostrip.triangulation.error_propagation.covariances import ParameterCovariances
-from photostrip.triangulation.error_propagation.joint_covariances import after_fit
-from photostrip.triangulation.error_propagation.photo_errors import PhotoErrors, UsedRays, differentiate_photos
-from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-from photostrip.triangulation.resection.resection import Resection
+from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
 
 if TYPE_CHECKING:
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
 MOST_TESTED = 100  # check points of a strip that are tested together, spread over it
-
-
-@dataclass(frozen=True, eq=False)
-class Propagation:
-    """Rows of derivatives of one strip in its intermediate frame, and what the fit to the control takes away."""
-
-    errors: StripErrors
-    control: control_errors.Misclosures  # control coordinates that count
-    fit: control_errors.FitOperator
-    xyz: Floats  # (q, 3): points after the similarity, where the fit takes away its influence
-    sightings: UsedRays  # of the points on the photos
-    resection: Resection
-
-    def photos(self) -> Iterator[PhotoErrors]:
-        """Rows of the photos that could be oriented, some at a time."""
-        return differentiate_photos(
-            self.errors, self.sightings, self.resection, lambda point: self.fit.polynomial_columns(self.xyz[point])
-        )
 
 
 class CheckPoints(NamedTuple):
@@ -85,7 +63,7 @@ class CheckDifferences:
 
 
 def compare_with_checks(
-    strip: StripResult, errors: StripErrors, checks: CheckPoints, frames: Sequence[GroundFrame]
+    strip: StripResult, checks: CheckPoints, frames: Sequence[GroundFrame]
 ) -> CheckDifferences | None:
     """Compare a strip with its check points, in the ground frames of the given points; None without any."""
     if not len(checks.rows):
@@ -93,33 +71,27 @@ def compare_with_checks(
     xyz = strip.xyz[checks.rows]
     targets = absolute_orientation.Targets(checks.points, frames, strip.intermediate)
     axes = targets.axes(xyz)
-    found = control_errors.misclosures(errors.points, targets.turned(xyz), checks.rows, axes)
+    found = control_errors.misclosures(targets.turned(xyz), checks.rows, axes)
     return CheckDifferences(checks, found, targets.misclosures(xyz, axes)[found.point, found.axis])
 
 
-def by_fit(
-    found: Propagation, compared: CheckDifferences, parameters: ParameterCovariances, factor: float
-) -> CheckErrors:
-    """Return the errors at the check points of a strip that was fitted to the control.
-
-    factor: variance factor of the image coordinates.
-    """
+def by_fit(found: FittedStrip, compared: CheckDifferences) -> CheckErrors:
+    """Return the errors at the check points of a strip that was fitted to the control."""
     at = compared.coordinates
-    influence = np.einsum("wi,wit->wt", at.direction, found.fit.influence(found.xyz[compared.checks.rows])[at.point])
-    return _errors(compared, after_fit(found.errors, at.rows, parameters, influence), factor)
+    return errors_at_checks(compared, found.joint_covariance(at.row, at.direction))
 
 
 def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> CheckErrors:
     """Return the errors at the check points of a strip that was adjusted with its own covariance."""
-    return _errors(compared, adjusted.joint_covariance_at(compared.checks.rows, compared.coordinates), 1.0)
+    return errors_at_checks(compared, adjusted.joint_covariance_at(compared.checks.rows, compared.coordinates))
 
 
-def _errors(compared: CheckDifferences, covariance: Floats, factor: float) -> CheckErrors:
+def errors_at_checks(compared: CheckDifferences, covariance: Floats) -> CheckErrors:
     """Return all differences; their covariance is that of the adjusted coordinates and of the given ones."""
     return CheckErrors(
         ids=compared.checks.points.ids,
         point=compared.coordinates.point,
         axis=compared.coordinates.axis,
         difference=compared.difference,
-        covariance=covariance * factor + np.diag(compared.coordinates.variance),
+        covariance=covariance + np.diag(compared.coordinates.variance),
     )

@@ -8,16 +8,19 @@ import numpy as np
 
 from photostrip.arrays import Floats, median
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
-from photostrip.pipeline.precision.check_points import CheckPoints, check_points
+from photostrip.pipeline.precision.check_points import (
+    CheckPoints,
+    check_points,
+    compare_with_checks,
+    errors_at_checks,
+)
 from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 from photostrip.triangulation.error_propagation.control_errors import FitOperator
-from photostrip.triangulation.error_propagation.covariances import variance_factor
+from photostrip.triangulation.error_propagation.image_variance import variance_factor
 from photostrip.triangulation.independent_models import model_errors, model_misclosures, perspective_centers
 from photostrip.triangulation.independent_models.formation import FormedModels
 from photostrip.triangulation.independent_models.model_errors import ModelErrors
@@ -38,7 +41,9 @@ def of_models(
     given: all given points; the check points among them are compared with what is found.
     """
     formed, axes = strip.of_models.formed, strip.intermediate.axes
-    found, control, fit = oriented.errors, oriented.misclosures, _fit_to_control(strip, oriented)
+    found, control = oriented.errors, oriented.misclosures
+    terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
+    fit = oriented.fit(terms)
     factor, basis = variance_of_models(formed)
     influence = _influence(strip, fit)
     by_parameters = model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, fit.operator))
@@ -69,14 +74,6 @@ def _of_photos(formed: FormedModels, nodes: Floats) -> Floats:
     for photo in np.flatnonzero(np.isfinite(formed.centers).all(axis=1)).tolist():
         photos[photo, :3, :3] = nodes[row[photo]]
     return photos
-
-
-def _fit_to_control(strip: StripResult, oriented: OrientedStrip[ModelErrors]) -> FitOperator:
-    """Operator of the fit to the control, with the weights that were in force."""
-    terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
-    return control_errors.fit_operator(
-        oriented.misclosures, oriented.weights, oriented.at_control, terms, oriented.errors.origin
-    )
 
 
 def _influence(strip: StripResult, fit: FitOperator) -> Floats:
@@ -114,18 +111,12 @@ def _check(
 ) -> CheckErrors | None:
     """Return the errors at the check points with their covariance; None without any."""
     found, control = oriented.errors, oriented.misclosures
-    if not len(checks.rows):
+    compared = compare_with_checks(strip, checks, oriented.frames)
+    if compared is None:
         return None
-    xyz = strip.xyz[checks.rows]
-    targets = absolute_orientation.Targets(checks.points, oriented.frames, strip.intermediate)
-    axes = targets.axes(xyz)
-    at = model_misclosures.misclosures(targets.turned(xyz), axes, xyz, found.origin)
-    difference = targets.misclosures(xyz, axes)[at.point, at.axis]
-    by_control = np.einsum("wi,wit->wt", at.direction, influence[checks.rows][at.point]) @ fit.operator
+    at = compared.coordinates
+    by_control = np.einsum("wi,wit->wt", at.direction, influence[at.row]) @ fit.operator
     sums = model_errors.sums(found, *model_misclosures.weights(at, checks.rows))
     sums = sums - model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, by_control))
     spread = model_errors.covariance_of_sums(found, sums) * factor + (by_control * control.variance) @ by_control.T
-    covariance = spread + np.diag(at.variance)
-    return CheckErrors(
-        ids=checks.points.ids, point=at.point, axis=at.axis, difference=difference, covariance=covariance
-    )
+    return errors_at_checks(compared, spread)

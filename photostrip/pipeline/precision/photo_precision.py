@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, pieces
-from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.arrays import Floats, Numbers
 from photostrip.pipeline.precision import check_points
-from photostrip.pipeline.precision.check_points import CheckPoints, Propagation
 from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.triangulation.error_propagation import control_errors, covariances, photo_errors
+from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
+from photostrip.triangulation.error_propagation.image_variance import image_variance
+from photostrip.triangulation.error_propagation.photo_errors import PhotoErrors, differentiate_photos
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 if TYPE_CHECKING:
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+
+MOST_PHOTOS = 400  # of a strip fitted to its control: the work grows by the square of their number, to 1 s
 
 
 def of_photos(
@@ -37,63 +38,63 @@ def of_photos(
     given: all given points; the check points among them are compared with what is found.
     """
     checks = check_points.check_points(strip, given, observations)
-    if strip.of_photos.solved is not None:
-        return _of_covariance(strip, strip.of_photos.solved, checks, oriented.frames, of_checks=of_checks)
-    found = propagation(strip, oriented, observations)
-    errors, fit, xyz, control, operator = found.errors, found.fit, found.xyz, found.control, found.fit.operator
-    stated = strip.of_photos.sigma
-    factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
-    parameters = covariances.of_parameters(errors, found.control, operator, factor)
-    compared = check_points.compare_with_checks(strip, errors, checks.spread(), oriented.frames)
-    wanted = checks.rows if of_checks else None
-    del checks  # of tens of thousands a hundred are compared
-    check = None if compared is None else check_points.by_fit(found, compared, parameters, factor)
+    compared = check_points.compare_with_checks(strip, checks.spread(), oriented.frames)
+    points = np.full((len(strip.xyz), 3, 3), np.nan)
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
-    for some in () if wanted is not None else found.photos():
-        of_some = covariances.covariances(errors, some.rows, parameters, some.influence.__getitem__)
-        photos[some.photos] = of_some * factor
-    del found  # with the rays of all photos: the largest table comes last, when what the others take is free again
-    table, at = (errors.points, xyz) if wanted is None else (errors.points.take(wanted), xyz[wanted])
-    points = covariances.covariances(errors, table, parameters, lambda rows: fit.influence(at[rows]))
-    points *= factor
-    if wanted is not None:
-        of_checked, points = points, np.full((len(xyz), 3, 3), np.nan)
-        points[wanted] = of_checked
-    axes = strip.intermediate.axes
+    if strip.of_photos.solved is not None:
+        wanted = checks.rows if of_checks else None
+        return _of_covariance(strip, strip.of_photos.solved, compared, points, photos, wanted)
+    stated = strip.of_photos.sigma
+    factor, basis = image_variance(strip.of_photos.orientation, stated)
+    found = fitted(strip, oriented, factor)
+    if of_checks:
+        points[checks.rows] = found.covariances_of_points(checks.rows)
+    else:
+        points = found.covariances_of_points(np.arange(len(points)))
+        solved = np.flatnonzero(strip.of_photos.resection.solved)
+        by_photo = photo_errors(strip, oriented.errors, observations)
+        photos[solved] = found.covariances_of_photos(by_photo, solved)
+    axes, fit = strip.intermediate.axes, found.fit
     return StripPrecision(
-        points=_points_turned(axes, points),
+        points=axes @ points @ axes.T,
         photos=_turned(strip, photos),
-        by_control=lambda rows, columns: axes @ fit.influence(xyz[rows]) @ operator[:, columns],
-        control=np.column_stack([strip.formed.point[strip.control_rows][control.point], control.axis]),
-        variance=control.variance,
+        by_control=lambda rows, columns: axes @ fit.influence(found.xyz[rows]) @ fit.operator[:, columns],
+        control=_control_of(strip, found.control.point, found.control.axis),
+        variance=found.control.variance,
         sigma=stated * float(np.sqrt(factor)),
         basis=basis,
-        check=check,
+        check=None if compared is None else check_points.by_fit(found, compared),
     )
+
+
+def too_long(strip: StripResult) -> bool:
+    """Whether a strip was fitted to its control that has too many photos for the covariances of all its points."""
+    stages = strip.photo_stages
+    return stages is not None and stages.solved is None and len(stages.strip.photos) > MOST_PHOTOS
 
 
 def _of_covariance(
     strip: StripResult,
     adjusted: CovarianceAdjustment,
-    checks: CheckPoints,
-    frames: Sequence[GroundFrame],
-    *,
-    of_checks: bool,
+    compared: check_points.CheckDifferences | None,
+    points: Floats,
+    photos: Floats,
+    wanted: Numbers | None,
 ) -> StripPrecision:
-    """Covariances from the system that the adjustment with the strip's own covariance has solved."""
-    compared = check_points.compare_with_checks(strip, adjusted.system.errors, checks.spread(), frames)
+    """Covariances from the system that the adjustment with the strip's own covariance has solved.
+
+    wanted: points of which alone they are wanted.
+    """
     control, axes = adjusted.figures.control, strip.intermediate.axes
-    if of_checks:
-        points, photos = np.full((len(strip.xyz), 3, 3), np.nan), np.full((len(strip.strip.photos), 6, 6), np.nan)
-        if compared is not None:
-            points[checks.rows] = adjusted.of_points(checks.rows)
-    else:
+    if wanted is None:
         points, photos = adjusted.points, adjusted.photos
+    elif len(wanted):
+        points[wanted] = adjusted.of_points(wanted)
     return StripPrecision(
-        points=_points_turned(axes, points),
+        points=axes @ points @ axes.T,
         photos=_turned(strip, photos),
         by_control=lambda rows, columns: np.asarray(axes @ adjusted.by_control(rows, columns), float),
-        control=np.column_stack([strip.formed.point[strip.control_rows][control.point], control.axis]),
+        control=_control_of(strip, control.point, control.axis),
         variance=control.variance,
         sigma=adjusted.figures.sigma,
         basis=adjusted.figures.basis,
@@ -101,11 +102,8 @@ def _of_covariance(
     )
 
 
-def _points_turned(axes: Floats, points: Floats) -> Floats:
-    """Turn covariances of points to other axes, in place and piece by piece: all at once take twice as much again."""
-    for piece in pieces(len(points)):
-        points[piece] = axes @ points[piece] @ axes.T
-    return points
+def _control_of(strip: StripResult, point: Numbers, axis: Numbers) -> Numbers:
+    return np.column_stack([strip.formed.point[strip.control_rows][point], axis])
 
 
 def _turned(strip: StripResult, photos: Floats) -> Floats:
@@ -115,25 +113,15 @@ def _turned(strip: StripResult, photos: Floats) -> Floats:
     return turn @ photos @ turn.T
 
 
-def propagation(strip: StripResult, oriented: OrientedStrip[StripErrors], observations: PhotoPoints) -> Propagation:
-    """Differentiate the strip method for one strip; `oriented` is the strip before its deformation was corrected."""
-    errors, found = oriented.errors, oriented.misclosures
+def fitted(strip: StripResult, oriented: OrientedStrip[StripErrors], factor: float) -> FittedStrip:
+    """Carry the errors of a strip over the fit to its control; `oriented` is the strip before it was corrected."""
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
-    fit = control_errors.fit_operator(found, oriented.weights, oriented.at_control, terms, errors.origin)
-    rows, flown = strip.of_photos.rows, strip.of_photos.strip
-    sightings = photo_errors.UsedRays(
-        photo=flown.positions(observations)[rows],
-        image=rows,
-        numbers=observations.point,
-        known=strip.formed.point,
-        points=strip.xyz,
-        focal=flown.camera.principal_distance,
-    )
-    return Propagation(
-        errors=errors,
-        control=found,
-        fit=fit,
-        xyz=oriented.xyz,
-        sightings=sightings,
-        resection=strip.of_photos.resection,
-    )
+    return FittedStrip(oriented.errors, oriented.misclosures, oriented.fit(terms), oriented.xyz, factor)
+
+
+def photo_errors(strip: StripResult, errors: StripErrors, observations: PhotoPoints) -> PhotoErrors:
+    """Differentiate the orientation of the photos on their adjusted points."""
+    rows = strip.of_photos.rows
+    photo = strip.of_photos.strip.positions(observations)[rows]
+    point = np.searchsorted(strip.formed.point, observations.point[rows])
+    return differentiate_photos(errors, strip.of_photos.resection, strip.xyz, photo, point, rows)

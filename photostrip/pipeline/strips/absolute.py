@@ -24,7 +24,8 @@ from photostrip.pipeline.results import StripResult
 from photostrip.points import ControlPoints
 from photostrip.rejection import Rejection
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.error_propagation.control_errors import Misclosures
+from photostrip.triangulation.error_propagation import control_errors
+from photostrip.triangulation.error_propagation.control_errors import FitOperator, Misclosures
 from photostrip.triangulation.error_propagation.strip_at_control import ControlRay, StripAtControl
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
@@ -37,7 +38,15 @@ if TYPE_CHECKING:
     from photostrip.triangulation.independent_models.formation import FormedModels
 
 
-Errors = TypeVar("Errors")  # derivatives of a strip on the ground by what was measured
+class OfStrip(Protocol):
+    """Derivatives of a strip on the ground by what was measured."""
+
+    @property
+    def origin(self) -> Floats:
+        """Origin (3,) of its similarities, in the intermediate frame."""
+
+
+Errors = TypeVar("Errors", bound=OfStrip)
 
 
 class StripStage(Protocol[Errors]):
@@ -63,9 +72,6 @@ class StripStage(Protocol[Errors]):
 
     def differentiate(self, similarity: Similarity) -> Errors:
         """Differentiate the strip on the ground by what was measured."""
-
-    def misclosures(self, oriented: OrientedStrip[Errors]) -> Misclosures:
-        """Control coordinates that count, with the derivatives of the strip there."""
 
     def misclosure_covariance(self, oriented: OrientedStrip[Errors]) -> Callable[[Numbers], Floats]:
         """Covariance of any misclosures at the control, strip and control together, metres^2."""
@@ -139,8 +145,13 @@ class OrientedStrip(Generic[Errors]):
 
     @cached_property
     def misclosures(self) -> Misclosures:
-        """Control coordinates that count, with the derivatives of the strip there."""
-        return self.stage.misclosures(self)
+        """Control coordinates that count."""
+        turned = self.targets.turned(self.at_control)
+        return control_errors.misclosures(turned, self.control_rows, self.absolute.axes)
+
+    def fit(self, terms: Sequence[tuple[str, ...]]) -> FitOperator:
+        """Operator of the similarity and of polynomials of these terms for X, Y, Z, with the weights in force."""
+        return control_errors.fit_operator(self.misclosures, self.weights, self.at_control, terms, self.errors.origin)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,8 @@ from photostrip.pipeline.choice import POLYNOMIAL, Choice, Witness, expected_of,
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 from photostrip.triangulation.covariance_adjustment.settings import BETTER
-from photostrip.triangulation.error_propagation import control_errors, covariances
+from photostrip.triangulation.error_propagation import control_errors
+from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
 from photostrip.triangulation.polynomial.correction import Polynomial
 from photostrip.triangulation.polynomial.terms import bands
 
@@ -89,14 +90,9 @@ def _predicted(
 ) -> Witness:
     """Compare the standard deviations of points."""
     errors, found = oriented.errors, oriented.misclosures
-    fit = _fit(oriented, polynomial, np.arange(len(found.point)))
-    parameters = covariances.of_parameters(errors, found, fit.operator, covariance.figures.factor)
-    influence = fit.influence(oriented.xyz[points]).__getitem__
-    after = covariances.covariances(errors, errors.points.take(points), parameters, influence)
-    both = [
-        np.diagonal(each, axis1=1, axis2=2).mean(axis=0)
-        for each in (after * covariance.figures.factor, covariance.of_points(points))
-    ]
+    fit = oriented.fit([axis.terms for axis in polynomial.axes])
+    after = FittedStrip(errors, found, fit, oriented.xyz, covariance.figures.factor).covariances_of_points(points)
+    both = [np.diagonal(each, axis1=1, axis2=2).mean(axis=0) for each in (after, covariance.of_points(points))]
     first, second = ((_root(v[:2].mean()), _root(v[2])) for v in both)
     return Witness(first, second, len(points))
 

@@ -19,7 +19,6 @@ from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.model_notes import link_notes
 from photostrip.points import ModelPoints, locate, take_rows
 from photostrip.rejection import Rejection
-from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.independent_models import (
     link_screening,
     linking,
@@ -73,11 +72,6 @@ class LinkedModels:
 
     def differentiate(self, similarity: Similarity) -> model_errors.ModelErrors:
         return model_errors.differentiate_models(self.formed, similarity)
-
-    def misclosures(self, oriented: Oriented) -> Misclosures:
-        xyz = oriented.at_control
-        turned = oriented.targets.turned(xyz)
-        return model_misclosures.misclosures(turned, oriented.absolute.axes, xyz, oriented.errors.origin)
 
     def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
         rows, factor = oriented.control_rows, self.formed.links.factor

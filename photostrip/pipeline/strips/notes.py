@@ -208,6 +208,15 @@ def photo_notes(strip: Strip, resection: Resection) -> Iterator[Note]:
         yield Note("not-resected", text, strip=strip.id, photos=(photo,))
 
 
+def precision_of_long_strip(strip: Strip, most: int) -> Note:
+    """Say that a strip that was fitted to its control is too long for standard deviations of all its points."""
+    text = (
+        f"strip {strip.id} has {len(strip.photos)} photos; standard deviations after a polynomial or a similarity are "
+        f"computed up to {most} photos in a strip; `processing.adjustment: bundle` has them at any length"
+    )
+    return Note("no-precision", text, strip=strip.id)
+
+
 def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
     """Propose the adjustment with the covariance of the strip where a polynomial does badly."""
     models = len(strip.photos) - 1

@@ -22,8 +22,7 @@ from photostrip.pipeline.strips.screened_formation import form_screened, with_re
 from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import PhotoPoints
 from photostrip.rejection import Rejection
-from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
-from photostrip.triangulation.error_propagation.joint_covariances import joint_covariance
+from photostrip.triangulation.error_propagation import strip_errors
 from photostrip.triangulation.error_propagation.strip_at_control import ControlRay
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
@@ -87,24 +86,18 @@ class FormedPhotos:
         return spacing, max(quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
 
     def differentiate(self, similarity: Similarity) -> strip_errors.StripErrors:
-        position = self.strip.positions(self.observations)
-        return strip_errors.differentiate_strip(
-            self.orientation, self.formed, similarity, position, self.observations.sigma
-        )
-
-    def misclosures(self, oriented: Oriented) -> control_errors.Misclosures:
-        turned = oriented.targets.turned(oriented.at_control)
-        return control_errors.misclosures(oriented.errors.points, turned, oriented.control_rows, oriented.absolute.axes)
+        return strip_errors.differentiate_strip(self.orientation, self.formed, similarity, self.observations.sigma)
 
     def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
         # image coordinates are taken as good as stated, or as bad as the pairs have proved
         factor = max(1.0, median(self.screened.scatter.by_pair) ** 2 / (2 * self.sigma**2))
         errors = oriented.errors.with_doubt(self.formed.junctions.doubt / np.sqrt(factor))
-        along = covariances.along_strip(errors)
 
         def of(some: Numbers) -> Floats:
             found = oriented.misclosures.take(some)
-            return joint_covariance(errors, found.rows, along) * factor + np.diag(found.variance)
+            along = errors.along(found.row, found.direction)
+            first, _ = errors.frames(along)  # the test does not depend on what moves the whole section
+            return errors.joint_covariance(along, first) * factor + np.diag(found.variance)
 
         return of
 
@@ -209,19 +202,21 @@ class FormedPhotos:
         Raises GeometryError where this determines nothing; the strip is named.
         """
         from photostrip.triangulation.covariance_adjustment.adjust import StripOnControl, adjust
+        from photostrip.triangulation.covariance_adjustment.strip_rows.strip_errors import differentiate_strip
 
+        position, similarity = self.strip.positions(self.observations), oriented.absolute.similarity
         start = StripOnControl(
             photos=self.strip.photos,
             focal=self.strip.camera.principal_distance,
             observations=self.observations,
-            position=self.strip.positions(self.observations),
+            position=position,
             sigma=self.sigma,
             orientation=self.orientation,
             formed=self.formed,
             absolute=oriented.absolute,
             targets=oriented.targets,
             control_rows=oriented.control_rows,
-            errors=oriented.errors,
+            errors=differentiate_strip(self.orientation, self.formed, similarity, position, self.observations.sigma),
             misclosures=oriented.misclosures,
         )
         try:

@@ -119,7 +119,6 @@ def ideal_strip(geometry: StripGeometry) -> IdealStrip:
     similarity = Similarity.from_points(formed.xyz, xyz)
     centers = similarity(formed.centers)
     station, row = _columns(geometry, centers, xyz)
-    position = np.array([photos.index(photo) for photo in observations.photo_ids], np.intp)
     return IdealStrip(
         geometry=geometry,
         photos=photos,
@@ -132,7 +131,7 @@ def ideal_strip(geometry: StripGeometry) -> IdealStrip:
         rotations=similarity.rotation @ formed.rotations,
         station=station,
         row=row,
-        errors=differentiate_strip(orientation, formed, similarity, position[observations.photo], observations.sigma),
+        errors=differentiate_strip(orientation, formed, similarity, observations.sigma),
     )
 
 

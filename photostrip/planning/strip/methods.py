@@ -22,7 +22,9 @@ from photostrip.triangulation.bundle.observations import problem as bundle
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as bundle_precision
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.covariance_adjustment import conditions, prediction, system
-from photostrip.triangulation.error_propagation import control_errors, covariances
+from photostrip.triangulation.covariance_adjustment.strip_rows.strip_errors import differentiate_strip
+from photostrip.triangulation.error_propagation import control_errors
+from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
 from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
 from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.polynomial import terms as polynomial_terms
@@ -129,13 +131,11 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
         )
         terms = [axis.terms for axis in correction.fit(problem, correction.PolynomialSettings(DEGREES[method])).axes]
     axes = targets.axes(xyz[numbers])
-    found = control_errors.misclosures(strip.errors.points, ground.control, numbers, axes)
+    found = control_errors.misclosures(ground.control, numbers, axes)
     shift = targets.intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
     fit = control_errors.fit_operator(found, weight, xyz[numbers], terms, shift)
-    parameters = covariances.of_parameters(strip.errors, found, fit.operator)
-    influence = fit.influence(xyz)
-    covariance = covariances.covariances(strip.errors, strip.errors.points, parameters, influence.__getitem__)
-    share = np.einsum("wi,wit,tw->w", found.direction, influence[numbers[found.point]], fit.operator)
+    covariance = FittedStrip(strip.errors, found, fit, xyz, 1.0).covariances_of_points(np.arange(len(xyz)))
+    share = np.einsum("wi,wit,tw->w", found.direction, fit.influence(xyz[found.row]), fit.operator)
     variance = np.diagonal(covariance, axis1=1, axis2=2)[numbers[found.point], found.axis]
     residual = variance + found.variance * (1 - 2 * share)
     detectable = np.full((len(numbers), 3), np.nan)
@@ -169,9 +169,11 @@ def _precision(strip: IdealStrip) -> tuple[float, float]:
 
 def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     """Misclosures distributed by the strip's own covariance, with the distances of the pass points at the junctions."""
-    numbers, errors = ground.numbers, strip.errors
+    numbers, observations = ground.numbers, strip.observations
+    position = observations.places(strip.photos)
+    errors = differentiate_strip(strip.orientation, strip.formed, strip.similarity, position, observations.sigma)
     axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
-    found = control_errors.misclosures(errors.points, ground.control, numbers, axes)
+    found = control_errors.misclosures(ground.control, numbers, axes)
     wanted = conditions.conditions(errors, strip.orientation, strip.formed, found, np.zeros(len(found.point)))
     solved = system.system(errors, wanted, 1.0)
     rows = np.flatnonzero(wanted.kind == conditions.CONTROL)

@@ -18,9 +18,10 @@ from photostrip.triangulation.covariance_adjustment import prediction, relineari
 from photostrip.triangulation.covariance_adjustment import system as strip_system
 from photostrip.triangulation.covariance_adjustment.left_out import PointsLeftOut, Without, left_out_errors
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
-from photostrip.triangulation.error_propagation import control_errors, strip_errors
-from photostrip.triangulation.error_propagation.covariances import image_variance
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows
+from photostrip.triangulation.covariance_adjustment.strip_rows import strip_errors
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import ErrorRows
+from photostrip.triangulation.error_propagation import control_errors
+from photostrip.triangulation.error_propagation.image_variance import image_variance
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
@@ -95,7 +96,8 @@ class CovarianceAdjustment:
         """Covariances (w, w) of coordinates of some of the points (n,), metres^2."""
         predicted = self._predicted(points)
         if predicted is None:
-            return self.joint_covariance(coordinates.rows)
+            rows = self.system.errors.points.take(points[coordinates.point])
+            return self.joint_covariance(rows.along(coordinates.direction))
         point, direction = coordinates.point, coordinates.direction
         one = np.einsum("wi,wiqj->wqj", direction, predicted[point])[:, point]
         return np.einsum("wvj,vj->wv", one, direction)
@@ -263,7 +265,7 @@ def _formed_again(
             orientation, kept, oriented.similarity, strip.position, strip.observations.sigma
         )
         at_control = oriented.similarity(formed.xyz)[rows]
-        found = control_errors.misclosures(errors.points, targets.turned(at_control), rows, oriented.axes)
+        found = control_errors.misclosures(targets.turned(at_control), rows, oriented.axes)
         return _solved(replace(again, errors=errors, misclosures=found), images, settings, factor)
     found, wanted = strip.misclosures, before.system.conditions
     control = oriented.misclosures[found.point, found.axis]

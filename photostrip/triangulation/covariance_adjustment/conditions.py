@@ -11,10 +11,10 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.triangulation.covariance_adjustment.similarities import PhotoSimilarities
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import COMPONENTS, ELEMENTS, SCALE, ErrorRows
+from photostrip.triangulation.covariance_adjustment.strip_rows.strip_errors import Section, StripErrors, scale_shares
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, SCALE, ErrorRows
 from photostrip.triangulation.error_propagation.pair_errors import PairErrors
-from photostrip.triangulation.error_propagation.strip_errors import Section, StripErrors, scale_shares
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
@@ -66,7 +66,8 @@ def conditions(
 ) -> Conditions:
     """Collect all conditions of a strip; `misclosures` (w,) is strip minus given of the control coordinates, metres."""
     count = len(misclosures)
-    parts = [_Part(rows=control.rows, value=misclosures, noise=control.variance, source=np.arange(count))]
+    at_control = errors.points.take(control.row).along(control.direction)
+    parts = [_Part(rows=at_control, value=misclosures, noise=control.variance, source=np.arange(count))]
     if distances:
         placed = np.asarray(np.isfinite(formed.model_xyz).all(axis=1), bool)
         for section, pairs in errors.sections():

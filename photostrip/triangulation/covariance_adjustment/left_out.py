@@ -23,9 +23,9 @@ from photostrip.triangulation.covariance_adjustment.prediction import (
     with_columns,
 )
 from photostrip.triangulation.covariance_adjustment.reduced import Solved, of_conditions, solved
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import ErrorRows
 from photostrip.triangulation.covariance_adjustment.system import System, solved_for
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
 AXES = 3
 UNCHECKED = 1e-9  # smallest eigenvalue of the scaled Pi of a group that the others determine

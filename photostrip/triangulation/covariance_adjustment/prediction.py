@@ -15,9 +15,8 @@ from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_der
 from photostrip.statistics import gamma_cdf, normal_quantile
 from photostrip.triangulation.covariance_adjustment import reduced, relinearisation, system
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE
-from photostrip.triangulation.error_propagation.covariances import NearImages
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, PointRows
-from photostrip.triangulation.error_propagation.joint_covariances import by_same_images
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import COMPONENTS, ErrorRows, PointRows
+from photostrip.triangulation.covariance_adjustment.strip_rows.sums import NearImages, by_same_images
 
 TIE = 6  # decimals of a test value that are not rounding
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check; what is less may be rounding

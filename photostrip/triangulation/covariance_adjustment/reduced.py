@@ -16,10 +16,10 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, distinct, runs_of
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import ErrorRows, ranges, same_images
+from photostrip.triangulation.covariance_adjustment.strip_rows.sums import NearImages
 from photostrip.triangulation.covariance_adjustment.system import System
 from photostrip.triangulation.covariance_adjustment.windows import ANCHOR, MODEL, MODELS, windows
-from photostrip.triangulation.error_propagation.covariances import NearImages
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows, ranges, same_images
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,9 +18,7 @@ import numpy as np
 from photostrip.arrays import Floats, median, pieces
 from photostrip.frozen import replace
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.covariance_adjustment.system import System
-from photostrip.triangulation.error_propagation.covariances import by_components
-from photostrip.triangulation.error_propagation.derivatives import (
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import (
     COMPONENTS,
     ELEMENTS,
     MOVED,
@@ -29,7 +27,9 @@ from photostrip.triangulation.error_propagation.derivatives import (
     ErrorRows,
     add_rows,
 )
-from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.triangulation.covariance_adjustment.strip_rows.strip_errors import StripErrors
+from photostrip.triangulation.covariance_adjustment.strip_rows.sums import by_components
+from photostrip.triangulation.covariance_adjustment.system import System
 from photostrip.triangulation.relative_orientation.orientation import Orientation
 from photostrip.triangulation.relative_orientation.solution import iterate_elements
 from photostrip.triangulation.strip_formation import non_neighbours

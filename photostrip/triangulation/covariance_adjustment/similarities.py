@@ -18,8 +18,8 @@ from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
-from photostrip.triangulation.error_propagation.derivatives import ELEMENTS
-from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import ELEMENTS
+from photostrip.triangulation.covariance_adjustment.strip_rows.strip_errors import StripErrors
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,16 @@ from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
 from photostrip.triangulation.covariance_adjustment.conditions import Conditions
 from photostrip.triangulation.covariance_adjustment.similarities import PhotoSimilarities
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import (
+    COMPONENTS,
+    SHARING,
+    SPAN,
+    ErrorRows,
+    ranges,
+    same_images,
+)
+from photostrip.triangulation.covariance_adjustment.strip_rows.strip_errors import StripErrors
+from photostrip.triangulation.covariance_adjustment.strip_rows.sums import NearImages
 from photostrip.triangulation.covariance_adjustment.windows import (
     ANCHOR,
     COMPONENT,
@@ -32,16 +42,6 @@ from photostrip.triangulation.covariance_adjustment.windows import (
     Blocks,
     windows,
 )
-from photostrip.triangulation.error_propagation.covariances import NearImages
-from photostrip.triangulation.error_propagation.derivatives import (
-    COMPONENTS,
-    SHARING,
-    SPAN,
-    ErrorRows,
-    ranges,
-    same_images,
-)
-from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 AT_A_TIME = 1024  # rows whose windows are made together
 

@@ -15,7 +15,7 @@ from photostrip.arrays import Floats, Numbers, runs_of
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment.similarities import PhotoSimilarities
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, SHARING, ErrorRows
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import COMPONENTS, SHARING, ErrorRows
 
 # of a block: correlates of what joins its anchor to the next, its anchor, and its models one after the other
 LINK, ANCHOR = slice(0, SIMILARITY_PARAMETERS), slice(SIMILARITY_PARAMETERS, 2 * SIMILARITY_PARAMETERS)

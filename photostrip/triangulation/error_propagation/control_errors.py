@@ -17,7 +17,6 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.points import ControlPoints
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows, PointRows
 from photostrip.triangulation.polynomial.terms import columns
 
 
@@ -26,18 +25,18 @@ class Misclosures:
     """Control coordinates that count, one row each."""
 
     point: Numbers  # (w,): control point of each
+    row: Numbers  # (w,): its row in the points of the strip
     axis: Numbers  # (w,): 0, 1, 2: along its first, second, third ground axis
     direction: Floats  # (w, 3): that axis as a unit vector in the intermediate frame
     variance: Floats  # (w,): variance of the given coordinate, metres^2
-    rows: ErrorRows  # error of the strip along the axis, d = 1
 
     def take(self, some: Numbers) -> Misclosures:
         return Misclosures(
             point=self.point[some],
+            row=self.row[some],
             axis=self.axis[some],
             direction=self.direction[some],
             variance=self.variance[some],
-            rows=self.rows.take(some),
         )
 
 
@@ -69,23 +68,20 @@ class FitOperator:
         return [found[terms] for terms in self.terms]
 
 
-def misclosures(
-    points: ErrorRows | PointRows, control: ControlPoints, control_rows: Numbers, axes: Floats
-) -> Misclosures:
-    """Rows of derivatives of the misclosures, in the order of the points, each with its coordinates that count.
+def misclosures(control: ControlPoints, rows: Numbers, axes: Floats) -> Misclosures:
+    """Control coordinates that count, in the order of the points.
 
     control: the control, with standard deviations along `axes`.
-    control_rows: (c,), its rows in `points`.
+    rows: (c,), its rows in the points of the strip.
     axes: (c, 3, 3), directions along which it is compared, rows, in the intermediate frame.
     """
     point, axis = np.nonzero(control.use)
-    direction = axes[point, axis]
     return Misclosures(
         point=point,
+        row=rows[point],
         axis=axis,
-        direction=direction,
+        direction=axes[point, axis],
         variance=control.sigma[point, axis] ** 2,
-        rows=points.take(control_rows[point]).along(direction),
     )
 
 
@@ -98,7 +94,8 @@ def fit_operator(
     xyz: (c, 3), control points after the similarity, intermediate frame, metres.
     terms: terms of the polynomials of X, Y, Z; all empty without.
     """
-    design, share = found.rows.by_similarity[:, 0], np.sqrt(weight[found.point, found.axis])
+    design = np.einsum("wi,wij->wj", found.direction, similarity_derivatives(xyz[found.point], origin))
+    share = np.sqrt(weight[found.point, found.axis])
     size = np.abs(design).max(axis=0)
     size = np.where(size > 0, size, 1.0)
     similarity = np.linalg.pinv(design / size * share[:, None]) * share / size[:, None]

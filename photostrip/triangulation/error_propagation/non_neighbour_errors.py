@@ -5,81 +5,65 @@ Source: derived; see docs/precision.md, eq. 3.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import NamedTuple
 from photostrip.geometry.rotation import cross_matrix
-from photostrip.geometry.similarity import similarity_derivatives
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, PlacedStrip, PointRows
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors, blocks, entries_of
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
-def with_bridges(points: PointRows, strip: PlacedStrip) -> PointRows:
-    """Complete the rows of the points of a strip by those without a model, which move with their first model so far."""
-    ends = _ends(strip)
-    photo = strip.images.photo[ends.image]
-    rays = np.concatenate([ends.xy, np.full((*photo.shape, 1), -strip.orientation.pairs.focal)], axis=2)
-    turned = np.einsum("nkij,nkj->nki", strip.rotations[photo], rays)
-    middle = _middle(strip.centers[photo], turned, strip.rotations[photo])
-    slots = int((photo[:, 1] - photo[:, 0]).max())
-    have = points.by_component.shape[1]
-    by_component = np.zeros((len(points.first), max(have, slots), 3, COMPONENTS))
-    by_component[:, :have] = points.by_component
-    first = points.first.copy()
-    first[ends.item] = np.minimum(photo[:, 0], len(strip.steps) - 1)
-    moved = middle.by_center @ similarity_derivatives(strip.centers[photo[:, 1]], np.zeros(3))
-    moved[:, :, 3:6] += middle.by_turn
-    for slot in range(slots):
-        inside = np.flatnonzero(photo[:, 0] + slot < photo[:, 1])
-        by_component[ends.item[inside], slot] = moved[inside] @ strip.steps[photo[inside, 0] + slot]
-    counts = np.diff(points.starts)
-    item = np.concatenate([np.repeat(np.arange(len(counts)), counts), np.repeat(ends.item, 2)])
-    order = np.argsort(item, kind="stable")
-    image = ends.image.ravel()
-    by_image = middle.by_image.reshape(-1, 3, 2) * strip.images.sigma[image][:, None, :]
-    return PointRows(
-        xyz=points.xyz,
-        first=first,
-        by_component=by_component,
-        starts=np.searchsorted(item[order], np.arange(len(counts) + 1)),
-        image=np.concatenate([points.image, image])[order],
-        by_image=np.concatenate([points.by_image, by_image])[order],
-    )
+def points_between(errors: StripErrors, place: Numbers, shape: tuple[int, int]) -> csr_array:
+    """Sparse rows of points without a model, each in the middle between the first and the last of its rays.
+
+    place: (q,), the place of each point of the strip among those asked for, -1 for all others.
+
+    Such a point moves with the frame of the first photo, and by what moves the last one more than that.
+    """
+    item, image, photo, xy = _ends(errors, place)
+    rays = np.concatenate([xy, np.full((*photo.shape, 1), -errors.orientation.pairs.focal)], axis=2)
+    turns, centers = errors.rotations[photo], errors.centers[photo]
+    ahead, by_turn, by_image = _middle(centers, np.einsum("nkij,nkj->nki", turns, rays), turns)
+    by_last = ahead @ similarity_derivatives(centers[:, 1], np.zeros(3))
+    by_last[:, :, 3:6] += by_turn
+    by_first = similarity_derivatives(errors.xyz[item], np.zeros(3)) - by_last
+    by_image *= errors.sigma[image][:, :, None, :]
+    columns = [
+        entries_of(photo[:, 0], SIMILARITY_PARAMETERS),
+        entries_of(photo[:, 1], SIMILARITY_PARAMETERS),
+        errors.first_error + errors.image_columns(image).reshape(-1, 4),
+    ]
+    values = np.concatenate([by_first, by_last, by_image[:, 0], by_image[:, 1]], axis=2)
+    return blocks(entries_of(place[item], 3), np.concatenate(columns, axis=1), values, shape)
 
 
-class _Ends(NamedTuple):
-    """First and last image point of each point without a model."""
-
-    image: Numbers  # (n, 2): rows of the image points
-    item: Numbers  # (n,): its row in the strip
-    xy: Floats  # (n, 2, 2): mm
-
-
-def _ends(strip: PlacedStrip) -> _Ends:
-    """Order the image points of each point along the flight; its place is the middle between the outermost two rays."""
-    orientation, images = strip.orientation, strip.images
-    xy, point = np.zeros((len(images.row), 2)), np.zeros(len(images.row), np.intp)
-    place = images.rows_of(orientation.rows)
-    for side, measured in ((0, orientation.pairs.left), (1, orientation.pairs.right)):
-        xy[place[:, side]] = measured
-        point[place[:, side]] = orientation.point
-    rows = np.flatnonzero(np.isin(images.row, strip.formed.bridging))
-    rows = rows[np.lexsort((images.photo[rows], point[rows]))]
-    number, begin, count = np.unique(point[rows], return_index=True, return_counts=True)
-    ends = rows[np.column_stack([begin, begin + count - 1])]
-    return _Ends(ends, np.searchsorted(strip.formed.point, number), xy[ends])
+def _ends(errors: StripErrors, place: Numbers) -> tuple[Numbers, Numbers, Numbers, Floats]:
+    """Points (n,) as rows of the strip; image points (n, 2), photos (n, 2) and coordinates (n, 2, 2) of both rays."""
+    orientation, formed = errors.orientation, errors.formed
+    pairs = orientation.pairs
+    image = orientation.rows.ravel()
+    item = np.searchsorted(formed.point, np.repeat(orientation.point, 2))
+    photo = (pairs.pair[:, None] + np.arange(2)).ravel()
+    xy = np.stack([pairs.left, pairs.right], axis=1).reshape(-1, 2)
+    some = np.flatnonzero(np.isin(image, formed.bridging))
+    some = some[place[item[some]] >= 0]
+    some = some[np.lexsort((photo[some], item[some]))]
+    points, begin, count = np.unique(item[some], return_index=True, return_counts=True)
+    ends = some[np.column_stack([begin, begin + count - 1])]
+    return points, image[ends], photo[ends], xy[ends]
 
 
-class _Middle(NamedTuple):
-    """Derivatives of the middle between two rays."""
+def _middle(centers: Floats, rays: Floats, rotations: Floats) -> tuple[Floats, Floats, Floats]:
+    """Differentiate (l1 r1 + b + l2 r2) / 2 with the factors (l1, l2) = G b, G the left inverse of [r1, -r2].
 
-    by_center: Floats  # (n, 3, 3): by the second centre
-    by_turn: Floats  # (n, 3, 3): by a small turn of the second photo
-    by_image: Floats  # (n, 2, 3, 2): by the image coordinates on both photos
-
-
-def _middle(centers: Floats, rays: Floats, rotations: Floats) -> _Middle:
-    """Differentiate (l1 r1 + b + l2 r2) / 2 with the factors (l1, l2) = G b, G the left inverse of [r1, -r2]."""
+    Returns the derivatives by the second centre (n, 3, 3), by a small turn of the second photo (n, 3, 3), and by the
+    image coordinates on both photos (n, 2, 3, 2).
+    """
     first, second = rays[:, 0], rays[:, 1]
     inverse = np.linalg.pinv(np.stack([first, -second], axis=2))
     factors = np.einsum("nij,nj->ni", inverse, centers[:, 1] - centers[:, 0])
@@ -87,4 +71,4 @@ def _middle(centers: Floats, rays: Floats, rotations: Floats) -> _Middle:
     ahead, back = np.eye(3) / 2 + half, np.eye(3) / 2 - half
     by_second, by_first = factors[:, 1, None, None] * ahead, factors[:, 0, None, None] * back
     by_image = np.stack([by_first @ rotations[:, 0, :, :2], by_second @ rotations[:, 1, :, :2]], axis=1)
-    return _Middle(ahead, -by_second @ cross_matrix(second), by_image)
+    return ahead, -by_second @ cross_matrix(second), by_image

@@ -1,349 +1,271 @@
-"""Errors of the formed strip: sparse rows of derivatives by the image coordinates, one for every step and point.
+"""Errors of a formed strip: one sparse operator on the errors of the image coordinates.
 
-The error of a model is an infinitesimal similarity (shift, rotation, scale) plus its deformation. From model to model
-the similarities differ by *steps* (eq. 2). All of them hang on six *error components* of each model: the errors of the
-five elements of its pair, and of the logarithm of the scale handed on to the next model. Every row is kept as
-coefficients of a similarity, of a few components, and of a few image coordinates (eq. 3); the covariances among
-components and image coordinates are exact products of their rows. Components of models i and k have image coordinates
-in common when |i - k| <= 2: pairs share a photo, a scale transfer uses three.
+The error of a model is an infinitesimal similarity of its frame (shift, rotation, scale) plus its deformation. From
+frame to frame the similarities differ by *steps*, each a sum over the image coordinates of three photos (eq. 2). A
+point is moved by the frames of its models, by the elements of their pairs, and by its own image coordinates: a sparse
+row of few derivatives (eq. 3). Steps are made of the elements, and of the scale that a model hands on: six components.
+A frame being the sum of the steps before it, rows become D = B Z + E, Z the errors of the components (eq. 4), and give
+every covariance, D D^T; nothing is said of correlations anywhere.
 
-All coordinates refer to the frame of the ground after the plain similarity; image coordinates count in their stated
-standard deviations.
+All coordinates refer to the frame of the ground after the plain similarity, all frames to that of the first model;
+image coordinates count in their stated standard deviations.
 
-Source: derived; see docs/precision.md, eq. 2 and 3.
+Source: derived; see docs/precision.md, eq. 1-4.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
-from typing import Self
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
-from photostrip.points import take_rows
-from photostrip.triangulation.error_propagation import pair_errors
-from photostrip.triangulation.error_propagation.derivatives import (
-    COMPONENTS,
-    ELEMENTS,
-    MOVED,
-    SCALE,
-    SHARING,
-    SPAN,
-    ImagePoints,
-    PlacedStrip,
-    PointRows,
-    add_rows,
+from photostrip.triangulation.error_propagation.pair_errors import (
+    PairErrors,
+    differentiate_pairs,
+    elements_by_parallax,
 )
-from photostrip.triangulation.error_propagation.pair_errors import PairErrors
 from photostrip.triangulation.relative_orientation.orientation import Orientation
-from photostrip.triangulation.resection.resection import runs
-from photostrip.triangulation.strip_formation.scale_transfer import Junctions
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-IMAGES = 4096  # image points whose products are summed together: what fits into the processor's cache
-JUNCTION_ROWS = ("junction", "before", "after", "point", "ratio", "used", "limit", "weight")
-# points of pairs differentiated together, of which the pairs' own derivatives then go: all at once take 28 MB more of
-# 200 with 50 000 check points, a quarter and twice as many the same
-SECTION = 8192
+ELEMENTS = 5  # of a pair
+SCALE, COMPONENTS = 5, 6  # of a model: the elements of its pair, then the logarithm of the scale handed on
 
 
 @dataclass(frozen=True, eq=False)
 class StripErrors:
-    """Everything that covariances of a strip are made of."""
+    """Errors of a strip of p pairs by c errors: of image coordinates, and doubts about p scales handed on.
 
-    images: ImagePoints
-    # (p, 7, 6): step from the similarity of each model to the next by the model's error components; after the last
-    # model that of the last photo
-    steps: Floats
-    component_covariances: Floats  # (p, 3, 6, 6): Q, of each model with itself, the next and the one after
-    points: PointRows
-    # finds errors inside the pairs again, section by section: not always asked for
-    sections: Callable[[], Iterator[tuple[Section, PairErrors]]]
-    origin: Floats  # (3,): common origin of all similarities
+    The columns of a sparse row stand for the similarities of the p + 1 frames, the elements of the p pairs, and the c
+    errors themselves, one after the other.
+    """
+
+    orientation: Orientation
+    formed: FormedStrip
+    pairs: PairErrors
+    origin: Floats  # (3,): common origin of all similarities, the mean of the perspective centres
+    # xyz, centers, rotations: (q, 3), (p + 1, 3), (p + 1, 3, 3): points and photos, from that origin
+    xyz: Floats
+    centers: Floats
+    rotations: Floats
+    sigma: Floats  # (k, 2): stated standard deviations of all image points of the project, mm
+    column: Numbers  # (k,): the first of the two errors of each of them; without meaning where it takes no part
+    components: csr_array  # (6 p, c): of each model the elements of its pair, and the logarithm of the scale handed on
+    steps: (
+        Floats  # (p, 7, 6): by these, from the frame of a model to the next, after the last to that of the last photo
+    )
 
     @property
     def models(self) -> int:
-        return len(self.steps)
+        return len(self.centers) - 1
 
     @property
-    def centers(self) -> Floats:
-        """Perspective centres (p + 1, 3) from the origin, which is the mean of all, metres."""
-        following = -self.steps[:, :3, SCALE]  # minus the centre that joins a model to the next
-        return np.concatenate([-following.sum(axis=0)[None], following])
+    def first_element(self) -> int:
+        """The column of a sparse row at which the elements begin."""
+        return SIMILARITY_PARAMETERS * (self.models + 1)
+
+    @property
+    def first_error(self) -> int:
+        return self.first_element + ELEMENTS * self.models
+
+    @property
+    def width(self) -> int:
+        return self.first_error + self.components.shape[1]
+
+    @cached_property
+    def _products(self) -> csr_array:
+        """Covariances (6 p, 6 p) of the components: those of models more than two apart have nothing in common."""
+        return self.components @ self.components.T
 
     def with_doubt(self, scale: Floats) -> StripErrors:
-        """Add standard deviations (j,) to the logarithms of the scales handed on, beside the image coordinates'."""
-        found = self.component_covariances.copy()
-        found[: len(scale), 0, SCALE, SCALE] += scale**2
-        return replace(self, component_covariances=found)
+        """Give the logarithms of the scales handed on standard deviations (j,) beside those of image coordinates."""
+        junction = np.flatnonzero(scale)
+        column = self.components.shape[1] - self.models + junction
+        rows, shape = COMPONENTS * junction + SCALE, self.components.shape
+        added = blocks(rows[:, None], column[:, None], scale[junction, None, None], shape)
+        return replace(self, components=self.components + added)
+
+    def points(self, points: Numbers) -> csr_array:
+        """Sparse rows (3 n, ...) of some points of the strip, each at most once: means over the models that hold it."""
+        formed, orientation = self.formed, self.orientation
+        place = np.full(len(formed.point), -1)
+        place[points] = np.arange(len(points))
+        rows = np.flatnonzero(orientation.used & np.isfinite(formed.model_xyz[:, 0]))
+        point = np.searchsorted(formed.point, orientation.point[rows])
+        rows, point = rows[place[point] >= 0], point[place[point] >= 0]
+        model, image = orientation.pairs.pair[rows], orientation.rows[rows]
+        values = np.concatenate(
+            [
+                similarity_derivatives(self.xyz[point], np.zeros(3)),
+                self.pairs.point_by_elements[rows],
+                self.pairs.point_by_image[rows] * self.sigma[image].reshape(-1, 1, 4),
+            ],
+            axis=2,
+        )
+        columns = [
+            entries_of(model, SIMILARITY_PARAMETERS),
+            self.first_element + entries_of(model, ELEMENTS),
+            self.first_error + self.image_columns(image).reshape(-1, 4),
+        ]
+        share = 1 / formed.model_count[point, None, None]
+        shape = 3 * len(points), self.width
+        found = blocks(entries_of(place[point], 3), np.concatenate(columns, axis=1), share * values, shape)
+        if len(formed.bridging) and (formed.model_count[points] == 0).any():
+            from photostrip.triangulation.error_propagation.non_neighbour_errors import points_between
+
+            found = found + points_between(self, place, shape)
+        return found
+
+    def along(self, points: Numbers, directions: Floats) -> csr_array:
+        """Sparse rows (n, ...) of errors of points along directions (n, 3)."""
+        some, place = np.unique(points, return_inverse=True)
+        turn = blocks(
+            np.arange(len(points))[:, None], entries_of(place, 3), directions[:, None], (len(points), 3 * len(some))
+        )
+        return turn @ self.points(some)
+
+    def image_columns(self, images: Numbers) -> Numbers:
+        """Errors (..., 2) of image points, given by their rows in the project."""
+        return self.column[images][..., None] + np.arange(2)
+
+    def covariances(self, rows: csr_array, size: int) -> Floats:
+        """Covariances (n, d, d) of rows (n d, ...), of ``size`` d neighbours each."""
+        half, by_component, own = self._halves(rows, 0)
+        shape = -1, size, half.shape[1]
+        found = half.reshape(shape) @ by_component.reshape(shape).transpose(0, 2, 1)
+        result = np.asarray(found + found.transpose(0, 2, 1), float)
+        same = (own @ own.T).tocoo()
+        one, other = np.divmod(same.row, size), np.divmod(same.col, size)
+        near = one[0] == other[0]
+        result[one[0][near], one[1][near], other[1][near]] += same.data[near]
+        return result
+
+    def joint_covariance(self, rows: csr_array, first: int = 0) -> Floats:
+        """Covariances (n, n) of rows, relative to the frame ``first``, from which on frames move them.
+
+        Errors before it move all of them by one similarity, and need no work.
+        """
+        half, by_component, own = self._halves(rows, first)
+        found = half @ by_component.T
+        return np.asarray(found + found.T + (own @ own.T).toarray(), float)
+
+    def with_everything(self, rows: csr_array) -> Floats:
+        """Covariances (..., n) of whatever a column stands for with rows (n, ...)."""
+        by_component, own = self._by_component(rows, 0, self.models), rows[:, self.first_error :]
+        found = self._products @ by_component.T + (self.components @ own.T).toarray()
+        found = found.reshape(self.models, COMPONENTS, -1)
+        frames = np.zeros((self.models + 1, SIMILARITY_PARAMETERS, len(by_component)))
+        np.cumsum(self.steps @ found, axis=0, out=frames[1:])
+        errors = self.components.T @ by_component.T + own.T.toarray()
+        count = len(by_component)
+        return np.concatenate([frames.reshape(-1, count), found[:, :SCALE].reshape(-1, count), errors])
+
+    def frames(self, rows: csr_array) -> tuple[int, int]:
+        """Give the first and the last frame that moves some rows."""
+        numbers = rows.indices[rows.indices < self.first_element] // SIMILARITY_PARAMETERS
+        return int(numbers.min()), int(numbers.max())
+
+    def _halves(self, rows: csr_array, first: int) -> tuple[Floats, Floats, csr_array]:
+        """Write the covariance of rows as G H^T + H G^T + E E^T: G, H (n, ...) of components, E (n, c) of errors."""
+        last = min(self.frames(rows)[1] + 1, self.models)
+        part, own = slice(COMPONENTS * first, COMPONENTS * last), rows[:, self.first_error :]
+        by_component = self._by_component(rows, first, last)
+        half = by_component @ self._products[part, part] / 2 + (own @ self.components[part].T).toarray()
+        return half, by_component, own
+
+    def _by_component(self, rows: csr_array, first: int, last: int) -> Floats:
+        """Give rows (n, 6 m) by the components of some models: a step moves all frames behind it (eq. 4)."""
+        frames, elements = (
+            rows[:, start + first * size : start + end * size].toarray().reshape(rows.shape[0], -1, size)
+            for start, size, end in ((0, SIMILARITY_PARAMETERS, last + 1), (self.first_element, ELEMENTS, last))
+        )
+        behind = np.cumsum(frames[:, :0:-1], axis=1)[:, ::-1]
+        result = (behind.transpose(1, 0, 2) @ self.steps[first:last]).transpose(1, 0, 2)
+        result[:, :, :SCALE] += elements
+        return result.reshape(rows.shape[0], -1)
 
 
 def differentiate_strip(
-    orientation: Orientation, formed: FormedStrip, similarity: Similarity, position: Numbers, sigma: Floats
+    orientation: Orientation, formed: FormedStrip, similarity: Similarity, sigma: Floats
 ) -> StripErrors:
-    """Rows of derivatives of a formed strip.
+    """Differentiate a formed strip.
 
     similarity: from the strip to the frame of the ground.
-    position: (k,), place in the strip of the photo of every image point in the observations.
-    sigma: (k, 2), standard deviations of all image points in the observations, mm.
+    sigma: (k, 2), standard deviations of all image points of the project, mm.
     """
-    rotations = similarity.rotation @ formed.rotations
+    rotations, models = similarity.rotation @ formed.rotations, len(formed.scale)
     across = formed.across if formed.left_ray else None
-    scale = similarity.scale * formed.scale
+    pairs = differentiate_pairs(orientation, rotations[:-1], similarity.scale * formed.scale, across)
     centers = similarity(formed.centers)
     origin = centers.mean(axis=0)
-    row = distinct(orientation.rows)
-    row = row[np.argsort(position[row], kind="stable")]
-    strip = PlacedStrip(
+    images = distinct(orientation.rows)
+    column = np.zeros(len(sigma), np.intp)
+    column[images] = 2 * np.arange(len(images))
+    columns = (column[orientation.rows][..., None] + np.arange(2)).reshape(-1, 4)
+    stated = sigma[orientation.rows].reshape(-1, 4)
+    width = 2 * len(images) + models
+    used, row = np.flatnonzero(orientation.used), np.arange(len(columns))[:, None]
+    by_parallax = elements_by_parallax(orientation, pairs.parallax_by_elements)[used, :, None]
+    by_image = (pairs.parallax_by_image * stated)[used, None]
+    places = entries_of(orientation.pairs.pair[used], COMPONENTS)[:, :SCALE]
+    elements = blocks(places, row[used], by_parallax, (COMPONENTS * models, len(row)))
+    elements = elements @ blocks(row[used], columns[used], by_image, (len(row), width))
+    return StripErrors(
         orientation=orientation,
         formed=formed,
+        pairs=pairs,
+        origin=origin,
         xyz=similarity(formed.xyz) - origin,
         centers=centers - origin,
         rotations=rotations,
-        images=ImagePoints(
-            row=row,
-            photo=position[row],
-            stated=sigma,
-            components=np.zeros((len(row), 2, MOVED.stop - MOVED.start)),
-        ),
-        steps=np.zeros((len(scale), SIMILARITY_PARAMETERS, COMPONENTS)),
-    )
-    points = _PointsInMaking.of(strip)
-    of_scale = np.zeros((2, len(scale), 5))
-    sections = partial(_differentiated, orientation, formed.junctions, rotations, scale, across)
-    for section, part in sections():
-        own = section.numbers
-        strip.steps[own] = _steps(part, strip.centers[1:][own])
-        _add_components(strip.images, section, part, of_scale[:, own])
-        points.add(section, part)
-        del section, part  # before the next are made
-    rows = points.finished()
-    if len(formed.bridging):
-        from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
-
-        rows = with_bridges(rows, strip)
-    return StripErrors(
-        images=strip.images,
-        steps=strip.steps,
-        component_covariances=_component_covariances(strip.images, len(strip.steps)),
-        points=rows,
-        sections=sections,
-        origin=origin,
+        sigma=sigma,
+        column=column,
+        components=elements + _scales(formed, pairs, columns, stated, elements),
+        steps=_steps(pairs, centers[1:] - origin),
     )
 
 
-class Section(NamedTuple):
-    """Some neighbouring pairs, and the one behind them, which shares their last junction and opens the next section."""
+def _scales(formed: FormedStrip, pairs: PairErrors, columns: Numbers, stated: Floats, elements: csr_array) -> csr_array:
+    """Differentiate the logarithms of the scales handed on by the pass points, among the elements (6 p, c).
 
-    numbers: slice  # of these pairs in the strip
-    orientation: Orientation  # of these pairs, renumbered
-    rows: slice  # in the table of the strip's pairs, of the points of these pairs
-    own: int  # how many of these rows belong to the pairs without the one behind
-    passes: Numbers  # (t,): rows of the strip's pass points that lie between these pairs
-    junctions: Junctions  # made of these; rows and junctions renumbered
-
-
-def _sections(orientation: Orientation, junctions: Junctions) -> Iterator[Section]:
-    """Cut a strip into sections."""
-    ends = np.append(orientation.pairs.starts, len(orientation.pairs.pair))
-    for first, stop in runs(ends, SECTION):
-        last = min(stop + 1, orientation.pairs.size)
-        rows = slice(int(ends[first]), int(ends[last]))
-        inside = np.flatnonzero((junctions.junction >= first) & (junctions.junction < last - 1))
-        joined = take_rows(junctions, inside, JUNCTION_ROWS)
-        yield Section(
-            numbers=slice(first, last),
-            orientation=orientation.take(np.arange(first, last)),
-            rows=rows,
-            own=int(ends[stop]) - rows.start,
-            passes=inside,
-            junctions=replace(
-                joined,
-                junction=joined.junction - first,
-                before=joined.before - rows.start,
-                after=joined.after - rows.start,
-            ),
-        )
-
-
-def _differentiated(
-    orientation: Orientation, junctions: Junctions, rotations: Floats, scale: Floats, across: Floats | None
-) -> Iterator[tuple[Section, PairErrors]]:
-    """Differentiate a strip section by section; rotations (p + 1, 3, 3) and scales (p,) are those of its pairs."""
-    for section in _sections(orientation, junctions):
-        own = section.numbers
-        yield (
-            section,
-            pair_errors.differentiate_pairs(
-                section.orientation, rotations[own], scale[own], None if across is None else across[own]
-            ),
-        )
-
-
-def scale_shares(joined: Junctions, pairs: PairErrors) -> tuple[Floats, Floats]:
-    """Differentiate the logarithm of the scale handed on by the pass points, seen from the common centre.
-
-    The scale k is the weighted mean of the ratios r = |b| / |a| of the vectors before and after: d ln k = sum p r
-    (b . db / |b|^2 - a . da / |a|^2) / sum p r. The shares of ``after`` come without their sign.
-
-    Returns before, after: (t, 3), by the point in the model before and after the junction, 1/metres; 0 for pass points
-        that are not used.
+    Seen from the common centre the scale k is the weighted mean of the ratios r = |b| / |a| of the vectors before and
+    after: d ln k = sum p r (b . db / |b|^2 - a . da / |a|^2) / sum p r.  # eq. 139-141
     """
-    shares = np.where(joined.used, joined.weight * joined.ratio, 0.0)
-    shares = shares / np.bincount(joined.junction, shares)[joined.junction]
-    vectors = (pairs.point[joined.before] - pairs.base[joined.junction], pairs.point[joined.after])
-    before, after = (shares[:, None] * u / (u**2).sum(axis=1)[:, None] for u in vectors)
-    return before, after
+    joined, count = formed.junctions, elements.shape[0]
+    used = np.flatnonzero(joined.used)
+    junction, before, after = joined.junction[used], joined.before[used], joined.after[used]
+    share = joined.weight[used] * joined.ratio[used]
+    share /= np.bincount(junction, share)[junction]
+    vectors = np.concatenate([pairs.point[before] - pairs.base[junction], -pairs.point[after]])
+    by_vector = (np.tile(share, 2)[:, None] * vectors / (vectors**2).sum(axis=1)[:, None])[:, None]
+    rows, some = COMPONENTS * np.tile(junction, 2)[:, None] + SCALE, np.concatenate([before, after])
+    by_elements = by_vector @ pairs.point_by_elements[some]
+    by_elements[: len(used)] -= by_vector[: len(used)] @ pairs.base_by_elements[junction]
+    places = entries_of(np.concatenate([junction, junction + 1]), COMPONENTS)[:, :SCALE]
+    by_images = by_vector @ pairs.point_by_image[some] * stated[some, None]
+    of_elements = blocks(rows, places, by_elements, (count, count))
+    return of_elements @ elements + blocks(rows, columns[some], by_images, elements.shape)
 
 
-def _add_components(images: ImagePoints, section: Section, pairs: PairErrors, of_scale: Floats) -> None:
-    """Put in what the image points of a section do to the error components.
-
-    A point on photo i enters the elements of the models i - 1 and i directly, and the scale of the models i - 2 to i:
-    by its own ray, and by the elements of both models of a junction.
-
-    of_scale: (2, p, 5), scales handed on from these models, and from the models before them, by the elements of these;
-        after the last model none is. What the last junction adds for the pair behind it stays for the next section.
-    """
-    orientation, joined, own = section.orientation, section.junctions, slice(section.own)
-    before, after = scale_shares(joined, pairs)
-    center_to_point = pairs.point_by_elements[joined.before] - pairs.base_by_elements[joined.junction]
-    add_rows(of_scale[0], joined.junction, (before[:, None] @ center_to_point)[:, 0])
-    by_next = after[:, None] @ pairs.point_by_elements[joined.after]
-    add_rows(of_scale[1], joined.junction + 1, -by_next[:, 0])
-    place, stated = images.rows_of(orientation.rows), images.stated[orientation.rows].reshape(-1, 4)
-    by_parallax = pair_errors.elements_by_parallax(orientation, pairs.parallax_by_elements)[own]
-    parallax = np.where(orientation.used[:, None], pairs.parallax_by_image * stated, 0.0)[own]
-    scale, scale_before = ((by_parallax * shares[orientation.pairs.pair[own]]).sum(axis=1) for shares in of_scale)
-    by_parallax = np.column_stack([by_parallax, scale])
-    # of the models photo - 2, photo - 1 and photo; the last of each is the scale
-    of_model = np.split(images.components, [1, 1 + COMPONENTS], axis=2)
-    sides = (parallax[:, :2], place[own, 0], 2), (parallax[:, 2:], place[own, 1], 1)
-    for by_image, image, slot in sides:
-        of_model[slot][image] = by_image[:, :, None] * by_parallax[:, None, :]
-    for by_image, image, slot in sides:
-        of_model[slot - 1][image, :, -1] += by_image * scale_before[:, None]
-    by_before = (before[:, None] @ pairs.point_by_image[joined.before])[:, 0] * stated[joined.before]
-    by_after = (after[:, None] @ pairs.point_by_image[joined.after])[:, 0] * stated[joined.after]
-    of_model[2][place[joined.before, 0], :, -1] += by_before[:, :2]
-    of_model[1][place[joined.before, 1], :, -1] += by_before[:, 2:] - by_after[:, :2]
-    of_model[0][place[joined.after, 1], :, -1] -= by_after[:, 2:]
-
-
-def _steps(pairs: PairErrors, next_centers: Floats) -> Floats:
-    """Derive steps by components: t = dB - theta x (S - O) - mu (S - O), theta, mu; S the centre joining the models."""
-    steps = np.zeros((len(next_centers), SIMILARITY_PARAMETERS, COMPONENTS))
-    steps[:, :3, ELEMENTS] = pairs.base_by_elements + cross_matrix(next_centers) @ pairs.rotation_by_elements
-    steps[:, :3, SCALE] = -next_centers
-    steps[:, 3:6, ELEMENTS] = pairs.rotation_by_elements
-    steps[:, 6, SCALE] = 1.0
+def _steps(pairs: PairErrors, centers: Floats) -> Floats:
+    """Derive steps: t = dB - theta x (S - O) - mu (S - O), theta, mu; S the centre (p, 3) behind each model."""
+    steps = np.zeros((len(centers), SIMILARITY_PARAMETERS, COMPONENTS))
+    steps[:, :3, :SCALE] = pairs.base_by_elements + cross_matrix(centers) @ pairs.rotation_by_elements
+    steps[:, 3:6, :SCALE] = pairs.rotation_by_elements
+    steps[:, :3, SCALE], steps[:, 6, SCALE] = -centers, 1.0
     return steps
 
 
-def _component_covariances(images: ImagePoints, models: int) -> Floats:
-    """Q(m, m + apart) = sum over common image points of their rows' products, shape (p, 3, 6, 6)."""
-    photos = models + 1
-    counts = np.bincount(images.photo, minlength=photos)
-    rank = np.arange(len(images.photo)) - np.concatenate([[0], np.cumsum(counts)])[images.photo]
-    gram = np.zeros((photos, SPAN * COMPONENTS, SPAN * COMPONENTS))
-    for start, stop in runs(np.concatenate([[0], np.cumsum(counts)]), IMAGES):
-        padded = np.zeros((stop - start, int(counts.max()), *images.components.shape[1:]))
-        rows = slice(*np.searchsorted(images.photo, [start, stop]).tolist())
-        padded[images.photo[rows] - start, rank[rows]] = images.components[rows]
-        flat = padded.reshape(stop - start, -1, padded.shape[-1])
-        gram[start:stop, MOVED, MOVED] = flat.transpose(0, 2, 1) @ flat
-    gram = gram.reshape(photos, SPAN, COMPONENTS, SPAN, COMPONENTS)
-    result = np.zeros((models, SPAN, COMPONENTS, COMPONENTS))
-    for apart in range(SPAN):
-        for slot in range(SPAN - apart):  # the earlier model is photo - 2 + slot
-            of_photo = gram[SHARING - slot :, slot, :, slot + apart]
-            result[: len(of_photo), apart] += of_photo[:models]
-    return result
+def blocks(rows: Numbers, columns: Numbers, values: Floats, shape: tuple[int, int]) -> csr_array:
+    """Sum small matrices (n, a, b) into a sparse one, at rows (n, a) and columns (n, b) of it."""
+    at = np.broadcast_arrays(rows[:, :, None].astype(np.int32), columns[:, None, :].astype(np.int32))
+    return coo_array((values.ravel(), (at[0].ravel(), at[1].ravel())), shape=shape).tocsr()
 
 
-@dataclass(frozen=True, eq=False)
-class _PointsInMaking:
-    """Rows of the points in the making: means over their k models, each brought back over the steps to the first."""
-
-    strip: PlacedStrip
-    # rows, item, slot: (t,): rows of the pairs' table that count, the point of each, and its model from the first of
-    # the point on
-    rows: Numbers
-    item: Numbers
-    slot: Numbers
-    first: Numbers  # (q,): first model of each point
-    by_component: Floats  # (q, s, 3, 6)
-    starts: Numbers  # (q + 1,): where the image points of each point begin that enter directly
-    image: Numbers  # (e,): these image points
-    by_image: Floats  # (e, 3, 2): in mm so far
-    entry: Numbers  # (n,): place of each image point among these, -1 of those that do not enter
-
-    @classmethod
-    def of(cls, strip: PlacedStrip) -> Self:
-        """Lay out rows of zeros."""
-        orientation, formed = strip.orientation, strip.formed
-        rows = np.flatnonzero(orientation.used & np.isfinite(formed.model_xyz).all(axis=1))
-        item = np.searchsorted(formed.point, orientation.point[rows])
-        model, count = orientation.pairs.pair[rows], len(formed.point)
-        first = np.full(count, len(strip.steps))
-        np.minimum.at(first, item, model)
-        if len(formed.home):
-            first = np.where(formed.model_count == 0, formed.home, first)
-        slot = model - first[item]
-        point_of = np.full(len(strip.images.row), -1)
-        point_of[strip.images.rows_of(orientation.rows[rows])] = item[:, None]
-        image = np.flatnonzero(point_of >= 0)
-        image = image[np.argsort(point_of[image], kind="stable")]
-        entry = np.full(len(point_of), -1)
-        entry[image] = np.arange(len(image))
-        return cls(
-            strip=strip,
-            rows=rows,
-            item=item,
-            slot=slot,
-            first=first,
-            by_component=np.zeros((count, int(slot.max()) + 1, 3, COMPONENTS)),
-            starts=np.searchsorted(point_of[image], np.arange(count + 1)),
-            image=image,
-            by_image=np.zeros((len(image), 3, 2)),
-            entry=entry,
-        )
-
-    def add(self, section: Section, pairs: PairErrors) -> None:
-        """Put in what the models of a section do to their points."""
-        start = section.rows.start
-        some = slice(*np.searchsorted(self.rows, [start, start + section.own]).tolist())
-        rows, item = self.rows[some], self.item[some]
-        share = (1 / self.strip.formed.model_count[item])[:, None, None]
-        place = self.entry[self.strip.images.rows_of(self.strip.orientation.rows[rows])]
-        for side, columns in ((0, slice(0, 2)), (1, slice(2, 4))):
-            self.by_image[place[:, side]] += share * pairs.point_by_image[rows - start, :, columns]
-        self.by_component[item, self.slot[some], :, ELEMENTS] = share * pairs.point_by_elements[rows - start]
-
-    def finished(self) -> PointRows:
-        """Return the rows, all models having been put in."""
-        steps, by_component, first = self.strip.steps, self.by_component, self.first
-        held = np.zeros(by_component.shape[:2])
-        held[self.item, self.slot] = 1 / self.strip.formed.model_count[self.item]
-        beyond = np.cumsum(held[:, ::-1], axis=1)[:, ::-1]
-        xyz = self.strip.xyz
-        for s in range(by_component.shape[1] - 1):  # share of the models after each slot
-            moved = np.flatnonzero(beyond[:, s + 1] > 0)
-            for some in np.split(moved, range(IMAGES, len(moved), IMAGES)):  # the steps of all take twice the memory
-                along = similarity_derivatives(xyz[some], np.zeros(3)) @ steps[first[some] + s]
-                by_component[some, s] += beyond[some, s + 1, None, None] * along
-        by_image = self.by_image
-        by_image *= self.strip.images.sigma[self.image][:, None, :]
-        return PointRows(
-            xyz=xyz,
-            first=first,
-            by_component=by_component,
-            starts=self.starts,
-            image=self.image,
-            by_image=by_image,
-        )
+def entries_of(numbers: Numbers, size: int) -> Numbers:
+    """Rows or columns (n, size) of things that have so many each."""
+    return size * numbers[:, None] + np.arange(size)

@@ -6,21 +6,9 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import replace
-from photostrip.geometry.similarity import similarity_derivatives
-from photostrip.points import ControlPoints
-from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.independent_models import model_errors
 from photostrip.triangulation.independent_models.model_errors import ModelErrors
-
-
-def misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floats) -> Misclosures:
-    """Control coordinates that count, with their derivatives by a similarity of the strip."""
-    number = np.arange(len(xyz))
-    no_components = np.zeros((len(xyz), 0, 3, 0))
-    points = ErrorRows.without_images(number, similarity_derivatives(xyz, origin), no_components)
-    return control_errors.misclosures(points, control, number, axes)
 
 
 def weights(found: Misclosures, rows: Numbers, operator: Floats | None = None) -> tuple[Numbers, Floats]:

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from photostrip.pipeline.precision.model_precision import variance_of_models
-from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, SIGMA_LEVEL
+from photostrip.triangulation.error_propagation.image_variance import A_POSTERIORI, A_PRIORI, SIGMA_LEVEL
 
 if TYPE_CHECKING:
     from photostrip.triangulation.independent_models.formation import FormedModels

@@ -27,20 +27,21 @@ from photostrip.triangulation.covariance_adjustment import (
     system,
 )
 from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
-from photostrip.triangulation.error_propagation import strip_errors
+from photostrip.triangulation.covariance_adjustment.strip_rows import strip_errors
+from photostrip.triangulation.covariance_adjustment.strip_rows.derivatives import ErrorRows
 from photostrip.triangulation.error_propagation.control_errors import misclosures
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.strip_formation.strip import without_rows
-from tests.derivatives import UNSCREENED, errors_of, every, oriented_of, spec, without_noise, written_out
+from tests.derivatives import UNSCREENED, oriented_of, spec, without_noise
 from tests.draws import orthogonal_normal
 from tests.loops import nonempty
 from tests.simulated import inputs_of
+from tests.triangulation.covariance_adjustment.strip_rows import errors_of, every, written_out
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+    from photostrip.triangulation.covariance_adjustment.strip_rows.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
     Prepared = tuple[StripErrors, conditions.Conditions]
@@ -233,9 +234,11 @@ def test_points_that_join_models_and_are_set_aside_leave_no_distances(photos: in
     aside = np.isin(orientation.point, new[::4])
     aside[earliest[np.isin(orientation.point[earliest], new[1::4])]] = True
     formed = without_rows(formed, orientation, aside)
-    errors = replace(stage, formed=formed).differentiate(at_control.similarity)
+    observations = stage.observations
+    position = stage.strip.positions(observations)
+    errors = strip_errors.differentiate_strip(orientation, formed, at_control.similarity, position, observations.sigma)
     rows = np.searchsorted(formed.point, stage.formed.point[before.control_rows])
-    control = misclosures(errors.points, before.targets.turned(before.at_control), rows, at_control.axes)
+    control = misclosures(before.targets.turned(before.at_control), rows, at_control.axes)
     given = at_control.misclosures[control.point, control.axis]
     wanted = conditions.conditions(errors, orientation, formed, control, given)
     joined = formed.junctions

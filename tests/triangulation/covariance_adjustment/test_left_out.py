@@ -14,8 +14,8 @@ from photostrip.triangulation.covariance_adjustment import (
     system,
 )
 from photostrip.triangulation.covariance_adjustment.left_out import Without, _predicted, left_out_errors
-from tests.derivatives import errors_of
 from tests.loops import nonempty
+from tests.triangulation.covariance_adjustment.strip_rows import errors_of
 from tests.triangulation.covariance_adjustment.test_covariance_adjustment import noisy
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
@@ -34,7 +34,7 @@ def test_groups_are_predicted_as_without_them(photos: int, lap: float) -> None:
     for rows, left_out in nonempty(zip(groups, left_out_errors(solved, groups), strict=True)):
         rest = np.setdiff1d(np.arange(len(given)), rows)
         without = conditions.conditions(*parts, control.take(rest), given[rest])
-        rest_alone, there = system.system(found.errors, without, FACTOR), control.take(rows).rows
+        rest_alone, there = system.system(found.errors, without, FACTOR), found.along(control.take(rows))
         images = relinearisation.image_errors(rest_alone)
         predicted = prediction.errors(rest_alone, rest_alone.errors.points, images)[strip.control_rows]
         along = np.einsum("wi,wi->w", control.direction[rows], predicted[control.point[rows]])
@@ -55,7 +55,7 @@ def test_a_strip_predicts_the_same_in_parts_of_which_some_hold_no_wanted_coordin
     given = strip.absolute.misclosures[found.control.point, found.control.axis]
     parts = (found.errors, strip.of_photos.orientation, strip.of_photos.formed)
     solved = system.system(found.errors, conditions.conditions(*parts, found.control, given), FACTOR)
-    wanted = found.control.take(np.arange(3)).rows
+    wanted = found.along(found.control.take(np.arange(3)))
     at_once = prediction.joint_covariance(solved, wanted)
     every = found.errors.points
     covariances = prediction.covariances(solved, every)
@@ -117,7 +117,9 @@ def test_points_that_take_no_part_have_the_covariances_of_an_adjustment_without_
     there = control.take(np.flatnonzero(np.isin(control.point, points)))
     direction = there.direction.reshape(2, 3, 3)
     along = np.einsum("pai,piqj,qbj->paqb", direction, covariance, direction)
-    assert along.reshape(6, 6) == pytest.approx(prediction.joint_covariance(alone, there.rows), rel=1e-6, abs=1e-9)
+    assert along.reshape(6, 6) == pytest.approx(
+        prediction.joint_covariance(alone, found.along(there)), rel=1e-6, abs=1e-9
+    )
     of_height = Without.of(solved, np.flatnonzero((control.point == 4) & (control.axis == 2)))
     assert of_height.points(control, FACTOR).covariance.shape == (0, 3, 0, 3)
     change = left_out.columns.columns @ left_out.inverse @ solved.correlates[left_out.rows]

@@ -24,7 +24,6 @@ from photostrip.result.document import document_of
 from photostrip.triangulation.absolute_orientation import Targets
 from photostrip.triangulation.error_propagation import strip_at_control
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.error_propagation.strip_at_control import StripAtControl
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.control_deletion import adjust
@@ -69,7 +68,6 @@ def drawn(seed: int, points: int = 8, worse: float = 1.0) -> Drawn:
     design = rng.normal(0, 1, (w, 7)) * DESIGN
     point, axis = np.repeat(np.arange(points), 3), np.tile(np.arange(3), points)
     nothing = cast("Any", None)
-    rows = ErrorRows.without_images(point, np.zeros((w, 1, 7)), np.zeros((w, 0, 1, 0)))
     names = tuple(f"c{number}" for number in range(points))
     control = ControlPoints(
         ids=names,
@@ -85,7 +83,7 @@ def drawn(seed: int, points: int = 8, worse: float = 1.0) -> Drawn:
         similarity=Similarity(1.0, np.eye(3), np.zeros(3)),
         weight=np.ones((points, 3)),
         rays=(),
-        coordinates=Misclosures(point, axis, np.eye(3)[axis], np.ones(w), rows),
+        coordinates=Misclosures(point, point, axis, np.eye(3)[axis], np.ones(w)),
         design=design,
         covariance=lambda some: np.asarray(root @ root.T)[np.ix_(some, some)],
         share=1.0,
