@@ -9,8 +9,6 @@ from tests.source_tree import PACKAGE, ROOT, modules
 from tests.test_layers import LAYERS
 
 DESIGN = (ROOT / "docs/design.md").read_text(encoding="utf-8")
-MOST_MODULES = 13  # of a folder
-MOST_LINES = 400  # of a module
 
 
 def folders() -> dict[str, list[str]]:
@@ -64,12 +62,3 @@ def test_the_map_lists_the_layers() -> None:
     (text,) = re.findall(r"Layers, lowest first: (.*?)\n\n", DESIGN, re.DOTALL)
     listed = [set(names.split()) for names in re.findall(r"`([^`]+)`", text.partition(". ")[0])]
     assert listed == list(LAYERS)
-
-
-def test_no_folder_holds_more_than_one_can_see() -> None:
-    assert {folder: len(names) for folder, names in folders().items() if len(names) > MOST_MODULES} == {}
-
-
-def test_no_module_is_longer_than_one_can_read() -> None:
-    lines = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in modules().values()}
-    assert {name for name, text in lines.items() if len(text.splitlines()) > MOST_LINES} == set()
