@@ -68,7 +68,14 @@ class Choice:
 
 _NOTHING = (float("nan"), float("nan"))
 # the polynomial, where a strip's own covariance does not determine it
-NOT_COMPARED = Choice(POLYNOMIAL, Witness(_NOTHING, _NOTHING, 0), _NOTHING, None, "point", float("nan"))
+NOT_COMPARED = Choice(
+    taken=POLYNOMIAL,
+    predicted=Witness(_NOTHING, _NOTHING, 0),
+    difference=_NOTHING,
+    left_out=None,
+    left_out_by="point",
+    excess=float("nan"),
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,9 +67,7 @@ def test_a_key_without_effect_is_told_with_what_would_make_it_count(
     assert list(found) == [f"processing.{key}"]
     message = found[f"processing.{key}"]
     assert message.startswith(f"`processing.{key}` has no effect here: it counts with ")
-    for name, other in cure.items():
-        assert name in message
-        assert str(other).lower() in message
+    assert [name for name, other in cure.items() if not (name in message and str(other).lower() in message)] == []
     assert not cure or told(project, {**idle, key: value, **cure}) == {}
     without, with_it = (
         photostrip.run(project, processing=processing(keys)).document for keys in (idle, {**idle, key: value})

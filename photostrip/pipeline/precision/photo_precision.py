@@ -116,7 +116,9 @@ def _turned(strip: StripResult, photos: Floats) -> Floats:
 def fitted(strip: StripResult, oriented: OrientedStrip[StripErrors], factor: float) -> FittedStrip:
     """Carry the errors of a strip over the fit to its control; `oriented` is the strip before it was corrected."""
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
-    return FittedStrip(oriented.errors, oriented.misclosures, oriented.fit(terms), oriented.xyz, factor)
+    return FittedStrip(
+        errors=oriented.errors, control=oriented.misclosures, fit=oriented.fit(terms), xyz=oriented.xyz, factor=factor
+    )
 
 
 def photo_errors(strip: StripResult, errors: StripErrors, observations: PhotoPoints) -> PhotoErrors:

@@ -91,7 +91,8 @@ def _predicted(
     """Compare the standard deviations of points."""
     errors, found = oriented.errors, oriented.misclosures
     fit = oriented.fit([axis.terms for axis in polynomial.axes])
-    after = FittedStrip(errors, found, fit, oriented.xyz, covariance.figures.factor).covariances_of_points(points)
+    fitted = FittedStrip(errors=errors, control=found, fit=fit, xyz=oriented.xyz, factor=covariance.figures.factor)
+    after = fitted.covariances_of_points(points)
     both = [np.diagonal(each, axis1=1, axis2=2).mean(axis=0) for each in (after, covariance.of_points(points))]
     first, second = ((_root(v[:2].mean()), _root(v[2])) for v in both)
     return Witness(first, second, len(points))

@@ -134,7 +134,8 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     found = control_errors.misclosures(ground.control, numbers, axes)
     shift = targets.intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
     fit = control_errors.fit_operator(found, weight, xyz[numbers], terms, shift)
-    covariance = FittedStrip(strip.errors, found, fit, xyz, 1.0).covariances_of_points(np.arange(len(xyz)))
+    fitted = FittedStrip(errors=strip.errors, control=found, fit=fit, xyz=xyz, factor=1.0)
+    covariance = fitted.covariances_of_points(np.arange(len(xyz)))
     share = np.einsum("wi,wit,tw->w", found.direction, fit.influence(xyz[found.row]), fit.operator)
     variance = np.diagonal(covariance, axis1=1, axis2=2)[numbers[found.point], found.axis]
     residual = variance + found.variance * (1 - 2 * share)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import gammaincc, gammaln, log_ndtr
 
 from photostrip.arrays import Numbers, distinct
-from photostrip.frozen import NamedTuple
+from photostrip.frozen import NamedTuple, replace
 from photostrip.triangulation.bundle.common_errors import (
     ALL,
     DISTANCE,
@@ -28,7 +28,7 @@ from photostrip.triangulation.bundle.normal_equations import datum
 from photostrip.triangulation.bundle.normal_equations.equations import equations_at, factored
 from photostrip.triangulation.bundle.observations.calibration import values_of
 from photostrip.triangulation.bundle.observations.problem import BundleProblem, PositionObservations
-from photostrip.triangulation.bundle.parameters import Parameters, prepare
+from photostrip.triangulation.bundle.parameters import prepare
 from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 
@@ -100,7 +100,7 @@ def _gains(
     rest = solution.common[int((problem.cameras.unknown >= 0).sum()) :]
     known = values[freed.cameras.unknown >= 0]
     common = np.concatenate([known, rest, np.zeros(len(prepared.prior) - len(known) - len(rest))])
-    state = Parameters(solution.centers, solution.rotations, solution.points, common)
+    state = replace(solution.state, common=common)
     equations = equations_at(prepared, state)
     found = factored(equations, datum.anchor(equations.own, prepared.rank, state) if solution.free else None)
     if found is None:

@@ -51,6 +51,17 @@ class PreparedProblem:
     own: Numbers  # (m,): which of the pairs is each photo with itself
     near: tuple[NearPoints, ...]
 
+    @property
+    def begun(self) -> Parameters:
+        """The start values, all common parameters zero."""
+        start = self.problem.start
+        return Parameters(
+            centers=start.centers,
+            rotations=start.rotations,
+            points=start.points,
+            common=np.zeros(len(self.prior)),
+        )
+
     def pair(self, row: Numbers, column: Numbers) -> Numbers:
         """Which of the pairs two photos are, by rank; -1: they share no point, or row < column."""
         size = len(self.rank)
@@ -114,5 +125,6 @@ def _near_points(images: ImageObservations, rank: Numbers, points: int) -> list[
         photos, own = np.unique(photo[ray], return_inverse=True)
         begin = piece * TOGETHER
         some = by_photos[begin : begin + TOGETHER]
-        found.append(NearPoints(some, photos, ray, own, at[images.point[ray]] - begin))
+        place = at[images.point[ray]] - begin
+        found.append(NearPoints(points=some, photos=photos, ray=ray, photo=own, point=place))
     return found

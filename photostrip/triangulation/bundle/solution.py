@@ -51,7 +51,7 @@ class BundleSolution:
 
     @property
     def state(self) -> Parameters:
-        return Parameters(self.centers, self.rotations, self.points, self.common)
+        return Parameters(centers=self.centers, rotations=self.rotations, points=self.points, common=self.common)
 
     @cached_property
     def factored(self) -> FactoredEquations:

@@ -66,9 +66,7 @@ def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> _Ended:
     Where the sum of squares grows, the step is taken back and the diagonal of the normal equations raised, more each
     time; where it falls again, less. Source: [Marquardt 1963].
     """
-    start = prepared.problem.start
-    state = Parameters(start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
-    damping, steps = 0.0, []
+    state, damping, steps = prepared.begun, 0.0, []
     if not free:
         defects.refuse_loose(prepared, state)
     best = equations_at(prepared, state)
@@ -152,7 +150,7 @@ def _move(state: Parameters, equations: NormalEquations, damping: float, *, free
         similarity = np.linalg.solve(flat.T @ flat, flat.T @ by_points)
         photos = photos - datum.photo_generators(state, origin) @ similarity
         points = points - moves @ similarity
-    return _Move(photos, points, common, float(np.sqrt(max(square, 0.0))))
+    return _Move(photos=photos, points=points, common=common, length=float(np.sqrt(max(square, 0.0))))
 
 
 def _moved(state: Parameters, move: _Move) -> Parameters:

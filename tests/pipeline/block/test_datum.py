@@ -13,6 +13,7 @@ from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.simulation import Control, Flight, Ground, Spec, Terrain
 from photostrip.triangulation.bundle.normal_equations.defects import GROWN, LOOSE
+from tests.loops import nonempty
 from tests.pipeline.blocks import adjusted, errors, orientations, photos_of, positions, simulate, with_control
 from tests.simulated import inputs_of
 
@@ -162,4 +163,4 @@ def test_heights_without_which_roll_is_open_stay_and_are_named() -> None:
     inputs = replace(inputs_of(simulation), control=given, positions=positions(simulation, noise=noise))
     told = [note for note in adjusted(simulation, inputs).notes if note.code == "control-doubtful"]
     assert sorted(point for note in told for point in note.points) == ["G02", "G08"]
-    assert all(note.message.endswith("it was used: the adjustment fails without it") for note in told)
+    assert all(note.message.endswith("it was used: the adjustment fails without it") for note in nonempty(told))

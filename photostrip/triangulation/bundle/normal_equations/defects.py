@@ -132,9 +132,8 @@ def diverged(prepared: PreparedProblem, state: Parameters, steps: int) -> Geomet
     That is a movement that is hardly determined; else the control that is farthest off.
     """
     message = f"the bundle adjustment did not converge in {counted(steps, 'step')}"
-    control, start = prepared.problem.control, prepared.problem.start
-    begun = Parameters(start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
-    loose = "" if datum.is_free(prepared.problem) else weak(prepared, begun)
+    control = prepared.problem.control
+    loose = "" if datum.is_free(prepared.problem) else weak(prepared, prepared.begun)
     with np.errstate(invalid="ignore"):
         off = np.nan_to_num(np.abs(linearise(prepared, state).control))
     if loose:

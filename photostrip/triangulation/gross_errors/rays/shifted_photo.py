@@ -21,7 +21,7 @@ from photostrip.points import PhotoPoints
 from photostrip.triangulation.bundle.normal_equations import datum
 from photostrip.triangulation.bundle.normal_equations.equations import equations_at, factored
 from photostrip.triangulation.bundle.observations.problem import BundleCameras, BundleProblem
-from photostrip.triangulation.bundle.parameters import Parameters, prepare
+from photostrip.triangulation.bundle.parameters import prepare
 from photostrip.triangulation.bundle.quality.reliability import limit_of
 from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.settings import CALIBRATION, BundleSettings
@@ -113,8 +113,7 @@ class _Network:
         photos = np.arange(self.problem.photos)
         freed = restarted(self._freed(photos), self.solution)
         prepared = prepare(selected(freed, self.plain))
-        start = prepared.problem.start
-        state = Parameters(start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
+        state = prepared.begun
         equations = equations_at(prepared, state)
         found = factored(equations, datum.anchor(equations.own, prepared.rank, state))
         if found is None:
