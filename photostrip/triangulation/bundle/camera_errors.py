@@ -22,6 +22,7 @@ from photostrip.triangulation.bundle.common_errors import (
     OFFSET,
     POINT,
     CommonError,
+    mirrors,
     taken_up,
 )
 from photostrip.triangulation.bundle.normal_equations import datum
@@ -114,7 +115,10 @@ def _gains(
             across = found.left[np.ix_(own, old)]
             left = left - across @ np.linalg.solve(found.left[np.ix_(old, old)], across.T)
         held = np.diag(left) < LEAST_SHARE * np.diag(equations.corner)[own]
-        gains.append(0.0 if held.any() else float(pull[own] @ np.linalg.solve(left, pull[own])))
+        value = np.zeros(len(own)) if held.any() else np.linalg.solve(left, pull[own])
+        tried = np.zeros(len(common))
+        tried[own] = value
+        gains.append(0.0 if mirrors(freed.cameras, tried) else float(pull[own] @ value))
     return gains
 
 

@@ -21,8 +21,8 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation.bundle.observations.calibration import PRINCIPAL_DISTANCE
-from photostrip.triangulation.bundle.observations.problem import BundleProblem
+from photostrip.triangulation.bundle.observations.calibration import PRINCIPAL_DISTANCE, values_of
+from photostrip.triangulation.bundle.observations.problem import BundleCameras, BundleProblem
 from photostrip.triangulation.bundle.quality.cofactors import coordinates_of, joint_cofactors
 from photostrip.triangulation.bundle.quality.reliability import Limit
 from photostrip.triangulation.bundle.selection import Selection, selected, supported
@@ -139,9 +139,14 @@ def _trials(problem: BundleProblem, selection: Selection) -> Iterator[_Trial]:
     for error in _conceivable(problem):
         tried = taken_up(problem, error)
         after = _solved(tried, selection)
-        if after is not None:
+        if after is not None and not mirrors(tried.cameras, after.common):
             unknowns = len(tried.common_names()) - known
             yield _Trial(error=error, unknowns=unknowns, chi_square=after.chi_square, sigma0=after.sigma0)
+
+
+def mirrors(cameras: BundleCameras, common: Floats) -> bool:
+    """Whether a principal distance comes out negative: heights that count downwards are no lens."""
+    return bool((cameras.focal + values_of(cameras, common)[:, PRINCIPAL_DISTANCE] < 0.0).any())
 
 
 def _trials_of_lists(problem: BundleProblem, selection: Selection, solution: BundleSolution) -> Iterator[_Trial]:
