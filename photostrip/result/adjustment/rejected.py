@@ -14,9 +14,10 @@ from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY, Rejection
 from photostrip.result.adjustment.bundle import GroupKind, kinds, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
-from photostrip.result.numbers import Plain, natural_rank, rounded
+from photostrip.result.numbers import Plain, natural, natural_rank, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record, records
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
+from photostrip.triangulation.gross_errors.rays.ray_log import START
 from photostrip.triangulation.strip_formation.scale_transfer import depths
 from photostrip.triangulation.strip_formation.strip import model_points
 from photostrip.units import MICROMETRES
@@ -295,7 +296,7 @@ def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
 
 
 def _from_bundle(found: Bundle, written: Mapping[str, GroupKind]) -> list[Document]:
-    """Observations that the search in the bundle took out, in its order."""
+    """Observations that the search in the bundle took out, in its order; what it began without by point and photo."""
     every, problem = found.screened.rejections, found.block.problem
     strip_of = {photo: strip.strip.id for strip in reversed(found.start.strips) for photo in strip.strip.photos}
     entries: list[Document] = [{}] * len(every)
@@ -323,7 +324,9 @@ def _from_bundle(found: Bundle, written: Mapping[str, GroupKind]) -> list[Docume
         )
         for place, entry in zip(places, made, strict=True):
             entries[place] = entry
-    return entries
+    begun = [each for each in entries if each["test"] == START]
+    begun.sort(key=lambda each: (natural(each["point"] or ""), natural(each["photo"] or "")))
+    return begun + [each for each in entries if each["test"] != START]
 
 
 def _reason_of_bundle(each: Rejection, kind: GroupKind, size: Plain) -> str:
