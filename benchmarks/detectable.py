@@ -14,6 +14,7 @@ import argparse
 import os
 import sys
 from collections import Counter
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from statistics import NormalDist, median
@@ -62,7 +63,7 @@ def wrong_points(seed: int) -> list[Wrong]:
 
     _, project = pair_of_projects("strips", seed)
     with patch.object(snooping, "screen_bundle", remembered):
-        run = adjusted(project, project.settings)
+        run = adjusted(project, replace(project.settings, adjustment="polynomial"))
     o, of_point = project.simulation.observations, Counter(name.partition("/")[2] for name in project.wrong)
     place = {name: row for row, name in enumerate(project.names)}
     rays, points = np.bincount(o.point), []

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 WIDE = plausibility.WIDE
 WEAK = {"P501", "P502", "P503"}  # told of control that is weak indeed
 ATTEMPTS = 20
-METHODS = ("polynomial", "covariance", "bundle")
+METHODS = ("polynomial", "bundle")
 FREE = ("principal_distance", "principal_point", "k1", "k2")
 OBLIQUE_DEG = (15.0, 42.0)
 SOME, HALF, MOST = 0.3, 0.5, 0.7
@@ -445,10 +445,8 @@ def large_block(seed: int) -> Sound:
 LAYOUTS: dict[str, Callable[[int], Sound]] = {
     "strips of 4-8 photos": short,
     "6-60 photos, bands every 3-20, polynomial": bands(6, 60, "polynomial"),
-    "6-60 photos, bands every 3-20, covariance": bands(6, 60, "covariance"),
     "6-60 photos, bands every 3-20, bundle": bands(6, 60, "bundle"),
     "60-300 photos, bands every 3-20, polynomial": bands(60, 300, "polynomial"),
-    "60-300 photos, bands every 3-20, covariance": bands(60, 300, "covariance"),
     "60-300 photos, bands every 3-20, bundle": bands(60, 300, "bundle"),
     "corners, centre, random": layouts,
     "end lap of 75-85 %": overlap,

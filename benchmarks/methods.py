@@ -1,4 +1,4 @@
-"""Which adjustment a strip needs: errors of polynomial, strip covariance and bundle at points that are not control.
+"""Which adjustment a strip needs: errors of polynomial and bundle at points that are not control.
 
 Simulated strips with known truth, 1:10 000, five micrometres in the image, 60 % end lap, six points across every nadir;
 bands of three control points (2 cm) spread evenly over the strip. Errors are those of all points that are not control,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-METHODS = ("polynomial", "covariance", "bundle")
+METHODS = ("polynomial", "bundle")
 MODELS, BANDS, SEEDS = (5, 10, 15, 20, 25, 30, 40), (2, 3, 4, 5), 8
 SUFFICES = 1.5  # times the errors of the bundle up to which the polynomial is good enough
 CENTIMETRES = 100.0
@@ -107,13 +107,13 @@ def lines_of(rows: Sequence[Row]) -> list[str]:
     """Give the table as Markdown."""
     heads = [f"{method} {part}" for method in METHODS for part in ("plan", "height")]
     lines = [
-        f"| models | bands | {' | '.join(heads)} | polynomial / bundle | covariance / bundle |",
-        f"|---|---|{'---|' * (len(heads) + 2)}",
+        f"| models | bands | {' | '.join(heads)} | polynomial / bundle |",
+        f"|---|---|{'---|' * (len(heads) + 1)}",
     ]
     for row in rows:
         cells = [f"{CENTIMETRES * value:.1f}" for method in METHODS for value in row.rms[method]]
-        ratios = ["{:.2f} / {:.2f}".format(*row.ratio(method)) for method in ("polynomial", "covariance")]
-        lines.append(f"| {row.models} | {row.bands} | {' | '.join([*cells, *ratios])} |")
+        ratio = "{:.2f} / {:.2f}".format(*row.ratio("polynomial"))
+        lines.append(f"| {row.models} | {row.bands} | {' | '.join([*cells, ratio])} |")
     return lines
 
 

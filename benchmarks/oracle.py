@@ -54,9 +54,8 @@ Document = dict[str, Any]
 
 FILE = Path(__file__).with_suffix(".npz")
 SAMPLE = 30  # rows that are kept of a table
-# Another kernel of the same BLAS (OPENBLAS_CORETYPE=Nehalem) moves bundle, polynomial and similarity by less, the
-# covariance of long strips by 6e-9 and more.
-TOLERANCES = {"covariance": 1e-7, "auto": 1e-7}
+# Another kernel of the same BLAS (OPENBLAS_CORETYPE=Nehalem) moves bundle, polynomial and similarity by less.
+TOLERANCES = {"auto": 1e-7}
 TOLERANCE = 1e-9  # of the other methods
 IN_SIGMA = 1e-6  # standard deviations that a coordinate may move; what an adjustment leaves when its steps end
 LENGTHS = {"absolute": 1.0, "metres": 100.0}
@@ -384,7 +383,7 @@ def runs(wanted: Sequence[Project], methods: Sequence[str], *, engine: bool) -> 
 def adjusted(path: Path, project: Project, method: str, truth: Document | None, *, engine: bool) -> Run:
     processing = {**project.keys.get("processing", {}), "adjustment": method}
     try:
-        result = photostrip.load(path, **{**project.keys, "processing": processing}).run(joint=False)
+        result = photostrip.load(path, **{**project.keys, "processing": processing}).run()
     except photostrip.GeometryError as error:
         return Run(facts={"refused": error.code}, figures={"refused": error.code, "message": str(error)})
     except photostrip.InputError as error:

@@ -38,7 +38,7 @@ Edit = Callable[[Path, Document], None]
 
 BUNDLE = ("bundle",)
 CLASSICAL = ("polynomial", "similarity")
-EVERY = ("bundle", "auto", "polynomial", "similarity", "covariance")
+EVERY = ("bundle", "auto", "polynomial", "similarity")
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,9 @@ For each layout of control and each method the standard deviations that `photost
 the scatter of adjusted points over all repetitions of whole runs (the bundle: over repetitions of its adjustment). The
 part on one model does the same for `photostrip plan model`, with the exact relative orientation, intersection and
 absolute orientation of every repetition. The part on flown strips tells how well the ideal geometry of a plan speaks
-for strips with tilts, relief and scattered points. The part on reliability gives the worst control point of each layout
-the smallest error that the plan calls detectable, and counts how often the test of the adjustment finds it.
+for strips with tilts, relief and scattered points.
 
-Usage: python benchmarks/planning.py [--part model strip flown reliability] [--repeat N] [--models N]
+Usage: python benchmarks/planning.py [--part model strip flown] [--repeat N] [--models N]
        [--layouts NAME ...] [--methods NAME ...] [--workers N]
 """
 
@@ -49,7 +48,6 @@ from photostrip.planning.strip.control_layout import ControlLayout, Spot, number
 from photostrip.planning.strip.ideal_strip import StripGeometry, ideal_strip  # noqa: E402
 from photostrip.planning.strip.methods import (  # noqa: E402
     BUNDLE,
-    COVARIANCE,
     DEGREES,
     METHODS,
     accuracy,
@@ -355,56 +353,7 @@ def measured_models(spec: ModelSpec, places: Floats, count: int) -> Floats:
     return scatter
 
 
-# -------------------------------------------------------------------------------------------------- reliability
-
-
-def reliability(options: argparse.Namespace) -> None:
-    """Print how often the smallest detectable error of the worst control point is found, by axis."""
-    geometry = StripGeometry(replace(FILM, principal_distance=FOCAL, fiducials={}), options.models + 1)
-    strip = ideal_strip(geometry)
-    print(
-        f"{options.models} models, covariance; the detectable error at the worst control point; {options.repeat} times"
-    )
-    print(f"{'control':<16} {'axis':<8} {'error, m':>8} {'found':>8}   80 % expected")
-    for layout in (layouts(geometry.photos)[name] for name in options.layouts):
-        if layout.gnss is not None:
-            continue
-        spots = spots_of(layout, geometry.photos, geometry.points.rows)
-        sizes = accuracy(strip, layout, spots, COVARIANCE).detectable
-        for axis, name in enumerate(("along", "across", "up")):
-            point = int(np.nanargmax(np.where(np.isfinite(sizes[:, axis]), sizes[:, axis], np.nan)))
-            size = float(sizes[point, axis])
-            share = found_share(strip, layout, spots, (point, axis, size), options.repeat)
-            print(f"{layout.name:<16} {name:<8} {size:8.3f} {100 * share:6.1f} %")
-
-
-def found_share(
-    strip: IdealStrip,
-    layout: ControlLayout,
-    spots: tuple[ControlSpot, ...],
-    wrong: tuple[int, int, float],
-    repeat: int,
-) -> float:
-    """Share of repetitions in which the test value of a wrong control coordinate exceeds its limit."""
-    point, axis, size = wrong
-    frames, _ = tie_frames([FrameSpec("local", ("east", "north", "up"))])
-    wanted, seen = run_settings(COVARIANCE), 0
-    for number in range(repeat):
-        rng = np.random.default_rng([SEED, number])
-        noise = rng.normal(size=strip.observations.xy.shape) * strip.observations.sigma
-        inputs = measured(strip, spots, layout, noise, rng)
-        given = inputs.control.enu.copy()
-        given[point, axis] += size
-        control = replace(inputs.control, enu=given)
-        formed = form_strip(inputs.strips[0], inputs.observations, wanted)
-        own = adjust_formed(formed, control, frames, wanted).of_photos.covariance
-        assert own is not None  # noqa: S101
-        row = np.flatnonzero((own.control.point == point) & (own.control.axis == axis))
-        seen += bool(np.abs(own.tested.normalised[row]) > LIMIT)
-    return seen / repeat
-
-
-PARTS = {"model": models, "strip": strips, "flown": flown, "reliability": reliability}
+PARTS = {"model": models, "strip": strips, "flown": flown}
 
 
 def main() -> None:

@@ -2,8 +2,7 @@
 
 ``GROWN``, from which a movement that is hardly determined is told; ``TURNED``, how well given rotations say what is
 level in a start; ``HOPELESS``, when a pair is given up; ``MANY_OF_PHOTO``, from which lost points of a photo are told;
-``FAR_FROM_RAY``, from which a ray that misses an approximate orientation begins outside; ``ENOUGH``, what squares of
-turns may leave in a strip before it is formed again.
+``FAR_FROM_RAY``, from which a ray that misses an approximate orientation begins outside.
 
 Usage: python benchmarks/run_constants.py [PROJECTS] [--first N] [--only WORD ...]
 """
@@ -38,10 +37,9 @@ from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.points import locate  # noqa: E402
 from photostrip.result import verdict  # noqa: E402
 from photostrip.result.document import document_of  # noqa: E402
-from photostrip.simulation import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain  # noqa: E402
+from photostrip.simulation import Control, Flight, GrossError, Ground, Points, Spec  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.triangulation.bundle.normal_equations import defects  # noqa: E402
-from photostrip.triangulation.covariance_adjustment import adjust  # noqa: E402
 from photostrip.triangulation.relative_orientation import solution  # noqa: E402
 from tests.simulated import inputs_of  # noqa: E402
 
@@ -154,22 +152,6 @@ def shifted(seeds: range) -> Iterator[Project]:
         yield Project("5 % wrong", inputs_of(wrong), replace(case.settings, adjustment=method))
 
 
-def short_bases(seeds: range) -> Iterator[Project]:
-    """Make sound strips of 20 photos of 94 % end lap, with 840 and 170 points on a photo."""
-    flight = Flight(photos=20, end_lap_percent=94.0)
-    for seed in seeds:
-        for points, sigma in ((60, 5.0), (10, 15.0)):
-            spec = Spec(
-                seed=seed,
-                flight=flight,
-                terrain=Terrain(relief=60.0),
-                points=Points(rows=5, extra_per_model=points),
-                control=Control(every=3),
-                image=Image(sigma_um=sigma),
-            )
-            yield Project(f"{points} points a model", inputs_of(simulate(spec)), Settings(adjustment="covariance"))
-
-
 def run(project: Project) -> Result | None:
     """Adjust a project; None where it is refused."""
     try:
@@ -213,15 +195,6 @@ def photo_told(project: Project) -> str:
     return "right one first" if first in project.named else "right one among them"
 
 
-def contradicted(project: Project) -> str:
-    """Say whether the adjustment finds that strip and control contradict each other."""
-    result = run(project)
-    if result is None:
-        return "refused"
-    told = {note.code for note in result.notes}
-    return "sound" if told.isdisjoint({"strip-contradicted", "control-doubtful"}) else "contradicted"
-
-
 class Constant(NamedTuple):
     """A constant with what it is tried on."""
 
@@ -237,7 +210,6 @@ CONSTANTS = (
     Constant(datum.__name__, "TURNED", (0.01, 0.005, 0.02, NEVER), by_orientations, done),
     Constant(problem.__name__, "FAR_FROM_RAY", (5.0, 2.5, 10.0, NEVER), half_a_pair, done),
     Constant(solution.__name__, "HOPELESS", ((12, 0.01), (6, 0.01), (24, 0.01), (30, 0.01)), hopeless, done),
-    Constant(adjust.__name__, "ENOUGH", (0.4, 0.2, 0.8, 1.6, NEVER), short_bases, contradicted),
     Constant(verdict.__name__, "MANY_OF_PHOTO", (0.2, 0.1, 0.4, 0.0, 1.0), shifted, photo_told),
 )
 

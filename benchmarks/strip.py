@@ -71,7 +71,7 @@ EXPONENT = 1.05  # at most, of whole runs from the first to the last of the size
 GROWTH_SCALE = 1500.0  # of the strips that grow: 10 000 photos are 1300 km
 FAILED = 1  # exit code of a run whose verdict is that: all work is done
 MANY_CONTROL = 1300  # points, of which each belongs to one of ten groups left out
-METHODS = ("polynomial", "covariance", "bundle")
+METHODS = ("polynomial", "bundle")
 POINT_KB = 2.0  # at most, for one more check point
 
 LAUNCHER = """
@@ -126,8 +126,6 @@ ROWS = {
     "short": Row("20 photos", strip_spec(20, 5), 1.8),
     "dense": Row("1000 photos, band every 5 models, polynomial", DENSE, 6.0, 200.0),
     "sparse": Row("1000 photos, band every 200 models, polynomial", SPARSE, 6.0, 200.0),
-    "dense-covariance": Row("1000 photos, every 5, covariance", DENSE, 8.0, 250.0, adjustment="covariance"),
-    "sparse-covariance": Row("1000 photos, every 200, covariance", SPARSE, 8.0, 250.0, adjustment="covariance"),
     "dense-bundle": Row("1000 photos, every 5, bundle", DENSE, 8.0, 210.0, adjustment="bundle"),
     "sparse-bundle": Row("1000 photos, every 200, bundle", SPARSE, 8.0, 210.0, adjustment="bundle"),
     "long": Row("3000 photos, band every 600 models", strip_spec(3000, 600), 16.0, 400.0),
@@ -239,8 +237,6 @@ class Stopwatch:
 pipeline = import_module("photostrip.pipeline.run")  # the module; the package gives the function
 # functions imported by name are timed where they are called
 of_strips = import_module("photostrip.pipeline.strips.photos")
-choosing = import_module("photostrip.pipeline.strips.choosing")
-by_covariance = import_module("photostrip.triangulation.covariance_adjustment.adjust")
 common = import_module("photostrip.pipeline.common_points")
 screened_formation = import_module("photostrip.pipeline.strips.screened_formation")
 strip_network = import_module("photostrip.triangulation.gross_errors.rays.strip_network")
@@ -255,8 +251,6 @@ STAGES = (
     ("screening of control", control_screening, "screen_control"),
     ("absolute orientation", absolute_orientation, "orient"),
     ("polynomial", correction, "fit"),
-    ("adjustment by the covariance", by_covariance, "adjust"),
-    ("choice of the method", choosing, "choose"),
     ("resection", of_strips, "resect"),
     ("points of all strips", common, "_joined"),
     ("differences at given points", pipeline, "compare_with_given"),

@@ -1,7 +1,7 @@
 """What the verdict sees: sound strips and blocks, a wrong principal distance, control worse than stated.
 
 Run it as ``python benchmarks/verdict.py [--first SEED] [--number N] [--photos N ...]``. Strips and pairs of strips of 5
-to 20 photos with three to five bands of control, adjusted by polynomials, covariance and bundle in turn; once with
+to 20 photos with three to five bands of control, adjusted by polynomials and bundle in turn; once with
 twelve check points, once without any and ``processing.cross_validation``. Counted are verdicts, and how often the tests
 of what the adjustment has not seen contradict it; plan and height are rms of differences over standard deviations, and
 times is what the cross-validation takes beside the adjustment alone.
@@ -33,7 +33,7 @@ from tests.simulated import inputs_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-ADJUSTMENTS = ("polynomial", "covariance", "bundle")
+ADJUSTMENTS = ("polynomial", "bundle")
 PHOTOS, STRIPS, BANDS = (5, 8, 12, 20), (1, 1, 2), (3, 4, 5)
 CHECKS = 12
 WRONG_DISTANCE = 1.01

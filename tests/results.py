@@ -86,8 +86,8 @@ def solved(inputs: Inputs, settings: Settings | None = None) -> Case:
 
 @cache
 def case(frame: str = "projected", strips: int = 1, sigma_um: float = 5.0, *errors: GrossError) -> Case:
-    """Run a simulated project; every other one is run once only."""
-    return solved(inputs_of(simulate(spec(frame, strips, sigma_um, *errors))))
+    """Run a simulated project by the strip method, which fills more of a result; every other one is run once only."""
+    return solved(inputs_of(simulate(spec(frame, strips, sigma_um, *errors))), Settings(adjustment="polynomial"))
 
 
 _results: dict[bytes, Result] = {}
@@ -100,21 +100,20 @@ def known(
     directory: Path | None = None,
     tied: TiedFrames | None = None,
     stages: Stages | None = None,
-    joint: bool = True,
 ) -> Result:
     """Do as ``triangulate``, or give what the same data with the same settings gave before, far from any grid."""
     if directory is not None and any(path.suffix in GRIDS for path in directory.iterdir()):
-        return triangulate(inputs, settings, directory=directory, tied=tied, stages=stages, joint=joint)
-    asked = pickle.dumps((inputs, settings, joint))
+        return triangulate(inputs, settings, directory=directory, tied=tied, stages=stages)
+    asked = pickle.dumps((inputs, settings))
     if asked not in _results:
-        _results[asked] = triangulate(inputs, settings, directory=directory, tied=tied, stages=stages, joint=joint)
+        _results[asked] = triangulate(inputs, settings, directory=directory, tied=tied, stages=stages)
     return _results[asked]
 
 
 def written_to(crs: str, axes: tuple[str, str, str], source: str = "projected", strips: int = 1) -> Case:
     """Run a project whose result is wanted in another frame than its control has."""
     inputs = inputs_of(simulate(spec(source, strips)))
-    return solved(replace(inputs, output=FrameSpec(crs, axes)))
+    return solved(replace(inputs, output=FrameSpec(crs, axes)), Settings(adjustment="polynomial"))
 
 
 def write_project(folder: Path, spec: Spec, more: str = "") -> Path:

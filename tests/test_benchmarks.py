@@ -64,32 +64,9 @@ def test_dense_prints_what_a_constant_costs_and_what_it_loses() -> None:
 
 
 @pytest.mark.slow
-def test_auto_prints_the_best_and_what_was_taken() -> None:
-    out = printed("auto.py", "--seeds", "1", "--photos", "6", "--overlap", "60", "--errors", "none")
-    rows = re.findall(
-        r"^\| 6 \| 60 % \| [^|]+ \| none \| [^|]+ \| (\w+) \| (\d\.\d\d) \| (\d\.\d\d) \|", out, re.MULTILINE
-    )
-    assert len(rows) == 8
-    assert all(float(mean) <= 1.2 for _, mean, _ in nonempty(rows))
-    assert re.search(r"^auto within 1\.05 of the best method in \d of 8 cells", out, re.MULTILINE)
-    as_it_is = re.search(r"cells, worst (.*); cells with a strip beyond 1\.2: \d, worst (.*); .* in (\d) of", out)
-    assert as_it_is is not None
-    for usual in nonempty((r"3\.5", r"0\.9")):
-        assert re.search(r"^\| {} \| .* \| {} \| {} \| {} \|$".format(usual, *as_it_is.groups()), out, re.MULTILINE)
-
-
-@pytest.mark.slow
-def test_auto_with_dense_control_keeps_polynomials_whose_results_agree() -> None:
-    out = printed("auto.py", "--dense", "--seeds", "8", "--photos", "3", "--overlap", "60", "--errors", "none")
-    taken = dict(re.findall(r"^\| ([\d.]+) \| [\d.]+ \| [\d.]+ \| [\d.]+ \| (\d+) \|$", out, re.MULTILINE))
-    assert int(taken["0"]) == 16  # all, by what is predicted
-    assert 16 > int(taken["0.9"]) > int(taken["0.95"]) > 0
-
-
-@pytest.mark.slow
 def test_methods_prints_errors_and_ratios() -> None:
     out = printed("methods.py", "--seeds", "1", "--models", "6", "--bands", "3")
-    (row,) = re.findall(r"^\| 6 \| 3 \|((?: \d+\.\d \|){6}) (\d\.\d\d) / (\d\.\d\d) \|", out, re.MULTILINE)
+    (row,) = re.findall(r"^\| 6 \| 3 \|((?: \d+\.\d \|){4}) (\d\.\d\d) / (\d\.\d\d) \|", out, re.MULTILINE)
     assert all(1.0 < float(value) < 100.0 for value in nonempty(row[0].split("|")[:-1]))
     assert re.search(r"times the errors of the bundle: 3 bands: (up to 6 models|never)$", out, re.MULTILINE)
 
@@ -118,9 +95,7 @@ def test_batch_prints_overhead_and_speed_up() -> None:
 @pytest.mark.slow
 def test_planning_prints_predicted_and_actual_deviations() -> None:
     options = ("--repeat", "30", "--models", "4", "--layouts", "3 bands", "--methods", "similarity", "bundle")
-    out = printed("planning.py", "--part", "model", "strip", "reliability", *options)
-    assert len(found := re.findall(r"^3 bands +(?:along|across|up) +\d\.\d{3} +(\d+\.\d) %$", out, re.MULTILINE)) == 3
-    assert all(60 < float(share) < 97 for share in nonempty(found))
+    out = printed("planning.py", "--part", "model", "strip", *options)
     rows = re.findall(r"^(\S+(?: \S+)?) +(new|control|similarity|bundle)((?: +\d+\.\d{3}){6})   \d", out, re.MULTILINE)
     assert [row[:2] for row in rows][-2:] == [("3 bands", "similarity"), ("3 bands", "bundle")]
     ratios = [float(value) for row in rows for value in (row[2].split()[2], row[2].split()[5])]

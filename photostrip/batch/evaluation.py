@@ -54,7 +54,7 @@ def _from_parcel(task: Task, parcel: Parcel) -> Answer:
 def _computed(task: Task, source: Source) -> Answer:
     with reading_from(source):
         project = loaded_from(Path(task.project), task.overrides)
-        result = project.run(joint=False)
+        result = project.run()
         files = result.files(html=task.html)
     outcome = outcome_of(result.document, result_findings(result.document)) | _place_of(result)
     return Answer(number=task.number, outcome=outcome, files=files, inputs=_inputs(project.loaded, source))

@@ -64,18 +64,16 @@ class Project:
         """Return all that can be said before anything is adjusted."""
         return _checked(self.loaded.path, self._assignments, self._source)
 
-    def run(self, *, joint: bool = True) -> Result:
+    def run(self) -> Result:
         """Adjust it.
 
-        joint: whether joint covariances of points may be asked of the result (``Result.covariance_of``); what they are
-            made of takes a third of the memory.
         Raises InputError or GeometryError, with the findings that may be the cause.
         """
         from photostrip.project.loading import adjust_project
         from photostrip.result.document import document_of
 
         with reading_from(self._source):
-            computed = self.loaded.result(adjust_project(self.loaded, self._stages, joint=joint))
+            computed = self.loaded.result(adjust_project(self.loaded, self._stages))
             document = document_of(computed, self.loaded.remarks)
             document["certificate"] = self._certificate(document, computed)
         read = self.loaded.files_read(computed) if self._source is None else ()

@@ -132,8 +132,8 @@ class Result:
     def covariance_of(self, ids: Sequence[str] | str, *, joint: bool = False) -> Floats:
         """Return the covariances of points, in the order of the ids, along x, y, z of the frame.
 
-        joint: of all points with each other, for distances and differences of points; of a run by ``covariance`` or
-            ``bundle`` only, not of a saved result.
+        joint: of all points with each other, for distances and differences of points; of a bundle only, not
+            of a saved result.
         Returns square metres, shape (n, 3, 3), joint (n, 3, n, 3); shape (3, 3) for a single id, which is no list. NaN
             where none was computed.
         Raises InputError for a point that the result does not have, and where joint covariances cannot be had.

@@ -59,7 +59,7 @@ def verify(result: Path, project: Path | None = None) -> Document:
     }
     with reading_from(Source()) as account:
         try:
-            again = loaded_from(place, certificate["set"]).run(joint=False).document
+            again = loaded_from(place, certificate["set"]).run().document
         except (InputError, GeometryError) as error:
             found["refused"] = str(error)
         else:

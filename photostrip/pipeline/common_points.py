@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from functools import partial
-from itertools import combinations, zip_longest
-from typing import TYPE_CHECKING, Any
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -18,12 +17,9 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
 from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-from photostrip.pipeline.strips.notes import precision_beyond_control, precision_of_long_strip
+from photostrip.pipeline.strips.notes import precision_of_long_strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips
-
-if TYPE_CHECKING:
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
 
 def join_strips(
@@ -53,12 +49,6 @@ def join_strips(
             _precision_of(strip, before.oriented, observations, given, of_checks=of_checks)
             for strip, before in zip(strips, screened, strict=True)
         ]
-    for strip, found in zip_longest(strips, each):
-        notes += strip.notes
-        solved = None if strip.photo_stages is None else strip.photo_stages.solved
-        if solved is not None and not of_checks:
-            variances = partial(_variances, strip, solved, found)
-            notes += precision_beyond_control(strip.of_photos.strip, strip.control_rows, solved, variances)
     precision = strip_precision.joined(each, strips, points) if each else None
     return AdjustedStrips(
         strips=strips,
@@ -66,18 +56,8 @@ def join_strips(
         ties=_ties(strips, output),
         observations=observations,
         precision=precision,
-        notes=tuple(notes),
+        notes=(*notes, *(note for strip in strips for note in strip.notes)),
     )
-
-
-def _variances(
-    strip: StripResult, solved: CovarianceAdjustment, found: strip_precision.StripPrecision | None
-) -> Floats:
-    """Variances (q, 3) of the points of a strip along the axes of its intermediate frame, metres^2."""
-    if found is None:
-        return np.diagonal(solved.points, axis1=1, axis2=2)
-    axes = strip.intermediate.axes
-    return np.asarray(np.einsum("ia,nij,ja->na", axes, found.points, axes), float)
 
 
 def _precision_of(

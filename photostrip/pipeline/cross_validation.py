@@ -1,7 +1,7 @@
 """Control left out in turn: how far off the same adjustment is where it does not know the ground.
 
 The strips are formed and their control is searched once; what is repeated is absolute orientation, polynomials or
-bundle adjustment, and precision. With the covariance of the strip control is taken out of the system that was solved.
+bundle adjustment, and precision.
 """
 
 from __future__ import annotations

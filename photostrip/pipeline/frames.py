@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.arrays import median
+from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.curvature import curvature_correction
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
-from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.inputs import AUTO, Inputs, Settings
 from photostrip.pipeline.refusals import refuse_curvature_twice
 
 if TYPE_CHECKING:
@@ -61,9 +62,11 @@ def tie_ground_frames(
     radius = settings.absolute.earth_radius if settings.absolute.earth_curvature == "model" else None
     refuse_curvature_twice(inputs, settings)
     cameras = [None if given is None else given.frame for given in (inputs.positions, inputs.orientations)]
-    if settings.adjustment != "bundle":
+    if not settings.together:
         cameras = [None, None]
-    if settings.adjustment == "bundle" and _nothing_given(inputs):
+    if settings.together and inputs.models is None and _nothing_given(inputs):
+        if settings.adjustment == AUTO:
+            raise _nothing_ties(inputs)
         _, target = tie_frames([FrameSpec("local", GROUND_AXES)])
         return GroundFrames((), target)
     named = {f"control[{number}]": spec for number, spec in enumerate(inputs.frames)}
@@ -85,6 +88,14 @@ def tie_ground_frames(
     return GroundFrames(
         control=control, output=target, positions=found.get(CAMERAS[0]), orientations=found.get(CAMERAS[1])
     )
+
+
+def _nothing_ties(inputs: Inputs) -> GeometryError:
+    message = (
+        "nothing ties the photos to the ground: none of the control points is measured on them, and neither camera "
+        "positions nor orientations are given; `processing.adjustment: bundle` makes a free network of them"
+    )
+    return GeometryError(message, photos=tuple(inputs.cameras), code="no-control")
 
 
 def _nothing_given(inputs: Inputs) -> bool:

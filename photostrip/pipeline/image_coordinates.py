@@ -79,7 +79,7 @@ def heights_of(
 
     control = measured_control(inputs.control, observations)
     formed = form_photos(inputs, observations, settings, stages)
-    if settings.adjustment == "bundle":
+    if settings.together:
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
         adjusted = adjust_block(inputs, settings, observations, control, ground, formed)

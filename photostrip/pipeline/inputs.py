@@ -13,7 +13,6 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 from photostrip.triangulation.absolute_orientation import AbsoluteSettings
 from photostrip.triangulation.bundle.settings import BundleSettings
-from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
 from photostrip.triangulation.independent_models.settings import LinkSettings
 from photostrip.triangulation.polynomial.correction import PolynomialSettings
@@ -22,8 +21,8 @@ from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 from photostrip.triangulation.strip_formation.strip import NOTHING_GIVEN, FirstPhoto
 
-METHODS = ("similarity", "polynomial", "covariance", "bundle")
-AUTO = "auto"  # polynomial or covariance, strip by strip
+METHODS = SIMILARITY, POLYNOMIAL, BUNDLE = "similarity", "polynomial", "bundle"
+AUTO = "auto"  # bundle where it is determined, otherwise polynomial
 ADJUSTMENTS = (AUTO, *METHODS)
 
 
@@ -134,7 +133,6 @@ class Settings:
     links: LinkSettings = field(default_factory=LinkSettings)
     absolute: AbsoluteSettings = field(default_factory=AbsoluteSettings)
     polynomial: PolynomialSettings = field(default_factory=PolynomialSettings)
-    covariance: CovarianceSettings = field(default_factory=CovarianceSettings)
     bundle: BundleSettings = field(default_factory=BundleSettings)
     interior: InteriorSettings = field(default_factory=InteriorSettings)
     refinement: ImageCorrectionSettings = field(default_factory=ImageCorrectionSettings)
@@ -148,3 +146,8 @@ class Settings:
     tolerances: dict[str, float] = field(default_factory=dict)
     # findings that the user has looked at and accepted: codes, or ``code/id`` for one photo, point or strip
     accept: tuple[str, ...] = ()
+
+    @property
+    def together(self) -> bool:
+        """Whether photos are adjusted in one bundle."""
+        return self.adjustment in {AUTO, BUNDLE}

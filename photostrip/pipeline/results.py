@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, pieces
-from photostrip.frozen import dataclass, replace
+from photostrip.frozen import dataclass
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints
@@ -23,12 +23,10 @@ from photostrip.triangulation.strip_formation.strip import FormedStrip
 if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.pipeline.choice import Choice
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
     from photostrip.triangulation.bundle.quality.correlations import Correlation
     from photostrip.triangulation.bundle.selection import Selection
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment, CovarianceFigures
     from photostrip.triangulation.error_propagation.check_errors import CheckErrors
     from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
     from photostrip.triangulation.gross_errors.pairs import screening
@@ -54,10 +52,6 @@ class PhotoStages:
     wrong_rays: tuple[Rejection, ...]  # rays that the others of their points contradict
     resection: exterior.Resection  # photos oriented on the adjusted points, intermediate frame
     rows: Numbers  # (m,): image points that took part in the resections, rows of the observations
-    # the adjustment with the strip's own covariance; None with other adjustments
-    covariance: CovarianceFigures | None = None
-    # what its covariances are made of: until they are known, or joint covariances of points wanted
-    solved: CovarianceAdjustment | None = None
 
     @property
     def orientation(self) -> Orientation:
@@ -90,9 +84,7 @@ class StripResult:
     control: ControlPoints  # control that took part
     control_rows: Numbers  # (n,): its rows in the strip's points
     absolute: absolute.AbsoluteOrientation
-    # correction of the strip deformation, also where it was weighed and another adjustment taken; None where it was not
-    # asked for
-    polynomial: Polynomial | None
+    polynomial: Polynomial | None  # correction of the strip deformation; None of a similarity and after a bundle
     xyz: Floats  # (q, 3): adjusted points, intermediate frame, metres; points of ``formed.point``
     cartesian: Floats  # (q, 3): the same in the project's Cartesian frame
     rays: Numbers  # (q,): photos on which each point was measured and used
@@ -101,16 +93,8 @@ class StripResult:
     # control coordinates that were not used; ``control`` says so in its ``use``
     screened_control: ScreenedControl
     shared: StretchedHeights | ShiftedList | None = None  # by all control, found before points were tested one by one
-    choice: Choice | None = None  # between polynomial and covariance; None where the project has made it
     photo_stages: PhotoStages | None = None  # None for independent models
     model_stages: ModelStages | None = None  # None for photos
-
-    @property
-    def unsolved(self) -> StripResult:
-        """The same without the system by which it was solved, a third of all memory."""
-        if self.photo_stages is None:
-            return self
-        return replace(self, photo_stages=replace(self.photo_stages, solved=None))
 
     @property
     def wrong_control(self) -> tuple[Rejection, ...]:

@@ -16,13 +16,13 @@ from photostrip.pipeline.common_points import join_strips
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
 from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
-from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.inputs import AUTO, POLYNOMIAL, Inputs, Settings
 from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
 from photostrip.pipeline.results import AdjustedStrips, Result
 from photostrip.pipeline.strips.absolute import StripStage, on_control
-from photostrip.pipeline.strips.adjusting import adjust, adjust_without
+from photostrip.pipeline.strips.adjusting import adjust
 from photostrip.pipeline.strips.forming import as_single_photos, form_strips
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.pipeline.strips.stages import Stages
@@ -37,14 +37,12 @@ def triangulate(
     directory: Path | None = None,
     tied: TiedFrames | None = None,
     stages: Stages | None = None,
-    joint: bool = True,
 ) -> Result:
     """Take a project through the whole strip method.
 
     directory: the project file's directory, where grids named by the frames are looked for first.
     tied: frames of these inputs that have been tied already; those of other inputs are not used.
     stages: what runs with other settings have made, and what they may take over from this one.
-    joint: whether joint covariances of points may be asked of the result; what they are made of takes memory.
     Raises InputError when the settings or frames contradict each other or the control is left-handed.
     Raises GeometryError when a pair, a junction or the absolute orientation cannot be determined.
 
@@ -64,7 +62,7 @@ def triangulate(
         require_whole(inputs, ground.control)
         # 1 interior orientation
         photo = orient_interior(inputs, settings)
-        result = _walk_from_orientations(inputs, settings, ground, photo, stages, joint=joint)
+        result = _walk_by_any_method(inputs, settings, ground, photo, stages)
     except (InputError, GeometryError) as error:
         error.findings = of_failure()
         raise
@@ -76,18 +74,36 @@ def triangulate(
     return replace(result, findings=gate.of_result(result, directory, stages))
 
 
+def _walk_by_any_method(
+    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages
+) -> Result:
+    """Walk, with `auto` again strip by strip with polynomials where a bundle cannot be had."""
+    try:
+        return _walk_from_orientations(inputs, settings, ground, photo, stages)
+    except GeometryError as error:
+        if settings.adjustment != AUTO or inputs.models is not None:
+            raise
+        try:
+            result = _walk(inputs, replace(settings, adjustment=POLYNOMIAL), ground, photo, stages)
+        except (GeometryError, InputError):
+            raise error from None
+        text = f"no bundle adjustment could be had, each strip is adjusted by polynomials in its place: {error}"
+        note = Note("no-bundle", text, photos=error.photos, points=error.points)
+        return replace(result, settings=settings, notes=(note, *result.notes))
+
+
 def _walk_from_orientations(
-    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages, *, joint: bool
+    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages
 ) -> Result:
     """Walk, and again with single photos at their given orientations in the place of a strip that cannot be formed."""
     try:
-        return _walk(inputs, settings, ground, photo, stages, joint=joint)
+        return _walk(inputs, settings, ground, photo, stages)
     except GeometryError as error:
         cut = as_single_photos(inputs, settings, error)
         if cut is None:
             raise
         try:
-            result = _walk_from_orientations(cut, settings, ground, photo, stages, joint=joint)
+            result = _walk_from_orientations(cut, settings, ground, photo, stages)
         except GeometryError:
             raise error from None
         text = f"{error}; all photos of the strip start from their given orientations in its place"
@@ -95,9 +111,7 @@ def _walk_from_orientations(
         return replace(result, notes=(note, *result.notes))
 
 
-def _walk(
-    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages, *, joint: bool
-) -> Result:
+def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages) -> Result:
     """Every stage takes what the stages before it found."""
     # 1 lens distortion, refraction
     refined = correct(photo, inputs, settings, ground, stages)
@@ -107,8 +121,6 @@ def _walk(
     def on_the_ground(inputs: Inputs, whole: Result | None = None) -> Result:
         strips = formed if whole is None else _as_left_by(whole, formed)
         adjusted = _adjusted(inputs, settings, ground, refined.observations, strips, stages, whole)
-        if whole is not None or not (joint or settings.cross_validation):
-            adjusted = replace(adjusted, strips=tuple(strip.unsolved for strip in adjusted.strips))
         missing = {}
         if whole is None:
             missing = not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips)
@@ -145,9 +157,7 @@ def _walk(
         return result
     from photostrip.pipeline.cross_validation import cross_validate
 
-    folds = cross_validate(result, partial(on_the_ground, whole=result))
-    strips = result.strips if joint else tuple(strip.unsolved for strip in result.strips)
-    return replace(result, folds=folds, strips=strips)
+    return replace(result, folds=cross_validate(result, partial(on_the_ground, whole=result)))
 
 
 def _of_any_method(settings: Settings) -> Settings:
@@ -177,7 +187,7 @@ def _adjusted(
 ) -> AdjustedStrips:
     """Bring formed strips to the ground and adjust them, each by itself or all in a bundle."""
     control = measured_control(inputs.control, observations)
-    if settings.adjustment == "bundle" and inputs.models is None:
+    if settings.together and inputs.models is None:
         # 4-5 all strips at once
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
@@ -200,15 +210,8 @@ def _adjusted(
         )
         for strip in formed
     ]
-    # 5 polynomials, or the strip's own covariance
-    level = settings.covariance.level / max(len(screened), 1)  # all strips together keep it
-    settings = replace(settings, covariance=replace(settings.covariance, level=level))
-    if whole is None:
-        strips = tuple(adjust(strip, settings, stages) for strip in screened)
-    else:
-        strips = tuple(
-            adjust_without(before, strip, settings) for before, strip in zip(whole.strips, screened, strict=True)
-        )
+    # 5 polynomials
+    strips = tuple(adjust(strip, settings) for strip in screened)
     # 6 back to the map, with standard deviations
     return join_strips(
         strips, screened, observations, inputs.control, ground.output, settings, of_checks=whole is not None

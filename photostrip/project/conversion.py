@@ -337,7 +337,6 @@ def settings(project: ProjectFile) -> Settings:
             control_weights=wanted.control_weights,
         ),
         polynomial=_laid_over(usual.polynomial, wanted.polynomial),
-        covariance=_laid_over(usual.covariance, wanted.covariance),
         bundle=replace(_laid_over(usual.bundle, wanted.bundle), search_cameras=wanted.self_calibration == AUTO),
         interior=_laid_over(usual.interior, wanted.interior),
         refinement=replace(

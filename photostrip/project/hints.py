@@ -14,6 +14,7 @@ from photostrip.formats.text.findings import meant
 from photostrip.formats.text.tables import Table
 from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Note, counted, listed
+from photostrip.pipeline.inputs import AUTO, BUNDLE
 from photostrip.points import locate
 from photostrip.project.conversion import certificate_of
 from photostrip.project.models import ModelTables
@@ -66,8 +67,7 @@ CONDITIONS = (  # of several that a key has, the first that fails is told
     Condition(  # a bundle starts from it
         ("polynomial",), _adjusted("auto", "polynomial", "bundle"), "`processing.adjustment: polynomial` or `auto`"
     ),
-    Condition(("covariance",), _adjusted("auto", "covariance"), "`processing.adjustment: covariance` or `auto`"),
-    Condition(("bundle", "self_calibration"), _adjusted("bundle"), "`processing.adjustment: bundle`"),
+    Condition(("bundle", "self_calibration"), _adjusted(AUTO, BUNDLE), "`processing.adjustment: bundle` or `auto`"),
     Condition(
         ("earth_radius", "earth_latitude", "earth_azimuth"),
         _curved("model", "image"),
@@ -106,7 +106,7 @@ def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
         return
     count = rays(observations, photos)
     given = {read.ids[row] for read in control for row in range(len(read.ids)) if read.used[row]}
-    bundle = project.processing.adjustment == "bundle"
+    bundle = project.processing.adjustment in {AUTO, BUNDLE}
     yield from _measured_once(observations, count, given, together=bundle)
     for read in control:
         yield from _switched_off(read)
@@ -163,7 +163,7 @@ def _cameras_not_used(
 ) -> Iterator[Note]:
     """Say which rows of a table of cameras are not used, and that the strip method uses none."""
     what = name.replace("_", " ")
-    if project.processing.adjustment != "bundle":
+    if project.processing.adjustment not in {AUTO, BUNDLE}:
         message = (
             f"the {what} are not used: the strip method has no place for them; `processing.adjustment: bundle` has"
         )

@@ -115,11 +115,10 @@ class Project:
             raise
 
 
-def adjust_project(project: Project, stages: Stages | None = None, *, joint: bool = True) -> Result:
+def adjust_project(project: Project, stages: Stages | None = None) -> Result:
     """Adjust a project; what is refused has its place in the project file.
 
     stages: what runs of it by other methods have made.
-    joint: whether joint covariances of points may be asked of the result.
     """
     from photostrip.pipeline.run import triangulate  # what only reads a project does without
 
@@ -130,7 +129,6 @@ def adjust_project(project: Project, stages: Stages | None = None, *, joint: boo
             directory=project.grid_folder,
             tied=project.tied,
             stages=stages,
-            joint=joint,
         )
 
 

@@ -26,7 +26,6 @@ AUTO = {"parallax_limit", "flying_height", "ground_height"}  # keys of which no 
 EMPTY = {"self_calibration"}  # lists of which none is not the same as no word
 OF_PHOTOS = (
     "relative",
-    "covariance",
     "bundle",
     "scale_transfer",
     "scale_weights",

@@ -54,9 +54,8 @@ output:
 
 # What follows has defaults that suit most strips.
 # processing:
-#   adjustment: auto                # auto | polynomial | similarity | covariance | bundle
+#   adjustment: auto                # auto | polynomial | similarity | bundle
 #   polynomial: {{degree: auto}}      # auto | 1 | 2 | 3
-#   covariance: {{distances: true}}   # false: the control alone
 #   earth_curvature: auto           # auto | model | none
 #   refraction: false
 # tolerances: {{check_rms_xy: 0.40, check_rms_z: 0.60}}     # metres; exceeded: exit code 1

@@ -7,6 +7,7 @@ import numpy as np
 from photostrip.frozen import as_dict, names_of
 from photostrip.geodesy.ground_frame import plural
 from photostrip.notes import Document
+from photostrip.pipeline.inputs import BUNDLE, POLYNOMIAL, SIMILARITY
 from photostrip.pipeline.results import Result
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
@@ -17,8 +18,7 @@ ROTATION = {
     "geocentric": "the geocentric axes X, Y, Z",
     "local": "the axes east, north, up of the local frame",
 }
-OF_PHOTOS, OF_MODELS = ("relative", "formation", "covariance", "interior", "refinement"), ("links",)
-ASKED_BY = {"bundle": ("bundle",), "covariance": ("covariance", "auto")}
+OF_PHOTOS, OF_MODELS = ("relative", "formation", "bundle", "interior", "refinement"), ("links",)
 EFFECTS = ("principal point", "distortion", "refraction")
 MEANT_OF_PHOTOS = ("vx_um, vy_um", "q_um")
 MEANT_OF_MODELS = {
@@ -54,18 +54,25 @@ def conventions_of(result: Result) -> Document:
     return {key: value for key, value in found.items() if key not in MEANT_OF_PHOTOS} | MEANT_OF_MODELS
 
 
+def adjustment_of(result: Result) -> str:
+    """Name the adjustment that was made."""
+    if result.bundle is not None:
+        return BUNDLE
+    return SIMILARITY if all(strip.polynomial is None for strip in result.strips) else POLYNOMIAL
+
+
 def settings_of(result: Result) -> Document:
     """Return the block ``settings``: what was asked for, with the keys and units of the project file."""
     settings = result.settings
     found: Document = {"adjustment": settings.adjustment}
     for name in names_of(type(settings)):
         value = getattr(settings, name)
-        if name in {"bundle", "covariance"} and settings.adjustment not in ASKED_BY[name]:
+        if name == "bundle" and not settings.together:
             continue
         if name in (OF_PHOTOS if result.model_strips else OF_MODELS):
             continue
         if names_of(type(value)):
-            found[name] = as_dict(value)
+            found[name] = {key: list(each) if isinstance(each, tuple) else each for key, each in as_dict(value).items()}
     return found
 
 

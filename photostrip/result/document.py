@@ -10,8 +10,6 @@ from photostrip.pipeline.results import Result
 from photostrip.result import conventions, summary
 from photostrip.result.adjustment import (
     bundle,
-    choices,
-    covariance,
     deformation,
     junctions,
     links,
@@ -40,7 +38,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     numbers = summary.summary_of(result, found)
     taken_out, said = rejected.rejected_of(result), (*notes, *result.notes)
     body: Document = {
-        "adjustment": choices.adjustment_of(result),
+        "adjustment": conventions.adjustment_of(result),
         "frame": ground.frame_of(result),
         "summary": numbers,
         "tolerances": summary.tolerances_of(result, numbers),
@@ -52,9 +50,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         **image_coordinates.fiducials_of(result),
         "strips": [strips.strip_of(result, each) for each in result.strips],
         "absolute": [strips.absolute_of(each) for each in result.strips],
-        **choices.choices_of(result),
         **strips.polynomials_of(result),
-        **covariance.covariances_of(result),
         **precision.precision_of(result, found),
         **cross_validation.cross_validation_of(result),
         **bundle.bundle_of(result),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from photostrip import __version__
 from photostrip.errors import PhotostripError
@@ -12,11 +12,10 @@ SCHEMA = 1
 PARTS = ("count", "rms", "max", "worst", "rms_um")
 
 
-def methods_document(name: str, methods: Mapping[str, Document], choices: Sequence[Document]) -> Document:
+def methods_document(name: str, methods: Mapping[str, Document]) -> Document:
     """Put what several adjustments of one project leave side by side.
 
     methods: by adjustment what ``method_of`` and ``refused_method`` give.
-    choices: what `auto` takes for each strip and why.
     ``methods`` says what is left at check and at control points, ``best`` which adjustment has the smallest rms at
     check points, None without these.
     """
@@ -27,7 +26,6 @@ def methods_document(name: str, methods: Mapping[str, Document], choices: Sequen
         "name": name,
         "methods": rows,
         "best": {part: _best(rows, part) for part in ("plan", "height")},
-        "choices": list(choices),
     }
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("_adjusted_once")
 
 TABLES = ("points", "photos", "residuals", "parallaxes", "rejected", "refined")
-FILES = {*(f"{name}.csv" for name in TABLES), "project.resolved.yaml", "result.json"}
+FILES = {*(f"{name}.csv" for name in TABLES), "reliability.csv", "project.resolved.yaml", "result.json"}
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def test_the_files_of_the_result(result: Path) -> None:
 def test_talk_goes_to_stderr(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "run", project, "-o", tmp_path / "out")
     assert code == 0
-    assert err == f"wrote 8 files to {tmp_path / 'out'}\n"
+    assert err == f"wrote 9 files to {tmp_path / 'out'}\n"
     assert "wrote" not in out
     _, _, err = run(capsys, "run", project, "-o", tmp_path / "out", "--verbose")
     assert [line.split()[0] for line in err.splitlines()] == ["read", "adjusted", "wrote"]
@@ -299,7 +299,7 @@ def test_a_section_is_printed_alone(result: Path, capsys: pytest.CaptureFixture[
     code, out, err = run(capsys, "report", result, "--section", "rejected", "--section", "check")
     assert (code, err) == (0, "")
     assert [line.split(" ─")[0] for line in out.splitlines() if "──" in line] == ["── Check points", "── Rejected"]
-    assert run(capsys, "report", result, "--section", "bundle")[1] == "This result has no section `bundle`.\n"
+    assert run(capsys, "report", result, "--section", "polynomial")[1] == "This result has no section `polynomial`.\n"
     assert run(capsys, "report", result, "--section", "check", "--format", "md")[1].startswith("## Check points\n")
 
 

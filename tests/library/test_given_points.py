@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SAMPLES = ROOT / "sample_data"
 PUBLISHED = ROOT / "tests" / "data" / "authorities" / "sxb-bundle"
-METHODS = "auto", "similarity", "polynomial", "covariance", "bundle"
+METHODS = "auto", "similarity", "polynomial", "bundle"
 CODES = {"control-lost", "control-rejected", "control-image", "control-measured-once", "given-ray", "check-lost"}
 MOVED = 0.1  # mm, twenty standard deviations
 

@@ -25,7 +25,7 @@ def test_a_result_against_its_baseline() -> None:
     same = photostrip.compare(result, FOLDER / "baseline.json")
     assert same.same
     assert repr(same).startswith("<Comparison: SAME: ")
-    other = photostrip.compare(photostrip.run(FOLDER / "project.yaml", processing={"adjustment": "bundle"}), result)
+    other = photostrip.compare(photostrip.run(FOLDER / "project.yaml", processing={"adjustment": "polynomial"}), result)
     assert not other.same
     assert {each["kind"] for each in other.differences} >= {"plan", "height", "rotation"}
     assert "DIFFERENT" in other.report()

@@ -68,7 +68,7 @@ def test_overrides_are_those_of_the_command(simulation: photostrip.Simulation) -
     project = simulation.project
     plain = project.run()
     changed = photostrip.run(project, processing={"adjustment": "polynomial", "polynomial": {"degree": 1}})
-    assert plain.document["adjustment"] == "covariance"
+    assert plain.document["adjustment"] == "bundle"
     assert changed.document["polynomials"][0]["degree"] == 1
     again = project.overridden(**{"processing.adjustment": "similarity"}).overridden(name="other")
     assert (again.run().document["adjustment"], again.name) == ("similarity", "other")

@@ -34,7 +34,7 @@ def geocentric(inputs: Inputs) -> Inputs:
 @pytest.fixture(scope="module")
 def both() -> tuple[Result, Result]:
     done = simulate(SPEC)
-    inputs, settings = inputs_of(done), settings_of(done)
+    inputs, settings = inputs_of(done), replace(settings_of(done), adjustment="polynomial")
     return triangulate(inputs, settings), triangulate(geocentric(inputs), settings)
 
 

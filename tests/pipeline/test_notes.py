@@ -49,16 +49,8 @@ def without_far_control(share: float) -> Inputs:
     return replace(inputs, control=control.take(kept))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("share", "adjustment"), [(0.7, "auto"), (0.7, "covariance"), (1.0, "covariance")])
-def test_standard_deviations_beyond_the_control_are_told(share: float, adjustment: str) -> None:
-    result = triangulate(without_far_control(share), Settings(adjustment=adjustment))
-    document = document_of(result)
-    (strip,) = result.strips
-    adjusted = strip.of_photos.solved
-    assert adjusted is not None
-    told = [each["message"] for each in document["notes"] if each["code"] == "extrapolation"]
-    largest = np.sqrt(adjusted.points[:, 2, 2].max())
+@pytest.mark.parametrize("share", [0.7, 1.0])
+def test_points_beyond_the_control_are_told_once(share: float) -> None:
+    document = document_of(triangulate(without_far_control(share), Settings()))
     beyond = [each for each in document["verdict"]["look_at"] if "beyond the control" in each]
-    assert [each[:4] for each in beyond] == ["P503"] * (share < 1.0)  # says it once
-    assert [f"and {largest:.2f} m in height, between the control" in each for each in told] == [True] * (share < 1.0)
+    assert [each[:4] for each in beyond] == ["P503"] * (share < 1.0)

@@ -37,7 +37,7 @@ def adjusted(adjustment: str, *, twice: bool) -> tuple[Result, str]:
     return triangulate(replace(inputs, observations=measured), settings), table.point_ids[first]
 
 
-@pytest.mark.parametrize("adjustment", ["similarity", "polynomial", "covariance", "bundle"])
+@pytest.mark.parametrize("adjustment", ["similarity", "polynomial", "bundle"])
 def test_the_strip_is_adjusted_and_the_id_is_named(adjustment: str) -> None:
     sound, _ = adjusted(adjustment, twice=False)
     result, name = adjusted(adjustment, twice=True)

@@ -49,9 +49,10 @@ def flown() -> Simulation:
     )
 
 
-def rejected(inputs: Inputs) -> str:
+def rejected(inputs: Inputs, adjustment: str = "auto") -> str:
     """Give rejected.csv."""
-    return "".join(rejected_csv(document_of(triangulate(inputs, settings_of(flown())))))
+    settings = replace(settings_of(flown()), adjustment=adjustment)
+    return "".join(rejected_csv(document_of(triangulate(inputs, settings))))
 
 
 def rows(text: str) -> list[dict[str, str]]:
@@ -94,7 +95,7 @@ def renamed(inputs: Inputs) -> tuple[Inputs, dict[str, str]]:
 
 @pytest.mark.slow
 def test_there_is_something_to_reject() -> None:
-    found = rows(rejected(inputs_of(flown())))
+    found = rows(rejected(inputs_of(flown()), "polynomial"))
     assert {row["stage"] for row in found} >= STAGES
     for row in nonempty(found):
         assert float(row["size"]) != 0 or row["stage"] == "rays"
@@ -111,9 +112,10 @@ def test_there_is_something_to_reject() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_order_of_rows_does_not_decide(seed: int) -> None:
+@pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
+def test_the_order_of_rows_does_not_decide(seed: int, adjustment: str) -> None:
     inputs = inputs_of(flown())
-    assert rejected(shuffled(inputs, seed)) == rejected(inputs)
+    assert rejected(shuffled(inputs, seed), adjustment) == rejected(inputs, adjustment)
 
 
 @pytest.mark.slow

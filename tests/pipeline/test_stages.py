@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def all_stages() -> Stages:
-    return Stages("pairs", "strip", "control", "covariance", "shifted", "failure")
+    return Stages("pairs", "strip", "control", "shifted", "failure")
 
 
 @pytest.fixture

@@ -91,7 +91,7 @@ def test_approximate_orientations_need_no_standard_deviations(tmp_path: Path) ->
 
 def test_the_strip_method_says_that_it_uses_none(tmp_path: Path) -> None:
     project = given(tmp_path)
-    project.change(Y, "  adjustment: bundle\n", "")
+    project.change(Y, "adjustment: bundle", "adjustment: polynomial")
     told = [note for note in project.load().hints if note.code == "cameras-not-used"]
     assert [note.key for note in told] == ["camera_positions", "orientations"]
 
@@ -160,8 +160,8 @@ def test_a_table_without_any_photo_of_the_strips(tmp_path: Path) -> None:
     assert "has none of the photos of the strips; its photos are DSC_1001, DSC_1002" in told
 
 
-def test_single_photos_and_no_control_are_for_bundles_only(tmp_path: Path) -> None:
+def test_single_photos_are_for_bundles_only(tmp_path: Path) -> None:
     project = given(tmp_path)
-    project.change(Y, "  adjustment: bundle\n", "")
+    project.change(Y, "adjustment: bundle", "adjustment: polynomial")
     project.change(Y, "[2001, 2002]", "[2001]")
     assert any("only one photo" in line and "adjustment: bundle" in line for line in project.lines())

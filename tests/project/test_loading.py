@@ -85,7 +85,6 @@ def test_every_setting_arrives(tmp_path: Path) -> None:
 processing:
   adjustment: similarity
   polynomial: {degree: 2}
-  covariance: {distances: no}
   relative: {screening: tau, grubbs_alpha: 0.01, parallax_limit: 0.03}
   scale_transfer: distances
   earth_curvature: none
@@ -102,7 +101,6 @@ tolerances: {check_rms_xy: 0.4, sigma0_um: 7}
     assert (settings.relative.screening, settings.relative.grubbs_alpha) == ("tau", 0.01)
     assert settings.relative.parallax_limit == 0.03
     assert settings.formation.scale_transfer == "distances"
-    assert settings.covariance.distances is False
     assert (settings.absolute.earth_curvature, settings.absolute.earth_radius) == ("none", 6.4e6)
     assert (settings.refinement.refraction, settings.refinement.flying_height) == (True, 1500.0)
     assert settings.refinement.ground_height == -3.5
@@ -407,6 +405,8 @@ def test_points_measured_once(tmp_path: Path) -> None:
     project = sample(tmp_path)
     project.write("observations.csv", OBSERVATIONS + "1001,P7,1,2\n1002,G7,1,2\n")
     project.write("control.csv", CONTROL + "G7,500100,4649871,212,xyz,\n")
+    assert set(notes(project.load())) == {"measured-once"}  # control on one photo helps to orient it
+    project.change("project.yaml", "processing:\n", "processing:\n  adjustment: polynomial\n")
     found = notes(project.load())
     assert found["measured-once"].points == ("P7",)
     assert found["control-measured-once"].points == ("G7",)

@@ -58,8 +58,6 @@ processing:
   adjustment: auto
   polynomial:
     degree: auto
-  covariance:
-    distances: true
   self_calibration: auto
   bundle:
     screening: snooping

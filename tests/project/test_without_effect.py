@@ -23,7 +23,6 @@ CASES: list[tuple[str, object, dict[str, Any]]] = [
     ("relative.grubbs_alpha", 0.2, {"relative.screening": "tau"}),
     ("relative.parallax_limit", 0.001, {"relative.screening": "parallax+grubbs"}),
     ("polynomial.degree", "1", {"adjustment": "polynomial"}),
-    ("covariance.distances", False, {"adjustment": "covariance"}),
     ("bundle.level", 0.5, {"adjustment": "bundle"}),
     ("self_calibration", ["k1"], {"adjustment": "bundle"}),
     ("earth_radius", 1e6, {"earth_curvature": "model"}),
@@ -90,11 +89,12 @@ def test_every_condition_is_tried() -> None:
 def test_it_is_told_where_it_stands_and_in_the_report(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = project.read_text(encoding="utf-8")
     other = project.with_name("other.yaml")
-    other.write_text(f"{text}processing:\n  bundle:\n    level: 0.05\n  earth_radius: 6378000\n", encoding="utf-8")
+    more = "processing:\n  adjustment: polynomial\n  bundle: {level: 0.05}\n  earth_radius: 6378000\n"
+    other.write_text(text + more, encoding="utf-8")
     line = text.count("\n") + 3
     assert main(["check", str(other)]) == 0
     printed = capsys.readouterr().out
-    assert f"{other}:{line}:12: processing.bundle.level: " in printed
+    assert f"{other}:{line}:19: processing.bundle.level: " in printed
     assert f"{other}:{line + 1}:17: processing.earth_radius: " in printed
     assert main(["run", str(other)]) == 0
     printed = " ".join(capsys.readouterr().out.split())

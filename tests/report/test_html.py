@@ -95,7 +95,7 @@ def texts(document: Document) -> Iterator[str]:
 def test_the_page_says_everything_that_the_sections_say() -> None:
     html = to_html(saved())
     assert "`" not in html[html.index("<main>") : html.index("</main>")]
-    assert "<code>processing.adjustment: covariance</code>" in html
+    assert "<code>processing.adjustment: bundle</code>" in html
     words = set(Page(html.replace("<code>", "`").replace("</code>", "`")).words)
     assert [text for text in texts(saved()) if " ".join(text.split()) not in words and text] == []
 

@@ -34,7 +34,6 @@ LAYOUTS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "strip": ({"flight": FOUR}, {}),
     "strip by polynomials": ({"flight": FOUR}, by("polynomial")),
     "strip by similarity": ({"flight": FOUR}, by("similarity")),
-    "strip by covariance": ({"flight": FOUR}, by("covariance")),
     "strip by bundle": ({"flight": FOUR}, by("bundle")),
     "pair": ({"flight": {"photos": 2}, "control": {"bands": 2}}, {}),
     "strips": ({"flight": TWO}, {}),

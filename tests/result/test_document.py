@@ -479,7 +479,8 @@ def test_ties_are_the_differences_of_strips_computed_alone() -> None:
     alone = []
     for strip in both.inputs.strips:
         single = solved(
-            replace(both.inputs, strips=(strip,), observations=only(both.inputs.observations, strip.photos))
+            replace(both.inputs, strips=(strip,), observations=only(both.inputs.observations, strip.photos)),
+            Settings(adjustment="polynomial"),
         ).document
         alone.append({row["id"]: np.array(xyz(row)) for row in single["points"]})
     points = {row["id"]: np.array(xyz(row)) for row in both.document["points"]}
@@ -569,7 +570,10 @@ def test_the_order_of_the_rows_does_not_matter() -> None:
     o = inputs.observations
     order = np.random.default_rng(1).permutation(len(o))
     shuffled = replace(o, photo=o.photo[order], point=o.point[order], xy=o.xy[order], sigma=o.sigma[order])
-    a, b = case("projected", 2).document, solved(replace(inputs, observations=shuffled)).document
+    a, b = (
+        case("projected", 2).document,
+        solved(replace(inputs, observations=shuffled), Settings(adjustment="polynomial")).document,
+    )
     for key in ("points", "photos", "control", "models"):
         for first, second in zip(a[key], b[key], strict=True):
             for x, y in zip(leaves(first), leaves(second), strict=True):
@@ -614,7 +618,7 @@ def test_notes_of_the_reading_come_first() -> None:
 
 
 def judged(**tolerances: float) -> Document:
-    return solved(case("local").inputs, Settings(tolerances=tolerances)).document
+    return solved(case("local").inputs, Settings(adjustment="polynomial", tolerances=tolerances)).document
 
 
 def test_tolerances_that_are_kept() -> None:
@@ -669,7 +673,7 @@ def displaced(role: str, metres: float) -> Document:
     control = inputs.control
     enu = control.enu.copy()
     enu[np.flatnonzero(control.check == (role == "check"))[2], 0] += metres
-    return solved(replace(inputs, control=replace(control, enu=enu))).document
+    return solved(replace(inputs, control=replace(control, enu=enu)), Settings(adjustment="polynomial")).document
 
 
 def test_a_wrong_check_point_is_worth_a_look_and_changes_nothing() -> None:

@@ -492,6 +492,9 @@ def test_a_strip_without_control_is_named() -> None:
         control = control_points(dict.fromkeys(names, (0.0, 0.0, 0.0)))
         inputs = project(flown, control)
         with pytest.raises(GeometryError, match="strip A: none of its points is a control point") as caught:
+            triangulate(inputs, Settings(adjustment="polynomial"))
+        assert caught.value.code == "no-control"
+        with pytest.raises(GeometryError, match="nothing ties the photos to the ground") as caught:
             triangulate(inputs, Settings())
         assert caught.value.code == "no-control"
 

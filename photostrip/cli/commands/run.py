@@ -74,7 +74,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             f"read {counted(len(read.loaded.files), 'file')}, {counted(len(inputs.observations), 'image point')}"
         )
         waiting.at(f"adjusting {counted(len(read.photos), 'photo')}")
-        result = read.run(joint=False)
+        result = read.run()
         if result.computed is not None:
             messages.step(f"adjusted {counted(len(result.computed.points.number), 'point')}")
         waiting.at("writing the result")

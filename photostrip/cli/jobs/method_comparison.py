@@ -12,12 +12,10 @@ from photostrip.cli.stdout import Document, Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripError
 from photostrip.formats.text.writing import write_text
 from photostrip.library.project import Project, loaded_from
-from photostrip.pipeline.inputs import AUTO, METHODS
+from photostrip.pipeline.inputs import METHODS
 from photostrip.pipeline.strips.stages import Stages
-from photostrip.project.loading import adjust_project
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
-from photostrip.result.adjustment.choices import choices_of
 from photostrip.result.methods import method_of, methods_document, refused_method
 
 
@@ -33,19 +31,19 @@ def compare_methods(
 ) -> int:
     """Adjust a project in every way there is and print what is left at its check points.
 
-    What `auto` takes is said in a line. In the output folder each adjustment gets a folder of its name, with `html`
-    each its report and all of them ``methods.html``. An adjustment that refuses the project, or its key in the project
-    file, is named with its reason; when none succeeds, the first failure is raised.
+    In the output folder each adjustment gets a folder of its name, with `html` each its report and all of them
+    ``methods.html``. An adjustment that refuses the project, or its key in the project file, is named with its reason;
+    when none succeeds, the first failure is raised.
     """
     found: dict[str, Document] = {}
     failures: list[PhotostripError] = []
     name = ""
     with failures_as(form), progress(sys.stderr, quiet=messages.quiet) as waiting:
-        stages = Stages("pairs", "strip", "control", "covariance", "shifted", "failure")
+        stages = Stages("pairs", "strip", "control", "shifted", "failure")
         for adjustment in METHODS:
             waiting.at(f"adjusting: {adjustment}")
             try:
-                result = _loaded(project, assignments, adjustment, stages).run(joint=False)
+                result = _loaded(project, assignments, adjustment, stages).run()
             except (GeometryError, InputError) as error:
                 found[adjustment] = refused_method(error)
                 failures.append(error)
@@ -57,12 +55,7 @@ def compare_methods(
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
         if len(failures) == len(found):
             raise failures[0]
-        waiting.at(f"adjusting: {AUTO}")
-        try:
-            chosen = _chosen(project, assignments, stages)
-        except (GeometryError, InputError):
-            chosen = []
-        document = methods_document(name, found, chosen)
+        document = methods_document(name, found)
         if html and output is not None:
             from photostrip.report.html import methods_html
 
@@ -77,11 +70,3 @@ def compare_methods(
 
 def _loaded(project: Path, assignments: Sequence[str], adjustment: str, stages: Stages) -> Project:
     return loaded_from(project, [*assignments, f"processing.adjustment={adjustment}"], stages=stages)
-
-
-def _chosen(project: Path, assignments: Sequence[str], stages: Stages) -> list[Document]:
-    """Say what `auto` takes for each strip and why; the rest of its result is one of the others."""
-    quick = ["processing.cross_validation=false", "processing.precision=false"]
-    loaded = _loaded(project, [*assignments, *quick], AUTO, stages).loaded
-    chosen: list[Document] = choices_of(adjust_project(loaded, stages)).get("choices", [])
-    return chosen

@@ -14,9 +14,8 @@ from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
 from photostrip.pipeline.block.check_points import check_errors
 from photostrip.pipeline.block.datum import known_of
-from photostrip.pipeline.choice import COVARIANCE, POLYNOMIAL
 from photostrip.pipeline.frames import GroundFrames
-from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.inputs import POLYNOMIAL, SIMILARITY, Inputs, Settings
 from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart, Bundle, SinglePhoto
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, locate
@@ -33,6 +32,7 @@ from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
 
 REFILLED = 1e-9  # metres by which targets of plan or height points may still move
 REFILLS = 3
+BENDS = 0.25, 0.5, 0.75  # parts of the way from the similarity of a strip to its control
 WITHIN_PHOTOS = 10  # correlations within photos that are kept
 
 
@@ -56,25 +56,23 @@ def adjust_block(
     def formed(adjustment: str) -> BlockStart:
         return block_start.start(inputs, replace(settings, adjustment=adjustment), stages, observations, known)
 
-    def searched_from(start: BlockStart) -> _Estimated:
-        block = block_problem.build(inputs, settings, observations, control, ground, start)
-        return _searched(block, control, ground.control, settings)
+    def built(start: BlockStart) -> BlockProblem:
+        return block_problem.build(inputs, settings, observations, control, ground, start)
 
     if before is not None:
         start = _start_from(before, observations, known.control)
-        block = block_problem.build(inputs, settings, observations, control, ground, start)
-        block = _refilled(_begin_from(before, block, len(observations)), control, ground.control)
+        block = _refilled(_begin_from(before, built(start), len(observations)), control, ground.control)
         estimated = _as_before(before, block, settings)
     else:
         start = formed(POLYNOMIAL)
         try:
-            estimated = searched_from(start)
+            estimated = _searched(built(start), control, ground.control, settings)
         except GeometryError as error:
             if error.code != "bundle-diverged":
                 raise
-            # between bands of control 2000 models apart polynomials leave a strip 80 km off, its own covariance 44 m
-            start = formed(COVARIANCE)
-            estimated = searched_from(start)
+            # between bands of control 2000 models apart polynomials leave a strip 80 km off
+            start = formed(SIMILARITY)
+            estimated = _searched(_bent(built(start)), control, ground.control, settings)
     bundle = _bundle(inputs, settings, start, estimated)
     _refuse_inseparable(bundle.correlations, set(estimated.asked))
     adjusted = block_result.adjusted_strips(inputs, observations, ground.output, bundle)
@@ -109,6 +107,20 @@ def _begin_from(before: Bundle, block: BlockProblem, measured: int) -> BlockProb
     )
     problem = replace(block.problem, images=block.problem.images.take(rows))
     return replace(block, problem=problem, begin=begin, kept=block.kept[rows], rows=block.rows[rows])
+
+
+def _bent(block: BlockProblem) -> BlockProblem:
+    """Bend strips to their control in parts: at once a long one is torn by the squares of its turns.
+
+    Raises GeometryError as an adjustment does.
+    """
+    problem, control = block.problem, block.problem.control
+    at = problem.start.points[control.point]
+    for share in BENDS:
+        part = replace(control, xyz=at + share * (control.xyz - at))
+        chosen = selected(replace(problem, control=part), supported(problem, block.begin))
+        problem = restarted(problem, solve(chosen, rough=True))
+    return replace(block, problem=problem)
 
 
 def _refilled(block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame]) -> BlockProblem:

@@ -16,18 +16,15 @@ from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.settings import CALIBRATION
 
 OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustment
-    "control-doubtful",
+    "bundle-proposed",
     "control-image",
     "control-rejected",
-    "covariance-proposed",
     "degree-reduced",
     "extrapolation",
     "little-control",
     "little-redundancy",
     "long-strip",
-    "not-converged",
     "not-resected",
-    "strip-contradicted",
     "weak-control",
     "weak-pair",
 }

@@ -31,7 +31,7 @@ def weak_layout(
     """Look where the control lies: along each strip and across, or in the block that a bundle makes of all strips."""
     if control is None:
         return
-    in_bundle = settings.adjustment == "bundle"
+    in_bundle = settings.together
     cameras = _cameras(inputs) if in_bundle else None
     strips = [strip for strip in images.strips if len(strip.photos) > 1]
     if in_bundle and (cameras is not None or len(images.strips) > 1):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +17,6 @@ from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.check_errors import CheckErrors
 from photostrip.triangulation.error_propagation.control_errors import Misclosures
 from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
-
-if TYPE_CHECKING:
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
 MOST_TESTED = 100  # check points of a strip that are tested together, spread over it
 
@@ -79,11 +75,6 @@ def by_fit(found: FittedStrip, compared: CheckDifferences) -> CheckErrors:
     """Return the errors at the check points of a strip that was fitted to the control."""
     at = compared.coordinates
     return errors_at_checks(compared, found.joint_covariance(at.row, at.direction))
-
-
-def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> CheckErrors:
-    """Return the errors at the check points of a strip that was adjusted with its own covariance."""
-    return errors_at_checks(compared, adjusted.joint_covariance_at(compared.checks.rows, compared.coordinates))
 
 
 def errors_at_checks(compared: CheckDifferences, covariance: Floats) -> CheckErrors:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
@@ -16,9 +14,6 @@ from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
 from photostrip.triangulation.error_propagation.image_variance import image_variance
 from photostrip.triangulation.error_propagation.photo_errors import PhotoErrors, differentiate_photos
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-
-if TYPE_CHECKING:
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
 MOST_PHOTOS = 400  # of a strip fitted to its control: the work grows by the square of their number, to 1 s
 
@@ -41,9 +36,6 @@ def of_photos(
     compared = check_points.compare_with_checks(strip, checks.spread(), oriented.frames)
     points = np.full((len(strip.xyz), 3, 3), np.nan)
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
-    if strip.of_photos.solved is not None:
-        wanted = checks.rows if of_checks else None
-        return _of_covariance(strip, strip.of_photos.solved, compared, points, photos, wanted)
     stated = strip.of_photos.sigma
     factor, basis = image_variance(strip.of_photos.orientation, stated)
     found = fitted(strip, oriented, factor)
@@ -70,36 +62,7 @@ def of_photos(
 def too_long(strip: StripResult) -> bool:
     """Whether a strip was fitted to its control that has too many photos for the covariances of all its points."""
     stages = strip.photo_stages
-    return stages is not None and stages.solved is None and len(stages.strip.photos) > MOST_PHOTOS
-
-
-def _of_covariance(
-    strip: StripResult,
-    adjusted: CovarianceAdjustment,
-    compared: check_points.CheckDifferences | None,
-    points: Floats,
-    photos: Floats,
-    wanted: Numbers | None,
-) -> StripPrecision:
-    """Covariances from the system that the adjustment with the strip's own covariance has solved.
-
-    wanted: points of which alone they are wanted.
-    """
-    control, axes = adjusted.figures.control, strip.intermediate.axes
-    if wanted is None:
-        points, photos = adjusted.points, adjusted.photos
-    elif len(wanted):
-        points[wanted] = adjusted.of_points(wanted)
-    return StripPrecision(
-        points=axes @ points @ axes.T,
-        photos=_turned(strip, photos),
-        by_control=lambda rows, columns: np.asarray(axes @ adjusted.by_control(rows, columns), float),
-        control=_control_of(strip, control.point, control.axis),
-        variance=control.variance,
-        sigma=adjusted.figures.sigma,
-        basis=adjusted.figures.basis,
-        check=None if compared is None else check_points.by_covariance(adjusted, compared),
-    )
+    return stages is not None and len(stages.strip.photos) > MOST_PHOTOS
 
 
 def _control_of(strip: StripResult, point: Numbers, axis: Numbers) -> Numbers:

@@ -17,7 +17,6 @@ from photostrip.frozen import dataclass
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.geometry.similarity import Similarity, similarity_derivatives
-from photostrip.pipeline.choice import Deformation
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
 from photostrip.pipeline.results import StripResult
@@ -31,10 +30,10 @@ from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
 from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
 from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
+from photostrip.triangulation.polynomial.correction import Polynomial
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.independent_models.formation import FormedModels
 
 
@@ -91,11 +90,10 @@ class StripStage(Protocol[Errors]):
     def refuse_other_hand(self, oriented: OrientedStrip[Errors]) -> None:
         """Refuse a strip that its control fits only as a mirror image."""
 
-    def by_covariance(self, oriented: OrientedStrip[Errors], settings: Settings) -> CovarianceAdjustment | None:
-        """Adjust the strip with its own covariance; None where that is not known."""
-
-    def adjusted(self, screened: ScreenedStrip[Errors], found: Deformation, settings: Settings) -> StripResult:
-        """Adjust the points and photos, the deformation being known."""
+    def adjusted(
+        self, screened: ScreenedStrip[Errors], correction: Polynomial | None, settings: Settings
+    ) -> StripResult:
+        """Adjust the points and photos by a polynomial, or leave them as the similarity has them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,7 +37,7 @@ def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings, s
     """Form the strips of photos; a single photo, which only a bundle adjustment can orient, forms nothing."""
     overruling.require(settings.relative, observations)
     overruling.require_weighted(settings.formation, observations)
-    whole = [strip for strip in inputs.strips if len(strip.photos) > 1 or settings.adjustment != "bundle"]
+    whole = [strip for strip in inputs.strips if len(strip.photos) > 1 or not settings.together]
     given = (observations, settings.relative, settings.formation)
     return [
         stages.once("strip", partial(form_strip, strip, observations, settings, stages), strip, *given)
@@ -60,7 +60,7 @@ def as_single_photos(inputs: Inputs, settings: Settings, refused: GeometryError)
         return None
     if not all(known.issuperset(strip.photos) for strip in several):
         return None
-    if settings.adjustment != "bundle" or "none" in {settings.bundle.screening, settings.relative.screening}:
+    if not settings.together or "none" in {settings.bundle.screening, settings.relative.screening}:
         return None
     if positions is not None and positions.correction != "none" and positions.group == "strip":
         return None

@@ -11,7 +11,6 @@ from photostrip.arrays import Flags, Floats, Numbers, median, quantile
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline.choice import Deformation
 from photostrip.pipeline.inputs import ModelStrip, Settings
 from photostrip.pipeline.overruling import CENTER
 from photostrip.pipeline.results import ModelStages, StripResult
@@ -109,12 +108,9 @@ class LinkedModels:
         if conspicuous and mirrored < link_screening.REFLECTED * as_it_is:
             raise _left_handed(self.strip)
 
-    def by_covariance(self, _: Oriented, __: Settings) -> None:
-        """Models are adjusted by polynomials only: their image coordinates are not known."""
-
-    def adjusted(self, screened: WithControlScreened, found: Deformation, _: Settings) -> StripResult:
+    def adjusted(self, screened: WithControlScreened, correction: Polynomial | None, _: Settings) -> StripResult:
         """Adjust the points, and move the perspective centres with them."""
-        oriented, strip, formed, correction = screened.oriented, self.strip, self.formed, found.polynomial
+        oriented, strip, formed = screened.oriented, self.strip, self.formed
         xyz = oriented.xyz if correction is None else correction(oriented.xyz)
         similarity = oriented.absolute.similarity
         centers = _centers(formed, similarity, correction)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, column_medians
+from photostrip.arrays import Floats
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note, counted
-from photostrip.pipeline.choice import Choice
 from photostrip.pipeline.inputs import ModelStrip, Strip
-from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.points import PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
 from photostrip.triangulation.error_propagation.weak_pairs import WEAK_PAIR, times_a_good_pair
@@ -25,16 +23,11 @@ from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.resection.resection import Resection
 from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-if TYPE_CHECKING:
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment, CovarianceFigures
-
 # of the length that the control spans: how far points may lie beyond it. Of a polynomial they are extrapolated
 BEYOND_POLYNOMIAL = 0.1
-BEYOND_COVARIANCE = 1 / 3
-WORSE_BEYOND = 2.0  # standard deviations there, over those between the control, that are told
 LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adjustment
 POLYNOMIAL_MODELS = 15  # models from which on, and
-POLYNOMIAL_BANDS = 4  # bands of control below which the adjustment with the covariance is proposed
+POLYNOMIAL_BANDS = 4  # bands of control below which the bundle adjustment is proposed
 
 
 def pair_notes(strip: Strip, oriented: Orientation) -> Iterator[Note]:
@@ -174,32 +167,6 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
             yield Note("little-redundancy", text, strip=strip.id)
 
 
-def precision_beyond_control(
-    strip: Strip, rows: Numbers, adjusted: CovarianceAdjustment, variances: Callable[[], Floats]
-) -> Iterator[Note]:
-    """Say what standard deviations grow to where points lie far beyond the control.
-
-    rows: the control in the points of the strip.
-    variances: gives those of the points (q, 3), intermediate frame, metres^2.
-    """
-    along, at = adjusted.xyz[:, 0], adjusted.xyz[rows, 0]
-    beyond = np.maximum(at.min() - along, along - at.max())
-    base = np.linalg.norm(np.diff(adjusted.centers, axis=0), axis=1).mean()
-    if beyond.max() <= max(BEYOND_COVARIANCE * np.ptp(at), base):
-        return
-    variance = variances()
-    sigma = np.sqrt(np.maximum(np.column_stack([variance[:, :2].mean(axis=1), variance[:, 2]]), 0.0))
-    inside, largest = column_medians(sigma[beyond <= 0]), sigma[beyond > 0].max(axis=0)
-    if (largest > WORSE_BEYOND * inside).any():
-        count = int((beyond > 0).sum())
-        text = (
-            f"strip {strip.id}: {counted(count, 'point lies', 'points lie')} up to {beyond.max():.0f} m beyond the "
-            f"control along the strip; standard deviations there reach {largest[0]:.2f} m in plan and "
-            f"{largest[1]:.2f} m in height, between the control they are {inside[0]:.2f} m and {inside[1]:.2f} m"
-        )
-        yield Note("extrapolation", text, strip=strip.id)
-
-
 def photo_notes(strip: Strip, resection: Resection) -> Iterator[Note]:
     """Name the photos that could not be oriented."""
     for number in np.flatnonzero(~resection.solved):
@@ -217,14 +184,14 @@ def precision_of_long_strip(strip: Strip, most: int) -> Note:
     return Note("no-precision", text, strip=strip.id)
 
 
-def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
-    """Propose the adjustment with the covariance of the strip where a polynomial does badly."""
+def network_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
+    """Propose the adjustment of all rays together where a polynomial does badly."""
     models = len(strip.photos) - 1
     if models > LONG_STRIP:
         text = (
             f"strip {strip.id}: {models} models; beyond about {LONG_STRIP} models a polynomial falls far behind a "
-            "rigorous adjustment (errors 2.5 times larger at 30 models, 12 times at 100); use `processing.adjustment: "
-            "covariance`, which does not"
+            "rigorous adjustment (errors 2.5 times larger at 30 models, 12 times at 100); `processing.adjustment: "
+            "bundle` is one"
         )
         yield Note("long-strip", text, strip=strip.id)
         return
@@ -233,56 +200,5 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
         bands = f"on {counted(min(correction.stations), 'band')} of control"
         why = f"over {models} models" if models > POLYNOMIAL_MODELS else bands
         what = "a polynomial" if correction.degree else "the similarity, which no polynomial improves,"
-        text = (
-            f"strip {strip.id}: {what} {why} leaves larger errors than necessary; `processing.adjustment: covariance` "
-            "comes within 5 % of a bundle adjustment"
-        )
-        yield Note("covariance-proposed", text, severity="note", strip=strip.id)
-
-
-def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceFigures | None) -> Iterator[Note]:
-    """Say whether the adjustment with the covariance of the strip came to its end, and what its tests found.
-
-    Returns a failed test of the whole that the most doubtful point does not explain; and that point, no other: it
-        raises the test values of its neighbours.
-    """
-    if adjusted is None:
-        return
-    tested, names = adjusted.tested, [control.ids[row] for row in adjusted.control.point.tolist()]
-    if not adjusted.converged:
-        text = (
-            f"strip {strip.id}: the adjustment with its covariance is not at rest after the strip was formed "
-            f"{counted(adjusted.formations, 'time')}: errors in its pairs are too large; look at pairs and photos with "
-            "large residuals, or use `processing.adjustment: bundle`"
-        )
-        yield Note("not-converged", text, strip=strip.id)
-    worst = tested.doubtful[:1].tolist()
-    left = adjusted.rest or tested
-    if left.probability < left.level:
-        found = ", and no single control point explains it" if not worst else f", also without {names[worst[0]]}"
-        text = (
-            f"strip {strip.id}: misclosures and distances are {np.sqrt(left.squares / left.redundancy):.2f} times as "
-            f"large as expected from the standard deviations of image coordinates and control{found}: systematic "
-            "errors of the images, or standard deviations that are too small"
-        )
-        yield Note("strip-contradicted", text, strip=strip.id)
-    for row in worst:
-        axis = GROUND_AXES[adjusted.control.axis[row]]
-        text = (
-            f"control point {names[row]} does not agree with the strip and the other control: {axis} by about "
-            f"{tested.size[row]:+.2f} m (test value {abs(tested.normalised[row]):.1f}, limit {tested.limit:.1f}); "
-            "it was used"
-        )
-        yield Note("control-doubtful", text, strip=strip.id, points=(names[row],))
-
-
-def choice_notes(strip: Strip, choice: Choice | None) -> Iterator[Note]:
-    """Say where control left out in turn decided against the standard deviations: these do not hold, then."""
-    if choice is None or not choice.contradicted:
-        return
-    text = (
-        f"strip {strip.id}: errors at control left out in turn are {choice.excess:.1f} times what the covariance of "
-        "the strip lets expect: standard deviations of its points and photos do not hold; look for errors that all "
-        "photos share, such as a lens that is not what its calibration says, or correct what is stated"
-    )
-    yield Note("strip-contradicted", text, strip=strip.id)
+        text = f"strip {strip.id}: {what} {why} leaves larger errors than `processing.adjustment: bundle`"
+        yield Note("bundle-proposed", text, severity="note", strip=strip.id)

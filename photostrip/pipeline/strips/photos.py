@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import overruling
-from photostrip.pipeline.choice import Deformation
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
@@ -26,6 +24,7 @@ from photostrip.triangulation.error_propagation import strip_errors
 from photostrip.triangulation.error_propagation.strip_at_control import ControlRay
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
+from photostrip.triangulation.polynomial.correction import Polynomial
 from photostrip.triangulation.relative_orientation.orientation import (
     Orientation,
     RelativeSettings,
@@ -33,11 +32,8 @@ from photostrip.triangulation.relative_orientation.orientation import (
     refuse_unusable,
 )
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
-from photostrip.triangulation.resection.resection import Resection, of_known_photos, resect
+from photostrip.triangulation.resection.resection import Resection, resect
 from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs, without_points
-
-if TYPE_CHECKING:
-    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
 Oriented = OrientedStrip[strip_errors.StripErrors]
 WithControlScreened = ScreenedStrip[strip_errors.StripErrors]
@@ -139,29 +135,21 @@ class FormedPhotos:
     def refuse_other_hand(self, oriented: Oriented) -> None:
         """Photos have no other hand."""
 
-    def adjusted(self, screened: WithControlScreened, found: Deformation, settings: Settings) -> StripResult:
+    def adjusted(self, screened: WithControlScreened, correction: Polynomial | None, settings: Settings) -> StripResult:
         """Adjust the points, and orient every photo on them."""
         oriented, strip, formed = screened.oriented, self.strip, self.formed
-        covariance, correction = found.covariance, found.correction
         xyz = oriented.xyz if correction is None else correction(oriented.xyz)
-        if covariance is not None:
-            xyz = covariance.xyz
         rows = self._rays_in_use
         photo = strip.positions(self.observations)[rows]
         points = np.searchsorted(formed.point, self.observations.point[rows])
-        if covariance is None:
-            resection = self._resected(oriented, photo, points, xyz)
-        else:
-            photos = strip.oriented(covariance.centers, covariance.rotations)
-            resection = of_known_photos(self.observations.xy, xyz, photo, photos, rows, points)
+        resection = self._resected(oriented, photo, points, xyz)
         return StripResult(
             precision=oriented.precision,
             intermediate=oriented.intermediate,
             control=oriented.control,
             control_rows=oriented.control_rows,
             absolute=oriented.absolute,
-            polynomial=found.polynomial,
-            choice=found.choice,
+            polynomial=correction,
             xyz=xyz,
             cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
             rays=np.bincount(points, minlength=len(formed.point)),
@@ -176,10 +164,8 @@ class FormedPhotos:
                 *notes.junction_notes(strip, formed),
                 *notes.control_notes(strip, oriented.absolute),
                 *notes.polynomial_notes(strip, correction, xyz),
-                *([] if correction is None or found.choice else notes.covariance_proposal(strip, correction)),
+                *([] if correction is None else notes.network_proposal(strip, correction)),
                 *notes.photo_notes(strip, resection),
-                *notes.choice_notes(strip, found.choice),
-                *notes.covariance_notes(strip, oriented.control, None if covariance is None else covariance.figures),
             ),
             screened_control=screened.screened_control,
             shared=screened.shared,
@@ -191,42 +177,8 @@ class FormedPhotos:
                 wrong_rays=self.wrong_rays,
                 resection=resection,
                 rows=rows,
-                covariance=None if covariance is None else covariance.figures,
-                solved=covariance,
             ),
         )
-
-    def by_covariance(self, oriented: Oriented, settings: Settings) -> CovarianceAdjustment:
-        """Distribute the misclosures at the control by the strip's own covariance.
-
-        Raises GeometryError where this determines nothing; the strip is named.
-        """
-        from photostrip.triangulation.covariance_adjustment.adjust import StripOnControl, adjust
-        from photostrip.triangulation.covariance_adjustment.strip_rows.strip_errors import differentiate_strip
-
-        position, similarity = self.strip.positions(self.observations), oriented.absolute.similarity
-        start = StripOnControl(
-            photos=self.strip.photos,
-            focal=self.strip.camera.principal_distance,
-            observations=self.observations,
-            position=position,
-            sigma=self.sigma,
-            orientation=self.orientation,
-            formed=self.formed,
-            absolute=oriented.absolute,
-            targets=oriented.targets,
-            control_rows=oriented.control_rows,
-            errors=differentiate_strip(self.orientation, self.formed, similarity, position, self.observations.sigma),
-            misclosures=oriented.misclosures,
-        )
-        try:
-            return adjust(start, settings.covariance)
-        except np.linalg.LinAlgError as error:
-            msg = (
-                f"strip {self.strip.id}: its own covariance does not determine it: its pairs hang together by rounding "
-                "only; look at what is wrong in them, or use `processing.adjustment: polynomial`"
-            )
-            raise GeometryError(msg, photos=self.strip.photos, code="singular") from error
 
     @cached_property
     def _rays_in_use(self) -> Numbers:

@@ -11,9 +11,9 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import names_of
 
 T = TypeVar("T")
-Stage = Literal["pairs", "strip", "control", "covariance", "shifted", "failure"]
-"""Pairs searched, a strip formed, on its control without what is wrong, adjusted with its covariance, a shifted photo
-looked for in it, what speaks for a failure."""
+Stage = Literal["pairs", "strip", "control", "shifted", "failure"]
+"""Pairs searched, a strip formed, on its control without what is wrong, a shifted photo looked for in it, what speaks
+for a failure."""
 
 
 class Stages:

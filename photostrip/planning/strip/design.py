@@ -11,12 +11,10 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, spots_of
 from photostrip.planning.strip.ideal_strip import IdealStrip, StripGeometry, ideal_strip
-from photostrip.planning.strip.methods import BUNDLE, COVARIANCE, DEGREES, METHODS, SIMILARITY, Accuracy, accuracy
+from photostrip.planning.strip.methods import BUNDLE, METHODS, Accuracy, accuracy
 from photostrip.planning.strip.placement import BestPlaces, Demand, Placement, best_places, worst
-from photostrip.triangulation.covariance_adjustment.settings import BETTER
 
 ANYTHING = Demand()
-POLYNOMIAL = "polynomial"
 
 
 @dataclass(frozen=True)
@@ -51,15 +49,6 @@ class Needed:
     worst: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Chosen:
-    """What a run would choose by itself."""
-
-    adjustment: str  # ``"polynomial"`` or ``"covariance"``
-    polynomial: str  # the best of the similarity and the polynomials
-    ratio: float  # standard deviations with the covariance over those with it, mean of plan and height
-
-
 @dataclass(frozen=True, eq=False)
 class DesignReport:
     """Everything about a design."""
@@ -69,21 +58,6 @@ class DesignReport:
     outcomes: tuple[Outcome, ...]
     needed: tuple[Needed, ...]  # bands that the required accuracy needs, by method; empty when none is required
     placed: BestPlaces | None
-
-    def chosen(self, layout: ControlLayout) -> Chosen | None:
-        """Say what `adjustment: auto` would take; None where polynomials and covariance are not both known."""
-        found = {each.method: each.accuracy for each in self.outcomes if each.layout == layout and each.accuracy}
-        fitted = {name: _rms(found[name]) for name in (SIMILARITY, *DEGREES) if name in found}
-        if COVARIANCE not in found or not fitted or not len(found[COVARIANCE].new):
-            return None
-        best = min(fitted, key=lambda name: float(np.prod(fitted[name])))
-        ratio = float(np.sqrt(np.prod(_rms(found[COVARIANCE]) / fitted[best])))
-        return Chosen(COVARIANCE if ratio < BETTER else POLYNOMIAL, best, ratio)
-
-
-def _rms(found: Accuracy) -> Floats:
-    """Rms standard deviations of new points in plan and in height."""
-    return np.asarray(np.sqrt((found.plan_and_height[found.new] ** 2).mean(axis=0)), float)
 
 
 def plan_strip(design: DesignTask) -> DesignReport:

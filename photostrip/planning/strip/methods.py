@@ -21,17 +21,15 @@ from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.bundle.observations import problem as bundle
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as bundle_precision
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.covariance_adjustment import conditions, prediction, system
-from photostrip.triangulation.covariance_adjustment.strip_rows.strip_errors import differentiate_strip
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
 from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
 from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.polynomial import terms as polynomial_terms
 
-SIMILARITY, COVARIANCE, BUNDLE = "similarity", "covariance", "bundle"
+SIMILARITY, BUNDLE = "similarity", "bundle"
 DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}
-METHODS = (SIMILARITY, *DEGREES, COVARIANCE, BUNDLE)
+METHODS = (SIMILARITY, *DEGREES, BUNDLE)
 NO_REDUNDANCY = 1e-9  # redundancy number of a control coordinate that nothing checks
 
 
@@ -90,7 +88,7 @@ def accuracy(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], 
         message = f"{counted(plan, 'control point')} in plan and {height} in height cannot orient a strip"
         raise GeometryError(message, code="plan-control")
     fit = _oriented(strip, np.array(numbers_of(strip, spots), np.intp), control)
-    return _predicted(strip, fit) if method == COVARIANCE else _fitted(strip, fit, method)
+    return _fitted(strip, fit, method)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,32 +164,6 @@ def _precision(strip: IdealStrip) -> tuple[float, float]:
     plan = geometry.image_sigma * geometry.scale / 1000.0
     depth = float(strip.centers[:, 2].mean())
     return plan, plan * float(np.sqrt(2.0)) * depth / geometry.base
-
-
-def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
-    """Misclosures distributed by the strip's own covariance, with the distances of the pass points at the junctions."""
-    numbers, observations = ground.numbers, strip.observations
-    position = observations.places(strip.photos)
-    errors = differentiate_strip(strip.orientation, strip.formed, strip.similarity, position, observations.sigma)
-    axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
-    found = control_errors.misclosures(ground.control, numbers, axes)
-    wanted = conditions.conditions(errors, strip.orientation, strip.formed, found, np.zeros(len(found.point)))
-    solved = system.system(errors, wanted, 1.0)
-    rows = np.flatnonzero(wanted.kind == conditions.CONTROL)
-    cofactors = prediction.cofactors_of(solved, rows)
-    redundant = cofactors * wanted.noise[rows]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        size = np.where(redundant > NO_REDUNDANCY, DETECTABLE / np.sqrt(cofactors), np.inf)
-    detectable = np.full((len(numbers), 3), np.nan)
-    source = wanted.source[rows]
-    detectable[found.point[source], found.axis[source]] = size
-    return Accuracy(
-        method=COVARIANCE,
-        used=COVARIANCE,
-        covariance=prediction.covariances(solved, errors.points),
-        control=numbers,
-        detectable=detectable,
-    )
 
 
 def _bundle(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], control: ControlPoints) -> Accuracy:

@@ -23,7 +23,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted
 from photostrip.pipeline import overruling
 from photostrip.pipeline.image_coordinates import orient_interior
-from photostrip.pipeline.inputs import Strip
+from photostrip.pipeline.inputs import BUNDLE, Strip
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_whole
 from photostrip.points import PhotoPoints, locate
@@ -85,7 +85,9 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     notes += _image_coordinates(project, faults)
     used = observations_used(inputs) if models is None else np.zeros(0, np.intp)
     faults += _neighbours(project) if models is None else links_of_models(project, models)
-    if project.settings.adjustment != "bundle":  # strips of a block may hang on others
+    # strips of a block may hang on others, or on cameras
+    hung = len(inputs.strips) > 1 or inputs.positions is not None or inputs.orientations is not None
+    if project.settings.adjustment != BUNDLE and not (project.settings.together and models is None and hung):
         faults += _control_of_strips(project, used)
     frames = _frames(project, tables, faults)
     if models is not None and (read := tables.models) is not None:

@@ -79,7 +79,7 @@ def table_rows(project: Project, tables: Tables, used: Numbers) -> list[Document
     if tables.models is not None and inputs.models is not None:
         return model_rows(tables, inputs.models)
     found = []
-    bundle = project.settings.adjustment == "bundle"
+    bundle = project.settings.together
     apart = set() if bundle else set(gaps_of(inputs, used))  # a bundle takes points of any two photos
     control = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if use.all()}
     count: dict[str, int] = {}

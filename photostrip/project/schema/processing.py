@@ -74,15 +74,6 @@ class Polynomial(Section):
     )
 
 
-class Covariance(Section):
-    """Adjustment of a strip with its own covariance."""
-
-    distances: Flag = key(
-        "Let distances of pass points from the common centers of their models count beside the control",
-        DEFAULTS.covariance.distances,
-    )
-
-
 class Interior(Section):
     """Interior orientation by fiducial marks."""
 
@@ -143,13 +134,11 @@ class Processing(Section):
     """What is computed and how."""
 
     adjustment: Annotated[str, choice(ADJUSTMENTS)] = key(
-        "`auto` (polynomial or covariance, by evidence, which is printed), `polynomial` (the strip method), "
-        "`similarity` (without a polynomial), `covariance` (each strip with its own covariance) or `bundle` (all "
-        "strips rigorously)",
+        "`auto` (`bundle` wherever it is determined, the polynomials printed beside it; otherwise `polynomial`), "
+        "`polynomial` (the strip method), `similarity` (without a polynomial) or `bundle` (all photos rigorously)",
         DEFAULTS.adjustment,
     )
     polynomial: Polynomial = key("Polynomial adjustment", Polynomial())
-    covariance: Covariance = key("Adjustment of a strip with its own covariance", Covariance())
     self_calibration: SelfCalibration = key(
         "`auto`: lens distortion, principal point and principal distance of a camera are estimated where the "
         "measurements contradict what is given; `never`; or a list of parameters that are estimated: "

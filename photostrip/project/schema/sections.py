@@ -36,6 +36,8 @@ MAPPING, LIST, VALUES = (
 )
 NAMES: dict[type, str] = {list: "a list", dict: MAPPING}  # of what is given where something else is expected
 ENTRIES = {"photos": "photo", "cameras": "camera", "strips": "strip"}
+# keys that were taken once
+GONE = {"covariance": "remove it: `adjustment: bundle` took its place, and needs none of it"}
 T = TypeVar("T", bound="Section")
 
 
@@ -169,7 +171,7 @@ def _missing(name: str, entry: Key) -> WrongValueError:
 def _unknown(name: str, kind: type[Section]) -> WrongValueError:
     known = list(kind.keys)
     expected = f"one of {', '.join(known)}"
-    fix = f"write `{kind.moved[name]}`" if name in kind.moved else suggestion(name, known)
+    fix = f"write `{kind.moved[name]}`" if name in kind.moved else GONE.get(name) or suggestion(name, known)
     return wrong(f"the key `{shown(name)}` is not known", code="unknown-key", expected=expected, fix=fix)
 
 

@@ -65,10 +65,14 @@ def or_auto(read: Callable[[object], float]) -> Callable[[object], float | None]
     return lambda value: None if value == "auto" else read(value)
 
 
+REPLACED = {"covariance": "bundle"}  # words that were taken once
+
+
 def known_word(word: str, allowed: tuple[str, ...]) -> str:
     """Require a word from a list."""
     if word not in allowed:
-        fix = suggestion(word, allowed)
+        replaced = REPLACED.get(word)
+        fix = f"write `{replaced}`, which took its place" if replaced in allowed else suggestion(word, allowed)
         raise wrong(f"`{shown(word)}` is not known", code="word", expected=_one_of(allowed), fix=fix)
     return word
 

@@ -11,6 +11,7 @@ from photostrip.errors import Fault
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.frozen import dataclass
+from photostrip.pipeline.inputs import AUTO, BUNDLE
 from photostrip.project.yaml.tree import NO_FILES, Node, Path, fault_at
 
 LEAST_MARKS = 2
@@ -55,7 +56,7 @@ NEEDED = {
     "observations": "points measured on photos, or `models` measured on a plotter",
 }
 NEEDS_IMAGES = {
-    "adjustment": (("bundle", "covariance"), "auto, polynomial or similarity"),
+    "adjustment": (("bundle",), "auto, polynomial or similarity"),
     "earth_curvature": (("image",), "auto, model or none"),
     "refraction": (("true", "yes", "on"), "false"),
 }
@@ -205,12 +206,17 @@ def _curvature(root: Node) -> Iterator[Fault]:
 
 
 def _needs_of_the_strip_method(root: Node) -> Iterator[Fault]:
-    """Ask for two photos in each strip and for control, which a bundle adjustment can do without."""
-    if root.word("processing", "adjustment") == "bundle":
+    """Ask for two photos in each strip and for control, which a bundle adjustment can do without.
+
+    One that nobody asked for needs something on the ground.
+    """
+    asked = root.word("processing", "adjustment")
+    together = asked in {"", AUTO} and not root.has("models")
+    if asked == BUNDLE or (together and (root.has("camera_positions") or root.has("orientations"))):
         return
     control = root.find("control")
     for number, strip in enumerate(root.list_at("strips")):
-        if len(strip.list_at("photos")) == 1:
+        if len(strip.list_at("photos")) == 1 and not together:
             path, fix = ("strips", number, "photos"), "or `processing.adjustment: bundle`, which takes single photos"
             message = "there is only one photo"
             yield fault_at(root, path, message, "length", expected="at least 2 photos", fix=fix)

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from photostrip.notes import Document
 from photostrip.report.page.parts import Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
-from photostrip.report.sections.decisions import choice_line
 
 
 def methods_sections(document: Document) -> tuple[Section, ...]:
@@ -19,7 +18,6 @@ def methods_sections(document: Document) -> tuple[Section, ...]:
         if row["status"] == "refused"
     ]
     parts.append(Words(_verdict(document)))
-    parts += [Words(f"`auto` takes for strip {each['strip']}: {choice_line(each)}.") for each in document["choices"]]
     return (Section("Methods side by side", tuple(parts)),)
 
 

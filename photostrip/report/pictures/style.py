@@ -23,7 +23,6 @@ METHODS = {  # dashes of matplotlib
     "degree 1": (0, (1, 3)),
     "degree 2": "--",
     "degree 3": "-.",
-    "covariance": (0, (8, 2)),
     "bundle": "-",
 }
 SMALL_TEXT = 7  # points: ids, legends, ticks

@@ -46,7 +46,6 @@ class SectionName(StrEnum):
     MODELS = "models"
     ABSOLUTE = "absolute"
     POLYNOMIAL = "polynomial"
-    COVARIANCE = "covariance"
     BUNDLE = "bundle"
     WEIGHTS = "weights"
     PRECISION = "precision"
@@ -93,10 +92,6 @@ def _of_the_strips(document: Document, *, everything: bool) -> Iterator[tuple[Se
         yield SectionName.ABSOLUTE, absolute_section(document)
     if document.get("polynomials"):
         yield SectionName.POLYNOMIAL, polynomial_section(document, everything=everything)
-    if "covariance" in document:
-        from photostrip.report.sections.covariance import covariance_section
-
-        yield SectionName.COVARIANCE, covariance_section(document, everything=everything)
     from photostrip.report.sections.bundle import bundle_sections
 
     yield from ((SectionName.BUNDLE, each) for each in bundle_sections(document, everything=everything))

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from photostrip.notes import Document, counted
-from photostrip.report.page.numbers import LEAST_PROBABILITY, fixed, metres, micrometres, ratio, short
+from photostrip.report.page.numbers import LEAST_PROBABILITY, micrometres, short
 from photostrip.report.page.parts import Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import elsewhere
 
-WEIGHED = ("polynomial", "covariance")
-NOT_COMPARED = "the strip's own covariance does not determine it"
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
-AGREEING, LIMIT = "10 %", 0.9  # methods that differ by less are said to agree; the ratio that is the limit
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
 
 
@@ -26,15 +23,10 @@ def decisions_section(document: Document) -> Section:
 
 def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     settings = document["settings"]
-    yield from choice_rows(document)
-    taken = {block["strip"]: block["taken"] for block in document.get("choices", [])}
     for block in document.get("polynomials", []):
         label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
         if block["asked"] == "auto":
             yield label, _degree(block)
-        elif taken.get(block["strip"]) == "covariance":
-            fix = "`processing.adjustment: polynomial` takes it"
-            yield label, f"degree {block['asked']} was asked for and weighed, and is not in the result; {fix}"
     if "relative" in settings:
         yield from _screening(document, settings["relative"])
     elif settings["links"]["screening"] == "auto":
@@ -54,67 +46,6 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     if curvature["asked"] == "auto":
         yield "Earth curvature", f"{curvature['treatment']}, as the frame of the control requires"
     yield from _heights(document, settings.get("refinement", {}))
-
-
-def choice_rows(document: Document) -> Iterator[tuple[str, str]]:
-    """Say for each strip what was taken and why."""
-    blocks = document.get("choices", [])
-    for block in blocks:
-        yield "chosen adjustment" if len(blocks) == 1 else f"adjustment of {block['strip']}", choice_line(block)
-
-
-def choices_in_short(document: Document) -> Iterator[tuple[str, str]]:
-    """Say in a line for each strip what was taken, with the ratios of both witnesses."""
-    blocks = document.get("choices", [])
-    for block in blocks:
-        left_out = "" if block["left_out"] is None else f", left-out errors {ratio(block['left_out']['ratio'])}"
-        known = f", with the results {ratio(block['difference']['ratio'])}" if block["apart"] else ""
-        why = f"covariance over polynomial: σ {ratio(block['predicted']['ratio'])}{known}{left_out}"
-        text = f"{block['taken']}; {why if block['predicted']['count'] else NOT_COMPARED}"
-        yield "chosen adjustment" if len(blocks) == 1 else f"adjustment of {block['strip']}", text
-
-
-def choice_line(block: Document) -> str:
-    """Say what was taken, why, and what both witnesses say of both methods."""
-    predicted, left_out = block["predicted"], block["left_out"]
-    if not predicted["count"]:
-        return f"{block['taken']}: {NOT_COMPARED}"
-    text = f"{block['taken']}, {_why(block)}: standard deviations of new points, of one plan coordinate/of the height, "
-    text += _figures(predicted)
-    apart = block["difference"]
-    text += f"; the results differ by {metres(apart['plan'])}/{metres(apart['height'])} m"
-    text += f" (ratio with that {_ratio(apart['ratio'])})"
-    if left_out is None:
-        return f"{text}; no control can be left out"
-    excess = f"; those of the covariance are {ratio(block['excess'])} times what it lets expect"
-    by = counted(left_out["count"], block["left_out_by"])
-    return f"{text}; errors at {by} left out in turn {_figures(left_out)}{excess}"
-
-
-def _why(block: Document) -> str:
-    if block["contradicted"]:
-        return "because left-out control contradicts the standard deviations of the covariance"
-    if block["taken"] == "polynomial":
-        return f"which the covariance of the strip betters by less than {AGREEING}"
-    if block["apart"]:
-        return f"because the results differ by more than predictions that agree within {AGREEING} let expect"
-    percent = 100 * (1 - block["predicted"]["ratio"])
-    return f"which betters the polynomial by {fixed(percent, 1 if _at_limit(block['predicted']['ratio']) else 0)} %"
-
-
-def _ratio(value: float | None) -> str:
-    """Write a ratio, with as many digits as show on which side of the limit it is."""
-    return ratio(value) if value is None or not _at_limit(value) else fixed(value, 3)
-
-
-def _at_limit(value: float) -> bool:
-    return abs(value - LIMIT) < 0.01  # noqa: PLR2004 (the last digit of what is written)
-
-
-def _figures(witness: Document) -> str:
-    """Give plan and height of both methods, and their ratio."""
-    each = [f"{metres(witness[name]['plan'])}/{metres(witness[name]['height'])} m" for name in WEIGHED]
-    return f"{each[0]} with the polynomial, {each[1]} with the covariance (ratio {_ratio(witness['ratio'])})"
 
 
 def _degree(block: Document) -> str:

@@ -14,7 +14,7 @@ from photostrip.report.page.layout import lay_out
 from photostrip.report.page.numbers import fixed, metres, micrometres, percent
 from photostrip.report.page.parts import Facts, Section, Words
 from photostrip.report.sections.check_points import check_section, cross_validation_section
-from photostrip.report.sections.decisions import choices_in_short, chosen_degrees
+from photostrip.report.sections.decisions import chosen_degrees
 from photostrip.report.sections.findings import cures_section
 from photostrip.report.sections.models import of_models
 from photostrip.report.sections.points import (
@@ -30,7 +30,6 @@ from photostrip.report.sections.strip import (
     column_of,
     degree_of,
     elsewhere,
-    not_taken,
     photos_of,
     rows_of,
 )
@@ -105,12 +104,7 @@ def _stages(document: Document) -> Rows:
     elif document["models"]:
         yield from _pairs(document)
     yield from _absolute(document["absolute"])
-    yield from choices_in_short(document)
-    yield from _degrees([each for each in document.get("polynomials", []) if not not_taken(document, each["strip"])])
-    for block in _worst_of(document.get("covariance", []), "sigma0", 1):
-        of = f" of strip {block['strip']}, the largest" if len(document["covariance"]) > 1 else ""
-        chance = "" if block["p"] is None else f"; a larger one by chance {fixed(100 * block['p'], 1)} %"
-        yield "covariance adjustment", f"σ0 {fixed(block['sigma0'], 2)}{of}, redundancy {block['redundancy']}{chance}"
+    yield from _degrees(document.get("polynomials", []))
     if "bundle" in document:
         yield "bundle adjustment", _bundle(document["bundle"])
     if summary["image_rms_um"] is not None:

@@ -99,9 +99,6 @@ def adjustment_of(document: Document) -> str:
 
 
 def _adjustment_of(document: Document) -> str:
-    if document["adjustment"] == "covariance":
-        alone = document["settings"].get("covariance", {}).get("distances") is False
-        return "with the covariance of the strip itself" + (", control alone" if alone else "")
     if document["adjustment"] != "polynomial":
         return str(document["adjustment"])
     return f"polynomial, degree {document['settings']['polynomial']['degree']}"

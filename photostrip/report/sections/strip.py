@@ -252,18 +252,11 @@ def _choice(document: Document, block: Document) -> str:
     plan, height = (degree_of(block["terms"][axis]) for axis in ("x", "z"))
     what = "no polynomial" if not block["degree"] else f"degree {plan} in plan and {height} in height"
     stations, (low, high) = block["stations"], block["reach"]
-    if not_taken(document, block["strip"]):
-        how += ", weighed and not taken: the strip was adjusted with its covariance"
     text = (
         f"{what}, {how}. The control lies at {counted(stations['plan'], 'station')} in plan and {stations['height']} "
         f"in height, from X = {low:.0f} m to {high:.0f} m along the strip."
     )
     return text[0].upper() + text[1:] if len(document["strips"]) == 1 else f"Strip {block['strip']}: {text}"
-
-
-def not_taken(document: Document, strip: str) -> bool:
-    """Whether the polynomial of a strip was weighed and not taken."""
-    return any(block["strip"] == strip and block["taken"] != "polynomial" for block in document.get("choices", []))
 
 
 def degree_of(terms: Sequence[str]) -> int:

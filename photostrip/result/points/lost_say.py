@@ -71,9 +71,7 @@ def _far_off(result: Result, residuals: Iterable[ImageResiduals]) -> Images:
     What a similarity leaves or a polynomial bends of a strip is in residuals too: these say nothing of single images.
     """
     observations, found = result.refined.observations, Images()
-    strips = () if result.bundle is not None else result.photo_strips
-    bent = {strip.strip.id for strip in strips if strip.of_photos.covariance is None}
-    for each in (each for each in residuals if each.strip.id not in bent):
+    for each in residuals if result.bundle is not None else ():
         ratio = np.abs(each.residuals) / observations.sigma[each.rows]
         for place in np.flatnonzero(each.used & (ratio > FAR).any(axis=1)).tolist():
             row, photo = each.rows[place], each.strip.photos[each.photo[place]]

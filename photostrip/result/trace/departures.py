@@ -62,9 +62,8 @@ CHOICES = (
         textbook=("polynomial",),
         words="polynomials",
         here={
-            "auto": "polynomials or the strip's own covariance, by evidence",
+            "auto": "bundle adjustment, which the strip only starts; polynomials where there can be none",
             "similarity": "none",
-            "covariance": "the strip's own covariance",
             "bundle": "bundle adjustment, which the strip only starts",
         },
     ),

@@ -232,7 +232,7 @@ def test_check_points_do_not_influence_a_bundle() -> None:
 
 
 @pytest.mark.slow
-def test_a_strip_that_polynomials_leave_kilometres_off_starts_from_its_own_covariance() -> None:
+def test_a_strip_that_polynomials_leave_kilometres_off_starts_without_them() -> None:
     spec = Spec(
         flight=Flight(photos=600, end_lap_percent=62.0, heading_deg=0.0, scale=1500.0),
         points=Points(rows=5, extra_per_model=6, reach_percent=75.0),

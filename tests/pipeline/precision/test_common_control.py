@@ -49,11 +49,10 @@ def by_strip(inputs: Inputs, wanted: Settings) -> list[Floats]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("adjustment", ["polynomial", "covariance"])
-def test_common_control_makes_common_errors(adjustment: str) -> None:
+def test_common_control_makes_common_errors() -> None:
     """Mean of two strips: a quarter of both covariances, and twice what their shared control does to both."""
     inputs = two_strips()
-    wanted = Settings(adjustment=adjustment, relative=UNSCREENED, polynomial=correction.PolynomialSettings("1"))
+    wanted = Settings(adjustment="polynomial", relative=UNSCREENED, polynomial=correction.PolynomialSettings("1"))
     result = triangulate(inputs, wanted)
     observations, assured = result.refined.observations, result.precision
     assert assured is not None

@@ -14,7 +14,7 @@ from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Points, Spec
 from tests.simulated import inputs_of
 
-ADJUSTMENTS = ("polynomial", "covariance", "bundle")
+ADJUSTMENTS = ("polynomial", "bundle")
 
 
 def calls(monkeypatch: pytest.MonkeyPatch, adjustment: str, check: int) -> int:

@@ -14,7 +14,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, across, spots_of
 from photostrip.planning.strip.design import DesignTask, along_the_strip, bands_needed, outcome, plan_strip
 from photostrip.planning.strip.ideal_strip import StripGeometry, ideal_strip
-from photostrip.planning.strip.methods import BUNDLE, COVARIANCE, METHODS, SIMILARITY, accuracy
+from photostrip.planning.strip.methods import BUNDLE, METHODS, SIMILARITY, accuracy
 from photostrip.planning.strip.placement import Demand, Placement, best_places, equal_ways, worst
 from photostrip.simulation import FILM, Points
 from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
@@ -109,7 +109,7 @@ def test_expected_precision_is_the_scatter_of_whole_runs() -> None:
     layout = ControlLayout("mixed", kind="corners", spots=single, sigma=(0.03, 0.03, 0.05))
     geometry = StripGeometry(FILM, 8)
     strip = ideal_strip(geometry)
-    methods = (SIMILARITY, COVARIANCE)
+    methods = (SIMILARITY, BUNDLE)
     count = 100
     found = repetitions(Task(geometry, (layout,), methods, 0, count))
     for method in nonempty(methods):
@@ -135,9 +135,7 @@ def test_better_methods_are_better_and_symmetric() -> None:
         assert len(ends) == 9
         # the formed strip begins at one end, but what it knows hardly depends on which
         assert ends == pytest.approx(ends[::-1], rel=0.25)
-    assert np.all(rms[BUNDLE] <= rms[COVARIANCE])
-    assert np.all(rms[COVARIANCE] < 1.05 * rms[BUNDLE])
-    assert np.all(rms[COVARIANCE] < rms["degree 2"])
+    assert np.all(rms[BUNDLE] < rms["degree 2"])
     assert np.all(rms["degree 2"] < rms[SIMILARITY])
 
 
@@ -198,11 +196,10 @@ def test_errors_go_with_the_image_coordinates_when_control_is_good() -> None:
 # --------------------------------------------------------------------------------------------------- reliability
 
 
-@pytest.mark.parametrize("method", [COVARIANCE, BUNDLE])
-def test_detectable_errors_of_best_estimates_follow_from_their_sigmas(method: str) -> None:
+def test_detectable_errors_of_best_estimates_follow_from_their_sigmas() -> None:
     strip = strip_of(9)
     layout = ControlLayout("", bands=3, sigma=(0.2, 0.2, 0.3))
-    found = accuracy(strip, layout, spots_of(layout, 9, 3), method)
+    found = accuracy(strip, layout, spots_of(layout, 9, 3), BUNDLE)
     adjusted = np.diagonal(found.covariance[found.control], axis1=1, axis2=2)
     given = np.array(layout.sigma) ** 2
     # a coordinate predicted by all others: variance given^2 / (given - adjusted)
@@ -253,10 +250,10 @@ def test_the_number_of_bands_is_the_least(method: str) -> None:
 def test_steps_over_many_bands_leave_none_out() -> None:
     strip = strip_of(40)
     required = Demand(0.0945)
-    needed = bands_needed(strip, ControlLayout("", per_band=2), COVARIANCE, required)
+    needed = bands_needed(strip, ControlLayout("", per_band=2), BUNDLE, required)
     assert needed.bands is not None
     assert needed.bands > 21
-    before = outcome(strip, ControlLayout("", bands=needed.bands - 1, per_band=2), COVARIANCE).accuracy
+    before = outcome(strip, ControlLayout("", bands=needed.bands - 1, per_band=2), BUNDLE).accuracy
     assert before is not None
     assert not required.met(worst(before))
 
@@ -328,19 +325,3 @@ def test_three_photos_are_the_shortest_strip() -> None:
     assert len(strip_of(3).centers) == 3
     with pytest.raises(InputError, match="2 photos cannot make a strip"):
         strip_of(2)
-
-
-def test_what_a_run_would_choose_by_itself() -> None:
-    corners = ControlLayout("corners", kind="corners")
-    report = plan_strip(DesignTask(StripGeometry(FILM, 7, points=SIMPLE), (corners,)))
-    chosen = report.chosen(corners)
-    assert chosen is not None
-    assert (chosen.adjustment, chosen.polynomial) == ("covariance", SIMILARITY)  # four points carry no second degree
-    found = {each.method: each.accuracy for each in report.outcomes if each.accuracy is not None}
-    rms = {
-        name: np.sqrt((found[name].plan_and_height[found[name].new] ** 2).mean(axis=0)).prod()
-        for name in (SIMILARITY, COVARIANCE)
-    }
-    assert chosen.ratio == pytest.approx(np.sqrt(rms[COVARIANCE] / rms[SIMILARITY]))
-    without = plan_strip(DesignTask(StripGeometry(FILM, 7, points=SIMPLE), (corners,), (SIMILARITY, BUNDLE)))
-    assert without.chosen(corners) is None

@@ -37,7 +37,6 @@ def test_what_auto_came_to_is_said(frame: str) -> None:
 
 def test_what_was_asked_for_is_no_decision() -> None:
     document = copy.deepcopy(case("local").document)
-    del document["choices"]
     document["polynomials"][0]["asked"] = "2"
     document["settings"]["relative"]["screening"] = "tau"
     document["corrections"]["earth_curvature"]["asked"] = "none"

@@ -80,7 +80,7 @@ def test_each_stage_has_one_line() -> None:
         "relative orientation",
         "scale transfer",
         "absolute orientation",
-        "chosen adjustment",
+        "polynomial",
     ]
     printed = to_text("", [stages], 100).splitlines()
     assert len(printed) == 1 + len(facts.rows)
@@ -143,6 +143,6 @@ def test_every_section_has_a_name_and_keeps_its_place() -> None:
             found += sections
     assert tuple(found) == sections_of(document, everything=True)
     assert missing == [
-        "findings", "fiducials", "links", "models", "covariance", "bundle", "deformations", "cross-validation",
+        "findings", "fiducials", "links", "models", "bundle", "deformations", "cross-validation",
         "certificate",
     ]  # fmt: skip

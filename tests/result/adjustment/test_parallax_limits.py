@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def run(screening: str, parallax_limit: float | None = None) -> Case:
     inputs = inputs_of(simulate(spec("projected", 1, 5.0, GrossError("image", size_um=300.0, axis="y"))))
     relative = replace(Settings().relative, screening=screening, parallax_limit=parallax_limit)
-    return solved(inputs, Settings(relative=relative))
+    return solved(inputs, Settings(adjustment="polynomial", relative=relative))
 
 
 def limits(document: Document) -> list[float | None]:

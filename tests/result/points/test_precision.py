@@ -183,7 +183,7 @@ def test_nothing_is_said_where_nothing_is_known() -> None:
 
 
 @pytest.mark.parametrize("frame", FRAMES)
-@pytest.mark.parametrize("adjustment", ["similarity", "polynomial", "covariance"])
+@pytest.mark.parametrize("adjustment", ["similarity", "polynomial"])
 def test_check_points_go_with_their_standard_deviations(frame: str, adjustment: str) -> None:
     """Four check points of a simulated strip: neither far beyond what is stated nor without any error."""
     inputs = case(frame).inputs

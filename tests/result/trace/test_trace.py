@@ -16,7 +16,7 @@ from photostrip.cli.main import main
 from photostrip.pipeline.inputs import Settings
 from photostrip.report.commands.trace import _left_over, trace_sections, trace_title
 from photostrip.report.page.text import to_text
-from photostrip.result.trace.departures import CHOICES
+from photostrip.result.trace.departures import CHOICES, departures_of
 from photostrip.result.trace.trace import SYMBOLS, trace_of
 from photostrip.simulation.spec import GrossError
 from photostrip.triangulation.polynomial.correction import PolynomialSettings
@@ -243,7 +243,7 @@ def test_the_preset_as_printed_departs_in_nothing(tmp_path: Path, capsys: pytest
     capsys.readouterr()
     document = as_printed(tmp_path)
     assert document["departures"] == []
-    usual = trace("projected")["departures"]
+    usual = departures_of(Settings())
     assert [row["subject"] for row in usual] == [choice.subject for choice in CHOICES]
     assert "processing.intersection: left" in [row["key"] for row in usual]
     strip = document["strips"][0]

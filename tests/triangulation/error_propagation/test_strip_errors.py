@@ -192,7 +192,7 @@ def test_a_photo_goes_where_all_its_points_go() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("adjustment", ["similarity", "covariance"])
+@pytest.mark.parametrize("adjustment", ["similarity", "polynomial"])
 def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
     """A point whose middle measurement is wrong is placed by the outer two; its derivatives against differences."""
     inputs = without_noise(spec(7, 62.0))

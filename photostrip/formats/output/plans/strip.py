@@ -7,12 +7,11 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.notes import Document
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, numbers_of
-from photostrip.planning.strip.design import Chosen, DesignReport, Needed, Outcome, along_the_strip
+from photostrip.planning.strip.design import DesignReport, Needed, Outcome, along_the_strip
 from photostrip.planning.strip.ideal_strip import IdealStrip
 from photostrip.planning.strip.placement import BestPlaces, worst
 from photostrip.result.numbers import GROUND, micrometres, rms, rounded, significant
 
-RATIO = 3  # decimals of a ratio
 PLACED = 6  # decimals of metres that decide which point is the worst: strips are symmetric
 
 
@@ -38,11 +37,6 @@ def strip_document(name: str, report: DesignReport) -> Document:
         "required_m": {"plan": design.required.plan, "height": design.required.height},
         "layouts": [_layout(layout, spots[layout.name], report.strip) for layout in design.layouts],
         "accuracy": [_outcome(each, report) for each in report.outcomes],
-        "chosen": [
-            {"layout": layout.name, **_chosen(found)}
-            for layout in design.layouts
-            if (found := report.chosen(layout)) is not None
-        ],
         "needed": [_needed(each) for each in report.needed],
         "placed": None if report.placed is None else _placed(report.placed),
     }
@@ -105,14 +99,6 @@ def _detectable(spot: Spot, size: Floats) -> Document:
     names = ("x_m", "y_m", "z_m")
     checked = [None if np.isnan(value) else bool(np.isfinite(value)) for value in size.tolist()]
     return {**_spot(spot), **dict(zip(names, rounded(size, GROUND), strict=True)), "checked": checked}
-
-
-def _chosen(chosen: Chosen) -> Document:
-    return {
-        "adjustment": chosen.adjustment,
-        "polynomial": chosen.polynomial,
-        "ratio": rounded(chosen.ratio, RATIO),
-    }
 
 
 def _needed(needed: Needed) -> Document:

@@ -22,9 +22,7 @@ def strip_sections(document: Document) -> tuple[Section, ...]:
     near = "near each photo, m"
     sections = [
         Section("", (Facts(_facts(document)), _layouts(document))),
-        Section(
-            "Expected standard deviations of new points", (_accuracy(document), *_reasons(document), *_chosen(document))
-        ),
+        Section("Expected standard deviations of new points", (_accuracy(document), *_reasons(document))),
         Section(f"Along the strip: worst standard deviation in height {near}", (_along(document, "z_m"),)),
         Section(f"Along the strip: worst standard deviation in plan {near}", (_along(document, "plan_m"),)),
         Section("Smallest control error that is found", (_detectable(document),)),
@@ -118,22 +116,6 @@ def _reasons(document: Document) -> tuple[Words, ...]:
         for row in document["accuracy"]
         if row["used"] is None
     )
-
-
-def _chosen(document: Document) -> tuple[Words, ...]:
-    """Say what `adjustment: auto` would take for each layout."""
-    return tuple(
-        Words(
-            f"{row['layout']}: `auto` would take the {row['adjustment']}{_if_results(row)}; standard deviations with "
-            f"the covariance are {fixed(row['ratio'], 2)} times those with the best polynomial, {row['polynomial']}."
-        )
-        for row in document["chosen"]
-    )
-
-
-def _if_results(row: Document) -> str:
-    """Say what a design cannot know: how far the results of two methods will be apart."""
-    return " if the results agree as well" if row["adjustment"] == "polynomial" else ""
 
 
 def _along(document: Document, name: str) -> Table:

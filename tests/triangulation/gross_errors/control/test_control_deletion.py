@@ -250,7 +250,7 @@ def adjusted(strip: Flown, names: tuple[str, ...], wrong: dict[str, tuple[float,
     given_ = {name: strip.xyz[strip.at[name]] + rng.normal(0, 0.02, 3) for name in names}
     for name, error in wrong.items():
         given_[name] = given_[name] + error
-    return triangulate(project(strip, control_points(given_, sigma=0.02)), Settings())
+    return triangulate(project(strip, control_points(given_, sigma=0.02)), Settings(adjustment="polynomial"))
 
 
 def flown(seed: int = 1) -> Flown:

@@ -42,7 +42,7 @@ def adjusted(strip: Flown, wrong: dict[str, tuple[float, float, float]] | None =
     given = {name: strip.xyz[strip.at[name]] + rng.normal(0, 0.02, 3) for name in names}
     for name, error in (wrong or {}).items():
         given[name] = given[name] + error
-    return triangulate(project(strip, control_points(given, sigma=0.02)), Settings())
+    return triangulate(project(strip, control_points(given, sigma=0.02)), Settings(adjustment="polynomial"))
 
 
 # ----------------------------------------------------------------------------------------------------- control
