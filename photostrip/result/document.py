@@ -10,6 +10,7 @@ from photostrip.pipeline.results import Result
 from photostrip.result import conventions, summary
 from photostrip.result.adjustment import (
     bundle,
+    classical,
     deformation,
     junctions,
     links,
@@ -54,6 +55,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         **precision.precision_of(result, found),
         **cross_validation.cross_validation_of(result),
         **bundle.bundle_of(result),
+        **classical.classical_of(result),
         "control": given.control_of(result, found),
         "misclosures": given.misclosures_of(result),
         "ties": ground.ties_of(result, rank),

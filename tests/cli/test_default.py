@@ -52,6 +52,7 @@ def test_two_strips_of_three_photos_on_four_corners(capsys: pytest.CaptureFixtur
     capsys.readouterr()
     document = run(capsys, project)
     assert document["adjustment"] == "bundle"
+    assert "classical" not in document
     check = document["summary"]["check"]
     assert check["plan"]["count"] == 16
     assert 2 < check["plan"]["rms_um"] < 12  # of 5 µm in the image
@@ -66,6 +67,23 @@ def test_a_photo_that_is_a_strip_of_its_own(capsys: pytest.CaptureFixture[str], 
     document = run(capsys, project)
     assert document["adjustment"] == "bundle"
     assert [photo["id"] for photo in document["photos"]] == ["1001", "1002", "1003", "1004"]
+
+
+def test_the_classical_adjustment_stands_beside_it(capsys: pytest.CaptureFixture[str]) -> None:
+    classical = run(capsys, SAMPLE)["classical"]
+    alone = run(capsys, SAMPLE, "--set", "processing.adjustment=polynomial")
+    summary = alone["summary"]
+    for role in ("control", "check"):
+        assert classical[f"{role}_rms"] == {part: summary[role][part]["rms"] for part in ("plan", "height")}
+    (strip,), (polynomial,) = classical["strips"], alone["polynomials"]
+    assert max(strip["degree"].values()) == polynomial["degree"]
+    assert "classical" not in alone
+    assert main(["run", str(SAMPLE)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    degrees = "degree {plan} in plan and {height} in height".format(**strip["degree"])
+    left = "{plan:.3f}/{height:.3f} m at check points".format(**classical["check_rms"])
+    assert f"polynomials instead {degrees}; rms in plan/height" in said
+    assert left in said
 
 
 def test_where_no_bundle_can_be_had_it_is_the_polynomial_and_says_why(

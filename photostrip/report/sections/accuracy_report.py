@@ -47,6 +47,7 @@ class SectionName(StrEnum):
     ABSOLUTE = "absolute"
     POLYNOMIAL = "polynomial"
     BUNDLE = "bundle"
+    CLASSICAL = "classical"
     WEIGHTS = "weights"
     PRECISION = "precision"
     DEFORMATIONS = "deformations"
@@ -92,9 +93,11 @@ def _of_the_strips(document: Document, *, everything: bool) -> Iterator[tuple[Se
         yield SectionName.ABSOLUTE, absolute_section(document)
     if document.get("polynomials"):
         yield SectionName.POLYNOMIAL, polynomial_section(document, everything=everything)
-    from photostrip.report.sections.bundle import bundle_sections
+    from photostrip.report.sections.bundle import bundle_sections, classical_section
 
     yield from ((SectionName.BUNDLE, each) for each in bundle_sections(document, everything=everything))
+    if "classical" in document:
+        yield SectionName.CLASSICAL, classical_section(document)
 
 
 def _of_the_accuracy(document: Document, *, everything: bool) -> Iterator[tuple[SectionName, Section]]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 
 from photostrip.notes import Document, counted
 from photostrip.report.page.angles import AngleUnit, angle_unit
-from photostrip.report.page.numbers import fixed, power, short, unit
+from photostrip.report.page.numbers import fixed, metres, power, short, unit
 from photostrip.report.page.parts import DASH, Facts, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
@@ -33,6 +34,48 @@ def bundle_sections(document: Document, *, everything: bool) -> list[Section]:
     if block["calibration"] or block["corrections"]:
         found.append(_parameters(block, everything=everything))
     return found
+
+
+def classical_section(document: Document) -> Section:
+    """Set what polynomials would leave, strip by strip, beside what the bundle leaves."""
+    block = document["classical"]
+    left = {
+        f"{role}_rms": {part: document["summary"][role][part]["rms"] for part in ("plan", "height")}
+        for role in ("control", "check")
+    }
+    rows = [{"by": "bundle", **left}, {"by": "polynomials", **block}]
+    columns = (
+        words("rms", "by"),
+        *(
+            number(f"{role} {part}", f"{role}_rms.{part}", 3, "m")
+            for role in ("control", "check")
+            for part in ("plan", "height")
+        ),
+    )
+    note = "the strip method by itself, from which the bundle started; `processing.adjustment: polynomial` takes it"
+    parts = (Words(f"Polynomials: {_degrees(block)}."), tabulated(rows, columns, note=note))
+    return Section("The classical strip adjustment beside it", parts)
+
+
+def classical_line(block: Document) -> str:
+    """Say in a line what polynomials would leave."""
+    left = [
+        f"{metres(block[key]['plan'])}/{metres(block[key]['height'])} m at {what}"
+        for key, what in (("control_rms", "control"), ("check_rms", "check points"))
+        if block[key]["plan"] is not None or block[key]["height"] is not None
+    ]
+    return f"{_degrees(block)}; rms in plan/height {', '.join(left)}"
+
+
+def _degrees(block: Document) -> str:
+    """Say which degrees the polynomials have, of several strips how many have each."""
+    number = Counter((each["degree"]["plan"], each["degree"]["height"]) for each in block["strips"])
+    several = len(block["strips"]) > 1
+    return ", ".join(
+        (f"degree {plan} in plan and {height} in height" if plan or height else "none, the similarity alone")
+        + (f" in {counted(count, 'strip')}" if several else "")
+        for (plan, height), count in sorted(number.items())
+    )
 
 
 def _adjustment(block: Document, angles: AngleUnit) -> Section:

@@ -8,6 +8,7 @@ from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import LEAST_PROBABILITY, micrometres, short
 from photostrip.report.page.parts import Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.sections.models import of_models
 from photostrip.report.sections.strip import elsewhere
 
 NO_DEGREE = "none: no degree improves on chance, or predicts control held back any better"
@@ -23,6 +24,8 @@ def decisions_section(document: Document) -> Section:
 
 def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     settings = document["settings"]
+    if settings["adjustment"] == "auto":
+        yield "adjustment", _adjustment(document)
     for block in document.get("polynomials", []):
         label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
         if block["asked"] == "auto":
@@ -46,6 +49,14 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     if curvature["asked"] == "auto":
         yield "Earth curvature", f"{curvature['treatment']}, as the frame of the control requires"
     yield from _heights(document, settings.get("refinement", {}))
+
+
+def _adjustment(document: Document) -> str:
+    if "bundle" in document:
+        return "bundle, which all photos together determine"
+    if of_models(document):
+        return "polynomial: independent models have no image coordinates"
+    return "polynomial: no bundle could be had, the notes say why"
 
 
 def _degree(block: Document) -> str:

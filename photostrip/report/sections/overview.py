@@ -13,6 +13,7 @@ from photostrip.notes import Document, counted, listed
 from photostrip.report.page.layout import lay_out
 from photostrip.report.page.numbers import fixed, metres, micrometres, percent
 from photostrip.report.page.parts import Facts, Section, Words
+from photostrip.report.sections.bundle import classical_line
 from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.decisions import chosen_degrees
 from photostrip.report.sections.findings import cures_section
@@ -107,6 +108,8 @@ def _stages(document: Document) -> Rows:
     yield from _degrees(document.get("polynomials", []))
     if "bundle" in document:
         yield "bundle adjustment", _bundle(document["bundle"])
+    if "classical" in document:
+        yield "polynomials instead", classical_line(document["classical"])
     if summary["image_rms_um"] is not None:
         yield "image residuals", f"rms {micrometres(summary['image_rms_um'])} µm"
     if "precision" in document:
