@@ -111,7 +111,7 @@ class Bundle(Section):
         "Estimate the standard deviations of image coordinates, control and camera positions",
         DEFAULTS.bundle.variance_components,
     )
-    moved = {"self_calibration": "processing.self_calibration"}  # noqa: RUF012 (a class variable of Section)
+    gone = {"self_calibration": "write `processing.self_calibration`"}  # noqa: RUF012 (a class variable of Section)
     calibration_sigma: Annotated[dict[str, Positive], Before(if_empty)] = key(
         "A-priori standard deviations of these parameters, by name; free without one",
         {},
@@ -132,6 +132,8 @@ Latitude = Annotated[Number, After(bounded(Range(-90.0, 90.0, "deg")))]
 
 class Processing(Section):
     """What is computed and how."""
+
+    gone = {"covariance": "remove it: `adjustment: bundle` took its place, and needs none of it"}  # noqa: RUF012 (as above)
 
     adjustment: Annotated[str, choice(ADJUSTMENTS)] = key(
         "`auto` (`bundle` wherever it is determined, the polynomials printed beside it; otherwise `polynomial`), "

@@ -36,8 +36,6 @@ MAPPING, LIST, VALUES = (
 )
 NAMES: dict[type, str] = {list: "a list", dict: MAPPING}  # of what is given where something else is expected
 ENTRIES = {"photos": "photo", "cameras": "camera", "strips": "strip"}
-# keys that were taken once
-GONE = {"covariance": "remove it: `adjustment: bundle` took its place, and needs none of it"}
 T = TypeVar("T", bound="Section")
 
 
@@ -112,7 +110,7 @@ class Section:
 
     keys: ClassVar[dict[str, Key]] = {}
     rules: ClassVar[tuple[Rule, ...]] = ()
-    moved: ClassVar[dict[str, str]] = {}  # keys of earlier versions, and which key of the project stands in their place
+    gone: ClassVar[dict[str, str]] = {}  # keys that were taken once, and what to do instead
     types: ClassVar[dict[str, Any]]  # once they are asked for: the annotation of each key, and what reads it
     readers: ClassVar[dict[str, Reader]]
     given: frozenset[str]  # keys that are not left to their defaults
@@ -171,7 +169,7 @@ def _missing(name: str, entry: Key) -> WrongValueError:
 def _unknown(name: str, kind: type[Section]) -> WrongValueError:
     known = list(kind.keys)
     expected = f"one of {', '.join(known)}"
-    fix = f"write `{kind.moved[name]}`" if name in kind.moved else GONE.get(name) or suggestion(name, known)
+    fix = kind.gone.get(name) or suggestion(name, known)
     return wrong(f"the key `{shown(name)}` is not known", code="unknown-key", expected=expected, fix=fix)
 
 
