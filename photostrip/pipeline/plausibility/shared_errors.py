@@ -31,6 +31,7 @@ from photostrip.triangulation.plausibility.control.shared_by_control import Shif
 from photostrip.triangulation.plausibility.finding import Evidence
 
 KEY = "camera_positions.correction"
+CONTINUED = "The adjustment continued with it; `processing.self_calibration` confirms or refuses it"
 
 
 def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
@@ -93,7 +94,7 @@ def _lens(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
     message = (
         f"photos of camera {k1.camera} agree with each other and with what is given at a radial distortion that is not "
         f"stated: k1 = {k1.value:.3g} mm^-2, {um:+.1f} µm at {radius:.0f} mm from the principal point (standard "
-        f"deviation {sigma_um:.1f} µm). The adjustment continued with it"
+        f"deviation {sigma_um:.1f} µm). {CONTINUED}"
     )
     fix = f"look at the lens in the calibration certificate of the camera; {_decision(['k1'])}"
     numbers: Evidence = {"k1": k1.value, "standard_deviation": k1.sigma, "radius_mm": radius, "distortion_um": um}
@@ -105,7 +106,7 @@ def _point(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
     message = (
         f"photos of camera {x.camera} agree with each other and with what is given at a principal point that lies "
         f"{x.value:+.3f}, {y.value:+.3f} mm from the given one (standard deviations {x.sigma:.3f}, {y.sigma:.3f} mm). "
-        "The adjustment continued with it"
+        f"{CONTINUED}"
     )
     fix = f"look at the principal point and the origin of the image coordinates; {_decision(['principal_point'])}"
     numbers: Evidence = {"x_mm": x.value, "y_mm": y.value, "standard_deviation_mm": max(x.sigma, y.sigma)}
