@@ -1,7 +1,7 @@
 """What each part of the search for gross errors is good for: strips adjusted by programs that differ in one thing.
 
 The strips of ``gross_errors.py``, 20 photos each, are adjusted as the program is, without one of its steps, and with
-every constant of ``photostrip/triangulation/gross_errors`` doubled and halved, one at a time. A probability near one
+every constant of ``photostrip/strip/gross_errors`` doubled and halved, one at a time. A probability near one
 gets twice or half of what it leaves to one; whole numbers stay whole. Errors are divided by those of the unchanged
 program without gross errors.
 
@@ -34,10 +34,10 @@ limit_threads()  # as the command does, before numpy is imported
 
 from benchmarks.gross_errors import AUTO, CLEAN, HEAD, KNOWN, Run, Tally, loses_anything, much_wrong_run, runs_of  # noqa: E402
 from photostrip import frozen  # noqa: E402
+from photostrip.network.settings import BundleSettings  # noqa: E402
 from photostrip.pipeline.strips.absolute import ScreenedStrip  # noqa: E402
-from photostrip.triangulation import gross_errors as search  # noqa: E402
-from photostrip.triangulation.bundle.settings import BundleSettings  # noqa: E402
-from photostrip.triangulation.gross_errors.control.control_screening import not_screened  # noqa: E402
+from photostrip.strip import gross_errors as search  # noqa: E402
+from photostrip.strip.gross_errors.control.control_screening import not_screened  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

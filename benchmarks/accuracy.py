@@ -34,7 +34,7 @@ from photostrip.geometry.rotation import from_vector  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
-from photostrip.triangulation.polynomial import correction, terms  # noqa: E402
+from photostrip.strip.polynomial import correction, terms  # noqa: E402
 from tests.simulated import inputs_of, settings_of  # noqa: E402
 
 if TYPE_CHECKING:

@@ -26,16 +26,16 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 import numpy as np  # noqa: E402
 
 from benchmarks import peers  # noqa: E402
+from photostrip.network.cofactors import cofactors_of  # noqa: E402
+from photostrip.network.solve import solve  # noqa: E402
 from photostrip.simulation import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
-from photostrip.triangulation.bundle.quality.cofactors import cofactors_of  # noqa: E402
-from photostrip.triangulation.bundle.solve import solve  # noqa: E402
 from tests.simulated_bundle import problem_of  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
+    from photostrip.network.problem import BundleProblem
+    from photostrip.network.solution import BundleSolution, Cofactors
 
 LIMITS = {"whole": 0.5, "block": 1.0, "solver": 0.8, "colmap": 0.25, "covariances": 1.0}
 LARGEST_MEMORY = 350.0  # MB, at 1000 photos with 300 points each

@@ -30,9 +30,9 @@ from benchmarks.ablation import put  # noqa: E402
 from benchmarks.gross_errors import Project, adjusted, project_of  # noqa: E402
 from photostrip.errors import PhotostripError  # noqa: E402
 from photostrip.frozen import replace  # noqa: E402
+from photostrip.network.gross_errors import snooping  # noqa: E402
 from photostrip.simulation import Control, Flight, Points, Spec, Terrain, simulate  # noqa: E402
-from photostrip.triangulation.gross_errors.pairs import pair_search  # noqa: E402
-from photostrip.triangulation.gross_errors.rays import snooping  # noqa: E402
+from photostrip.strip.gross_errors.pairs import pair_search  # noqa: E402
 
 NEVER = 10**9
 CONSTANTS = {  # as it is first

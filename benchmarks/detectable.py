@@ -30,7 +30,7 @@ limit_threads()  # as the command does, before numpy is imported
 import numpy as np  # noqa: E402
 
 from benchmarks.gross_errors import STRIP, adjusted, pair_of_projects  # noqa: E402
-from photostrip.triangulation.gross_errors.rays import point_decisions, ray_decisions, snooping  # noqa: E402
+from photostrip.network.gross_errors import point_decisions, ray_decisions, snooping  # noqa: E402
 
 KINDS = (
     "two photos, along the base",

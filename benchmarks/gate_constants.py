@@ -36,12 +36,12 @@ import numpy as np  # noqa: E402
 from benchmarks import false_alarms, plausibility  # noqa: E402
 from benchmarks.ablation import put, scaled  # noqa: E402
 from benchmarks.false_alarms import Sound  # noqa: E402
+from photostrip import plausibility as tests  # noqa: E402
 from photostrip.errors import PhotostripError  # noqa: E402
 from photostrip.pipeline import plausibility as around_tests  # noqa: E402
 from photostrip.pipeline.plausibility import gate  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.simulation import Image, Spec  # noqa: E402
-from photostrip.triangulation import plausibility as tests  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -29,11 +29,11 @@ from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.models import form_models, link_strip  # noqa: E402
 from photostrip.points import ModelPoints, PhotoPoints  # noqa: E402
 from photostrip.simulation import Control, Flight, Image, Models, Points, Simulation, Spec, simulate  # noqa: E402
-from photostrip.triangulation.independent_models.settings import LinkSettings  # noqa: E402
-from photostrip.triangulation.polynomial import correction  # noqa: E402
-from photostrip.triangulation.relative_orientation.orientation import orient_unchecked  # noqa: E402
-from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
-from photostrip.triangulation.strip_formation.strip import model_points  # noqa: E402
+from photostrip.strip.independent_models.settings import LinkSettings  # noqa: E402
+from photostrip.strip.polynomial import correction  # noqa: E402
+from photostrip.strip.relative_orientation.orientation import orient_unchecked  # noqa: E402
+from photostrip.strip.relative_orientation.pairs import collect_pairs  # noqa: E402
+from photostrip.strip.strip_formation.strip import model_points  # noqa: E402
 from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """The faults that the tests notice: constants, comparisons and signs of the program changed one at a time.
 
-Run it as ``python benchmarks/mutations.py [--count 120] [--seed 1] [--room triangulation/polynomial ...]``. Each change
+Run it as ``python benchmarks/mutations.py [--count 120] [--seed 1] [--room strip/polynomial ...]``. Each change
 is made in a temporary copy of this tree and undone again. The tests of the room run first, then all that are not slow;
 a change that both let pass stands in the table as NOT noticed. Some of those make no difference that a test should
 notice (the width of a message, a tolerance that only decides how long something takes): a person judges them.
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = "photostrip", "tests"
-LEFT_OUT = "triangulation/gross_errors"  # rates of detection: benchmarks/screening.py and gross_errors.py
+LEFT_OUT = "strip/gross_errors"  # rates of detection: benchmarks/screening.py and gross_errors.py
 NOT_COPIED = shutil.ignore_patterns(".*_cache", ".git", ".venv*", "__pycache__", "build", "dist", ".hypothesis")
 FACTOR = 1.5  # of a constant that is not whole
 SWAPPED: dict[type[ast.AST], tuple[str, str]] = {

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pycolmap
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.network.problem import BundleProblem
 
     Floats = NDArray[np.float64]
 

@@ -29,6 +29,7 @@ import numpy as np  # noqa: E402
 
 from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.geodesy.tying import tie_frames  # noqa: E402
+from photostrip.network.solve import solve  # noqa: E402
 from photostrip.pipeline.inputs import Inputs, Settings, Strip  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
 from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
@@ -58,11 +59,10 @@ from photostrip.points import ControlPoints  # noqa: E402
 from photostrip.simulation import Control as SimulatedControl  # noqa: E402
 from photostrip.simulation import Flight, Ground, Image, Spec, simulate  # noqa: E402
 from photostrip.simulation.spec import FILM  # noqa: E402
-from photostrip.triangulation.bundle.solve import solve  # noqa: E402
-from photostrip.triangulation.polynomial import correction  # noqa: E402
-from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
-from photostrip.triangulation.relative_orientation.pairs import Pairs  # noqa: E402
-from photostrip.triangulation.strip_formation.strip import model_points  # noqa: E402
+from photostrip.strip.polynomial import correction  # noqa: E402
+from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
+from photostrip.strip.relative_orientation.pairs import Pairs  # noqa: E402
+from photostrip.strip.strip_formation.strip import model_points  # noqa: E402
 from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:

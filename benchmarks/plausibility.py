@@ -28,6 +28,7 @@ from photostrip.geometry.rotation import angles, from_angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import triangulate
+from photostrip.plausibility import KINDS
 from photostrip.simulation import (
     DIGITAL,
     FILM,
@@ -43,7 +44,6 @@ from photostrip.simulation import (
     Terrain,
 )
 from photostrip.simulation.simulation import simulate
-from photostrip.triangulation.plausibility import KINDS
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:

@@ -32,8 +32,8 @@ from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
-from photostrip.triangulation.polynomial import correction  # noqa: E402
-from photostrip.triangulation.relative_orientation.orientation import RelativeSettings  # noqa: E402
+from photostrip.strip.polynomial import correction  # noqa: E402
+from photostrip.strip.relative_orientation.orientation import RelativeSettings  # noqa: E402
 from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:

@@ -31,6 +31,7 @@ from benchmarks import false_alarms, plausibility  # noqa: E402
 from benchmarks.ablation import put  # noqa: E402
 from photostrip.errors import PhotostripError  # noqa: E402
 from photostrip.geometry.rotation import angles  # noqa: E402
+from photostrip.network import defects  # noqa: E402
 from photostrip.pipeline.block import datum, problem  # noqa: E402
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
@@ -39,8 +40,7 @@ from photostrip.result import verdict  # noqa: E402
 from photostrip.result.document import document_of  # noqa: E402
 from photostrip.simulation import Control, Flight, GrossError, Ground, Points, Spec  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
-from photostrip.triangulation.bundle.normal_equations import defects  # noqa: E402
-from photostrip.triangulation.relative_orientation import solution  # noqa: E402
+from photostrip.strip.relative_orientation import solution  # noqa: E402
 from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:

@@ -22,6 +22,7 @@ limit_threads()  # as the command does, before numpy is imported
 
 import numpy as np  # noqa: E402
 
+from photostrip.network.gross_errors.strip_rays import StripRays  # noqa: E402
 from photostrip.pipeline.strips.screened_formation import form_screened  # noqa: E402
 from photostrip.planning.screening import (  # noqa: E402
     PairLayout,
@@ -35,13 +36,12 @@ from photostrip.planning.screening import (  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Flight, GrossError, Points, Spec  # noqa: E402
 from photostrip.statistics import chi2_quantile  # noqa: E402
-from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
-from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays  # noqa: E402
-from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
-from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
-from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes  # noqa: E402
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings  # noqa: E402
-from photostrip.triangulation.strip_formation.strip import form_from_pairs  # noqa: E402
+from photostrip.strip.gross_errors.pairs import deletion, screening  # noqa: E402
+from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
+from photostrip.strip.relative_orientation.pairs import collect_pairs  # noqa: E402
+from photostrip.strip.relative_orientation.solution import linearised_parallaxes  # noqa: E402
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings  # noqa: E402
+from photostrip.strip.strip_formation.strip import form_from_pairs  # noqa: E402
 from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline.inputs import Inputs
     from photostrip.planning.screening import MethodOutcome
-    from photostrip.triangulation.relative_orientation.pairs import Pairs
+    from photostrip.strip.relative_orientation.pairs import Pairs
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]

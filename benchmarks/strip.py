@@ -49,14 +49,14 @@ from photostrip.report.sections.accuracy_report import chosen_sections, title_of
 from photostrip.result.document import document_of  # noqa: E402
 from photostrip.simulation.simulation import simulate  # noqa: E402
 from photostrip.simulation.spec import Control, Flight, Gnss, Points, Spec  # noqa: E402
-from photostrip.triangulation import absolute_orientation  # noqa: E402
-from photostrip.triangulation.gross_errors.control import control_screening  # noqa: E402
-from photostrip.triangulation.gross_errors.pairs import screening  # noqa: E402
-from photostrip.triangulation.image_coordinates import corrections  # noqa: E402
-from photostrip.triangulation.polynomial import correction  # noqa: E402
-from photostrip.triangulation.relative_orientation.orientation import orient_pairs  # noqa: E402
-from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
-from photostrip.triangulation.relative_orientation.solution import iterate_elements, start_values  # noqa: E402
+from photostrip.strip import absolute_orientation  # noqa: E402
+from photostrip.strip.gross_errors.control import control_screening  # noqa: E402
+from photostrip.strip.gross_errors.pairs import screening  # noqa: E402
+from photostrip.strip.image_coordinates import corrections  # noqa: E402
+from photostrip.strip.polynomial import correction  # noqa: E402
+from photostrip.strip.relative_orientation.orientation import orient_pairs  # noqa: E402
+from photostrip.strip.relative_orientation.pairs import collect_pairs  # noqa: E402
+from photostrip.strip.relative_orientation.solution import iterate_elements, start_values  # noqa: E402
 from tests.simulated import inputs_of  # noqa: E402
 
 if TYPE_CHECKING:
@@ -239,7 +239,7 @@ pipeline = import_module("photostrip.pipeline.run")  # the module; the package g
 of_strips = import_module("photostrip.pipeline.strips.photos")
 common = import_module("photostrip.pipeline.common_points")
 screened_formation = import_module("photostrip.pipeline.strips.screened_formation")
-strip_network = import_module("photostrip.triangulation.gross_errors.rays.strip_network")
+strip_network = import_module("photostrip.network.gross_errors.strip_network")
 STAGES = (
     ("image coordinates", corrections, "refine"),
     ("collecting pairs", of_strips, "collect_pairs"),

@@ -13,7 +13,7 @@ from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
-from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
+from photostrip.strip.relative_orientation.orientation import RelativeSettings
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.results import Result
-    from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
-    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+    from photostrip.strip.error_propagation.fitted_strip import FittedStrip
+    from photostrip.strip.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
 

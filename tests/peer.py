@@ -17,7 +17,7 @@ from tests.simulated_bundle import problem_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.network.problem import BundleProblem
 
 FILE = ROOT / "tests" / "data" / "bundle_by_ceres.json"
 TIGHT = 1e-16

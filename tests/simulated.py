@@ -8,7 +8,7 @@ from photostrip.formats.output.simulation import model_strips
 from photostrip.frozen import replace
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
+from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings
 
 if TYPE_CHECKING:
     from photostrip.points import ModelPoints

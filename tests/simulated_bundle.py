@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import from_vector
-from photostrip.triangulation.bundle.observations.problem import (
+from photostrip.network.problem import (
     BundleCameras,
     BundleProblem,
     ControlObservations,

@@ -14,16 +14,16 @@ from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.triangulation.absolute_orientation import Targets
-from photostrip.triangulation.relative_orientation.orientation import orient_pairs
-from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs
+from photostrip.strip.absolute_orientation import Targets
+from photostrip.strip.relative_orientation.orientation import orient_pairs
+from photostrip.strip.relative_orientation.pairs import Pairs, collect_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.strip.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]

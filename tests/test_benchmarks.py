@@ -189,10 +189,10 @@ def test_ablation_changes_constants_where_they_are_imported_and_everything_it_sw
 import sys
 from benchmarks import ablation
 from photostrip import rejection
-from photostrip.triangulation.bundle.quality import reliability
-from photostrip.triangulation.gross_errors.pairs import deletion, global_test, pair_search
-from photostrip.triangulation.gross_errors.rays import point_decisions
-from photostrip.triangulation.bundle.settings import BundleSettings
+from photostrip.network import reliability
+from photostrip.strip.gross_errors.pairs import deletion, global_test, pair_search
+from photostrip.network.gross_errors import point_decisions
+from photostrip.network.settings import BundleSettings
 names = [f"{module.rpartition('.')[2]}.{name}" for module, name, _ in ablation.constants()]
 assert {"settings:BundleSettings.level", "strip_network.STRIP_LEVEL", "point_decisions.LIKELIER"} < set(names)
 ablation.put(rejection.__name__, "UNCONTROLLED", 0.25)

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 LAYERS = (
     {"arrays", "errors", "frozen", "notes", "number_columns", "statistics", "threads", "units", "visible"},
     {"points", "camera", "geometry", "geodesy", "rejection"},
-    {"triangulation", "terrestrial"},
+    {"strip", "terrestrial"},
+    {"network"},
+    {"plausibility"},
     {"simulation"},
     {"planning"},
     {"pipeline"},
@@ -35,9 +37,10 @@ LAYERS = (
 TAUGHT = {"errors", "frozen", "notes", "visible"}  # all that a report may know of the program
 LEAVES = {"report"}
 APART = {
-    ("terrestrial", "triangulation"),
-    ("triangulation", "terrestrial"),
-    ("comparison", "triangulation"),
+    ("terrestrial", "strip"),
+    ("strip", "terrestrial"),
+    ("comparison", "strip"),
+    ("comparison", "network"),
     ("comparison", "terrestrial"),
 }
 

@@ -104,12 +104,12 @@ def test_a_plain_run_loads_no_room_that_it_does_not_enter() -> None:
         "one = '--set=processing.adjustment=polynomial'  # the default is a bundle\n"
         "assert main(['run', 'sample_data/simulated-20/project.yaml', one, '--quiet']) == 0\nprint(*sys.modules)"
     ).split()
-    assert "photostrip.triangulation.polynomial.correction" in names
+    assert "photostrip.strip.polynomial.correction" in names
     rooms = (
         "independent_models.linking",
         "image_coordinates.interior",
     )
-    assert not {f"photostrip.triangulation.{room}" for room in rooms} & set(names)
+    assert not {f"photostrip.strip.{room}" for room in rooms} & set(names)
     assert not {"photostrip.report.html", "photostrip.cli.jobs.method_comparison"} & set(names)
 
 
@@ -121,8 +121,8 @@ def test_polynomials_without_gross_errors_need_no_bundle() -> None:
         "one = '--set=processing.adjustment=polynomial'\n"
         "assert main(['run', 'sample_data/simulated-20/project.yaml', drop, one, '--quiet']) == 0\nprint(*sys.modules)"
     ).split()
-    assert "photostrip.triangulation.polynomial.correction" in names
-    assert "photostrip.triangulation.bundle.solution" not in names
+    assert "photostrip.strip.polynomial.correction" in names
+    assert "photostrip.network.solution" not in names
 
 
 DROP = "--set=processing.relative.drop=[1007/1007-1, 1015/1015-7]"  # the gross errors of the sample

@@ -15,13 +15,13 @@ from photostrip.library.step_documents import Column, columns, table
 from photostrip.library.steps import Absolute, Bundle, Interior, Relative, Strip, one_pair
 from photostrip.notes import Document
 from photostrip.result.trace.replay import first_rounds
-from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
-from photostrip.triangulation.polynomial.terms import columns as design_columns
-from photostrip.triangulation.relative_orientation.solution import ELEMENTS
-from photostrip.triangulation.resection.closed_form import OrientedPhoto, approximate
-from photostrip.triangulation.resection.collinearity import KnownPhotos, project
-from photostrip.triangulation.resection.resection import resect
-from photostrip.triangulation.strip_formation.intersection import lies_across
+from photostrip.strip.image_coordinates.corrections import Bending, undistort
+from photostrip.strip.polynomial.terms import columns as design_columns
+from photostrip.strip.relative_orientation.solution import ELEMENTS
+from photostrip.strip.resection.closed_form import OrientedPhoto, approximate
+from photostrip.strip.resection.collinearity import KnownPhotos, project
+from photostrip.strip.resection.resection import resect
+from photostrip.strip.strip_formation.intersection import lies_across
 from photostrip.units import MICROMETRES
 
 Trace = list[Document]

@@ -21,13 +21,13 @@ from photostrip.geometry import plane
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.library.step_arguments import rows, same, sigma0_of
 from photostrip.library.steps_of_strips import Absolute, Bundle, Strip, absolute, bundle, polynomial, strip
-from photostrip.triangulation.image_coordinates.corrections import Bending, undistort
-from photostrip.triangulation.image_coordinates.refraction import refraction_constant
-from photostrip.triangulation.relative_orientation.orientation import orient_pairs
-from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
-from photostrip.triangulation.resection.closed_form import OrientedPhoto, space_resection
-from photostrip.triangulation.strip_formation.intersection import Intersection, intersect
-from photostrip.triangulation.strip_formation.strip import hand_on_rotations
+from photostrip.strip.image_coordinates.corrections import Bending, undistort
+from photostrip.strip.image_coordinates.refraction import refraction_constant
+from photostrip.strip.relative_orientation.orientation import orient_pairs
+from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
+from photostrip.strip.resection.closed_form import OrientedPhoto, space_resection
+from photostrip.strip.strip_formation.intersection import Intersection, intersect
+from photostrip.strip.strip_formation.strip import hand_on_rotations
 
 __all__ = [
     "Absolute",

@@ -14,22 +14,22 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.library.step_arguments import Rays, of_rays, rows, same, sigma0_of
-from photostrip.points import PhotoPoints
-from photostrip.triangulation.bundle.observations.problem import (
+from photostrip.network.cofactors import cofactors_of
+from photostrip.network.problem import (
     BundleCameras,
     BundleProblem,
     ControlObservations,
     ImageObservations,
     StartValues,
 )
-from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
-from photostrip.triangulation.bundle.solution import IterationStep
-from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.polynomial.terms import POWERS, columns
-from photostrip.triangulation.relative_orientation.orientation import orient_pairs
-from photostrip.triangulation.relative_orientation.pairs import collect_pairs
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.triangulation.strip_formation.strip import FirstPhoto, form_from_pairs
+from photostrip.network.solution import IterationStep
+from photostrip.network.solve import solve
+from photostrip.points import PhotoPoints
+from photostrip.strip.polynomial.terms import POWERS, columns
+from photostrip.strip.relative_orientation.orientation import orient_pairs
+from photostrip.strip.relative_orientation.pairs import collect_pairs
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip.strip_formation.strip import FirstPhoto, form_from_pairs
 
 Names = tuple[Sequence[str], Sequence[str]]
 

@@ -18,8 +18,8 @@ from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
 from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
 from photostrip.pipeline.strips.notes import precision_of_long_strip
+from photostrip.plausibility.photos.tied_strips import TiesOfStrips
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips
 
 
 def join_strips(

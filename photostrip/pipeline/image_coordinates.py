@@ -15,11 +15,11 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.image_coordinates import corrections
+from photostrip.strip.image_coordinates import corrections
 
 if TYPE_CHECKING:
     from photostrip.pipeline.strips.stages import Stages
-    from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
+    from photostrip.strip.image_coordinates.mark_fit import InteriorOrientation
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ def orient_interior(inputs: Inputs, settings: Settings) -> PhotoCoordinates:
     """Interior orientation, when fiducial marks were measured."""
     if inputs.fiducials is None:
         return PhotoCoordinates(inputs.observations, None)
-    from photostrip.triangulation.image_coordinates import interior  # digital cameras need none of it
+    from photostrip.strip.image_coordinates import interior  # digital cameras need none of it
 
     orientation = interior.orient(inputs.fiducials, inputs.cameras, settings.interior)
     return PhotoCoordinates(interior.transform(inputs.observations, orientation), orientation)

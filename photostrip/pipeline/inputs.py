@@ -10,16 +10,16 @@ from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.camera import Camera
 from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.network.settings import BundleSettings
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
-from photostrip.triangulation.absolute_orientation import AbsoluteSettings
-from photostrip.triangulation.bundle.settings import BundleSettings
-from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
-from photostrip.triangulation.independent_models.settings import LinkSettings
-from photostrip.triangulation.polynomial.correction import PolynomialSettings
-from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
-from photostrip.triangulation.resection.collinearity import KnownPhotos
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.triangulation.strip_formation.strip import NOTHING_GIVEN, FirstPhoto
+from photostrip.strip.absolute_orientation import AbsoluteSettings
+from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
+from photostrip.strip.independent_models.settings import LinkSettings
+from photostrip.strip.polynomial.correction import PolynomialSettings
+from photostrip.strip.relative_orientation.orientation import RelativeSettings
+from photostrip.strip.resection.collinearity import KnownPhotos
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip.strip_formation.strip import NOTHING_GIVEN, FirstPhoto
 
 METHODS = SIMILARITY, POLYNOMIAL, BUNDLE = "similarity", "polynomial", "bundle"
 AUTO = "auto"  # bundle where it is determined, otherwise polynomial

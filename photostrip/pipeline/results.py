@@ -15,27 +15,27 @@ from photostrip.notes import Finding, Note
 from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.rejection import Rejection
-from photostrip.triangulation import absolute_orientation as absolute
-from photostrip.triangulation.polynomial.correction import Polynomial
-from photostrip.triangulation.relative_orientation.orientation import Orientation
-from photostrip.triangulation.strip_formation.strip import FormedStrip
+from photostrip.strip import absolute_orientation as absolute
+from photostrip.strip.polynomial.correction import Polynomial
+from photostrip.strip.relative_orientation.orientation import Orientation
+from photostrip.strip.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
-    from photostrip.triangulation.bundle.quality.correlations import Correlation
-    from photostrip.triangulation.bundle.selection import Selection
-    from photostrip.triangulation.error_propagation.check_errors import CheckErrors
-    from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
-    from photostrip.triangulation.gross_errors.pairs import screening
-    from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
-    from photostrip.triangulation.image_coordinates import corrections
-    from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
-    from photostrip.triangulation.independent_models.formation import FormedModels
-    from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
-    from photostrip.triangulation.resection import resection as exterior
+    from photostrip.network import reliability, self_calibration, variance_components
+    from photostrip.network.correlations import Correlation
+    from photostrip.network.gross_errors.snooping import ScreenedBundle
+    from photostrip.network.problem import BundleProblem
+    from photostrip.network.selection import Selection
+    from photostrip.plausibility.control.shared_by_control import ShiftedList, StretchedHeights
+    from photostrip.strip.error_propagation.check_errors import CheckErrors
+    from photostrip.strip.gross_errors.control.control_screening import ScreenedControl
+    from photostrip.strip.gross_errors.pairs import screening
+    from photostrip.strip.image_coordinates import corrections
+    from photostrip.strip.image_coordinates.mark_fit import InteriorOrientation
+    from photostrip.strip.independent_models.formation import FormedModels
+    from photostrip.strip.resection import resection as exterior
 
 ROLES = NEW, CONTROL, CHECK = "new", "control", "check"
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from photostrip.arrays import Floats, median
+from photostrip.network import reliability
 from photostrip.notes import Note
 from photostrip.pipeline.results import AdjustedStrips, Bundle, StripResult
-from photostrip.triangulation.bundle.quality import reliability
 
 HARDLY = 10.0  # standard deviations of a given coordinate in one model: errors of half of them must be that large
 PARTS = (("plan", slice(0, 2)), ("height", slice(2, 3)))

@@ -14,7 +14,7 @@ import numpy as np
 
 from photostrip.camera import Distortion
 from photostrip.frozen import NamedTuple, dataclass
-from photostrip.triangulation.image_coordinates.lens_distortion import ideal_from_image
+from photostrip.strip.image_coordinates.lens_distortion import ideal_from_image
 from photostrip.units import MILLIMETRES
 
 KILOMETRE = 1e6  # mm

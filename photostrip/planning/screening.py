@@ -15,10 +15,10 @@ from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import from_angles
-from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs, screen_pairs
-from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked, unusable_pairs
-from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
-from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes
+from photostrip.strip.gross_errors.pairs.screening import ScreenedPairs, screen_pairs
+from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_unchecked, unusable_pairs
+from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
+from photostrip.strip.relative_orientation.solution import linearised_parallaxes
 
 ZONES = 6
 ARC_MINUTES = 60 * 180 / np.pi  # in a radian

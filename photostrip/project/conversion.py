@@ -25,10 +25,10 @@ from photostrip.project.schema.cameras import AUTO, Camera, Distortion, FirstPho
 from photostrip.project.schema.ground import CameraPositions as PositionsBlock
 from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
 from photostrip.project.schema.sections import Section
-from photostrip.triangulation.image_coordinates import certificate
-from photostrip.triangulation.image_coordinates.certificate import Certificate
-from photostrip.triangulation.strip_formation import strip
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip.image_coordinates import certificate
+from photostrip.strip.image_coordinates.certificate import Certificate
+from photostrip.strip.strip_formation import strip
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -10,8 +10,8 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.simulation.flight import Photos
 from photostrip.simulation.spec import Spec
-from photostrip.triangulation.image_coordinates import lens_distortion
-from photostrip.triangulation.image_coordinates.refraction import refraction_constant
+from photostrip.strip.image_coordinates import lens_distortion
+from photostrip.strip.image_coordinates.refraction import refraction_constant
 
 USABLE = 0.97  # part of the width and height of the photo that is measured in
 BENDING_STEPS = 6  # each gains four digits

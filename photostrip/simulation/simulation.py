@@ -26,7 +26,7 @@ from photostrip.simulation.placement import Placed, place, shown
 from photostrip.simulation.plotter import TruePlaces, plotted
 from photostrip.simulation.spec import Spec
 from photostrip.simulation.validation import LARGEST_ARC, faults_of
-from photostrip.triangulation.image_coordinates.corrections import distort
+from photostrip.strip.image_coordinates.corrections import distort
 
 STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors
 MOST_ROUND_TRIP = 1e-4  # metres

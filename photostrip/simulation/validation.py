@@ -9,7 +9,7 @@ from photostrip.errors import Fault
 from photostrip.frozen import replace
 from photostrip.notes import counted
 from photostrip.simulation.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES, Spec
-from photostrip.triangulation.image_coordinates import lens_distortion
+from photostrip.strip.image_coordinates import lens_distortion
 
 LEAST_LAP, LARGEST_LAP = 50.0, 95.0  # percent; up to 50 % no point lies on three photos
 LARGEST_SIDE_LAP = 90.0

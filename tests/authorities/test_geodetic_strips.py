@@ -13,7 +13,7 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import geocentric_from_geodetic
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.run import triangulate
-from photostrip.triangulation.polynomial import correction
+from photostrip.strip.polynomial import correction
 from tests.strips import control_points, measured
 from tests.vectors import section, vector
 

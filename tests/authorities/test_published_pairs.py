@@ -11,16 +11,16 @@ import pytest
 
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, rotation_x, rotation_y, rotation_z
 from photostrip.geometry.similarity import Similarity
-from photostrip.triangulation.relative_orientation.orientation import orient_pairs
-from photostrip.triangulation.relative_orientation.pairs import collect_pairs
-from photostrip.triangulation.strip_formation.intersection import intersect
-from photostrip.triangulation.strip_formation.strip import model_points
+from photostrip.strip.relative_orientation.orientation import orient_pairs
+from photostrip.strip.relative_orientation.pairs import collect_pairs
+from photostrip.strip.strip_formation.intersection import intersect
+from photostrip.strip.strip_formation.strip import model_points
 from tests.strips import MICROMETRE, measured
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.strip.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
 

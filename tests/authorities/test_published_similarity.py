@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from photostrip.geometry.similarity import Similarity
-from photostrip.triangulation.absolute_orientation import orient
+from photostrip.strip.absolute_orientation import orient
 from tests.strips import control_points, targets
 
 if TYPE_CHECKING:

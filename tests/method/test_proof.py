@@ -38,9 +38,9 @@ from photostrip.simulation import (
     Terrain,
     simulate,
 )
-from photostrip.triangulation.polynomial import correction
-from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip.polynomial import correction
+from photostrip.strip.relative_orientation.orientation import RelativeSettings
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
 from tests.attitudes import angle_between
 from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of

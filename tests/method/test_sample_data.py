@@ -26,7 +26,7 @@ from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints
 from photostrip.project.loading import Project, load_project
 from photostrip.result.document import document_of
-from photostrip.triangulation import absolute_orientation
+from photostrip.strip import absolute_orientation
 from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline, kept, simulated
 from tests.source_tree import ROOT

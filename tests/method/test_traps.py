@@ -16,8 +16,8 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
-from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.polynomial import correction
+from photostrip.strip import absolute_orientation
+from photostrip.strip.polynomial import correction
 from tests.loops import nonempty
 from tests.results import write_project
 from tests.simulated import inputs_of, settings_of

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.network.gross_errors import snooping
+from photostrip.network.solve import solve
 from photostrip.pipeline.cross_validation import FOLDS
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.precision import check_points
@@ -18,17 +20,15 @@ from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.verdict import GOOD, LOOK, UNVERIFIED
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Models
-from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.gross_errors.rays import snooping
+from photostrip.strip.gross_errors.control import control_screening
 from tests.loops import nonempty
 from tests.results import solved, spec
 from tests.simulated import inputs_of
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.solution import BundleSolution
-    from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
+    from photostrip.network.problem import BundleProblem
+    from photostrip.network.solution import BundleSolution
+    from photostrip.strip.gross_errors.control.control_deletion import Columns, JointAdjustment
 
 ADJUSTMENTS = ("similarity", "polynomial", "bundle")
 TURNED = Settings(cross_validation=True)

@@ -11,8 +11,8 @@ from photostrip.errors import InputError
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import Result
 from photostrip.pipeline.run import triangulate
-from photostrip.triangulation.relative_orientation.orientation import RelativeSettings as Relative
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip.relative_orientation.orientation import RelativeSettings as Relative
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
 from tests.strips import Flown, control_points, fly, project
 
 WRONG = ("105", "p4_1")

@@ -14,7 +14,7 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.stages import Stages
 from photostrip.simulation import simulate
-from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
+from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings
 from tests.geodesy.frames import write_gtx
 from tests.results import spec
 from tests.simulated import inputs_of

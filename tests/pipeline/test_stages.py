@@ -16,7 +16,7 @@ from photostrip.pipeline.strips import absolute, forming
 from photostrip.pipeline.strips.stages import Stages, alike
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate
-from photostrip.triangulation.gross_errors.pairs import screening
+from photostrip.strip.gross_errors.pairs import screening
 from tests.loops import nonempty
 from tests.results import spec
 from tests.simulated import inputs_of

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.planning.model.deformation import parallax_error
-from photostrip.triangulation.relative_orientation import six_points
+from photostrip.strip.relative_orientation import six_points
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -17,7 +17,7 @@ from photostrip.planning.screening import (
     spoiled,
     standard_pairs,
 )
-from photostrip.triangulation.relative_orientation.orientation import orient_unchecked
+from photostrip.strip.relative_orientation.orientation import orient_unchecked
 from tests.loops import nonempty
 
 F, B, A = 100.0, 60.0, 70.0

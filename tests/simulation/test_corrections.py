@@ -16,9 +16,9 @@ from photostrip.simulation.film import sheets
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import FILM as CAMERA
 from photostrip.simulation.spec import Film, Flight, Image, Spec, Terrain
-from photostrip.triangulation.image_coordinates import corrections, interior
-from photostrip.triangulation.image_coordinates.refraction import refraction_constant
-from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
+from photostrip.strip.image_coordinates import corrections, interior
+from photostrip.strip.image_coordinates.refraction import refraction_constant
+from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

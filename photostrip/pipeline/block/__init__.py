@@ -4,6 +4,6 @@ What comes in are ideal image coordinates, control, camera positions and given o
 ``results.AdjustedStrips`` with orientations, points, covariances and calibration. ``datum`` and ``start`` bring all
 strips to the ground, ``problem`` collects the observations, ``adjust`` solves and searches for gross errors,
 ``block_result`` puts the solution where the pipeline goes on, ``block_notes`` says what it says beside its numbers,
-``check_points`` has the joint errors at check points. The equations are those of ``triangulation/bundle``, see
+``check_points`` has the joint errors at check points. The equations are those of ``network``, see
 docs/bundle.md.
 """

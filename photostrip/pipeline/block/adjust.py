@@ -9,6 +9,15 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.network import defects, reliability, self_calibration, variance_components
+from photostrip.network.cofactors import cofactors_of as precision_of
+from photostrip.network.common_errors import taken_up
+from photostrip.network.correlations import Correlation, correlations
+from photostrip.network.gross_errors import snooping
+from photostrip.network.gross_errors.snooping import ScreenedBundle
+from photostrip.network.selection import LEAST_RAYS, Selection, restarted, selected, supported
+from photostrip.network.solution import BundleSolution, Cofactors
+from photostrip.network.solve import solve
 from photostrip.pipeline.block import block_result
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
@@ -19,16 +28,6 @@ from photostrip.pipeline.inputs import POLYNOMIAL, SIMILARITY, Inputs, Settings
 from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart, Bundle, SinglePhoto
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, locate
-from photostrip.triangulation.bundle.common_errors import taken_up
-from photostrip.triangulation.bundle.normal_equations import defects
-from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
-from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
-from photostrip.triangulation.bundle.quality.correlations import Correlation, correlations
-from photostrip.triangulation.bundle.selection import LEAST_RAYS, Selection, restarted, selected, supported
-from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
-from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.gross_errors.rays import snooping
-from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
 
 REFILLED = 1e-9  # metres by which targets of plan or height points may still move
 REFILLS = 3

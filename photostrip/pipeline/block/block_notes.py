@@ -6,14 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from photostrip.network import defects, reliability
+from photostrip.network.common_errors import OF_CAMERAS
+from photostrip.network.problem import BundleProblem
+from photostrip.network.settings import CALIBRATION
 from photostrip.notes import Note
 from photostrip.pipeline.results import Bundle
 from photostrip.rejection import Rejection
-from photostrip.triangulation.bundle.common_errors import OF_CAMERAS
-from photostrip.triangulation.bundle.normal_equations import defects
-from photostrip.triangulation.bundle.observations.problem import BundleProblem
-from photostrip.triangulation.bundle.quality import reliability
-from photostrip.triangulation.bundle.settings import CALIBRATION
 
 OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustment
     "bundle-proposed",

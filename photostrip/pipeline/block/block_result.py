@@ -7,12 +7,12 @@ import numpy as np
 from photostrip.arrays import Numbers, median
 from photostrip.frozen import replace
 from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.network import self_calibration
 from photostrip.pipeline.block import block_notes
 from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, Bundle, Precision, StripResult, Ties
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.bundle.quality import self_calibration
-from photostrip.triangulation.resection.resection import of_known_photos
+from photostrip.strip.resection.resection import of_known_photos
 
 
 def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFrame, bundle: Bundle) -> AdjustedStrips:

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.network.cofactors import coordinates_of, joint_cofactors
 from photostrip.pipeline.given_points import axes_of, compare_with_given
 from photostrip.pipeline.results import AdjustedStrips, Bundle
 from photostrip.points import ControlPoints
-from photostrip.triangulation.bundle.quality.cofactors import coordinates_of, joint_cofactors
-from photostrip.triangulation.error_propagation.check_errors import CheckErrors
+from photostrip.strip.error_propagation.check_errors import CheckErrors
 
 MOST_TESTED = 40  # check points that are tested together; in a block of 400 photos 60 of them take 11 % of a run
 

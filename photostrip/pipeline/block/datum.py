@@ -18,7 +18,7 @@ from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.strips.absolute import middle_frame
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
-from photostrip.triangulation import absolute_orientation
+from photostrip.strip import absolute_orientation
 
 LEAST_TIES = 3
 ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line

@@ -11,12 +11,7 @@ from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.rotation import angle_rates, from_angles
-from photostrip.pipeline import overruling
-from photostrip.pipeline.frames import GroundFrames
-from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
-from photostrip.pipeline.results import BlockProblem, BlockStart
-from photostrip.points import ControlPoints, PhotoPoints, locate
-from photostrip.triangulation.bundle.observations.problem import (
+from photostrip.network.problem import (
     AttitudeObservations,
     BundleCameras,
     BundleProblem,
@@ -25,10 +20,15 @@ from photostrip.triangulation.bundle.observations.problem import (
     PositionObservations,
     StartValues,
 )
-from photostrip.triangulation.bundle.quality.self_calibration import sigmas
-from photostrip.triangulation.bundle.selection import Selection
-from photostrip.triangulation.bundle.settings import ASKED
-from photostrip.triangulation.resection.collinearity import KnownPhotos, project
+from photostrip.network.selection import Selection
+from photostrip.network.self_calibration import sigmas
+from photostrip.network.settings import ASKED
+from photostrip.pipeline import overruling
+from photostrip.pipeline.frames import GroundFrames
+from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
+from photostrip.pipeline.results import BlockProblem, BlockStart
+from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.strip.resection.collinearity import KnownPhotos, project
 
 FAR_FROM_RAY = 5.0  # times the median: a ray of no pair that misses its point by more waits outside at first
 LEAST_FAR = 50.0  # in standard deviations

@@ -32,12 +32,12 @@ from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import BlockStart, StripResult
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.photos import FormedPhotos
+from photostrip.plausibility.photos.tied_strips import odd_ties
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
-from photostrip.triangulation.plausibility.photos.tied_strips import odd_ties
-from photostrip.triangulation.resection.closed_form import approximate
-from photostrip.triangulation.resection.collinearity import KnownPhotos
-from photostrip.triangulation.resection.ray_intersection import intersect_points
-from photostrip.triangulation.resection.resection import resect
+from photostrip.strip.resection.closed_form import approximate
+from photostrip.strip.resection.collinearity import KnownPhotos
+from photostrip.strip.resection.ray_intersection import intersect_points
+from photostrip.strip.resection.resection import resect
 
 MOST_TIES = 60  # points that hand the frame of a block to one of its strips
 

@@ -1,7 +1,7 @@
 """The plausibility gate of a run: ``gate`` gathers evidence from inputs and stages and returns findings.
 
-In come the inputs and settings of a run, or its result; out come findings (``triangulation.plausibility.KINDS``). The
-tests stand in ``triangulation.plausibility``; here is what they are asked about: ``image_evidence`` the image
+In come the inputs and settings of a run, or its result; out come findings (``plausibility.KINDS``). The
+tests stand in ``plausibility``; here is what they are asked about: ``image_evidence`` the image
 coordinates alone, ``base_directions`` the order of photos by relative orientation, ``evidence`` and ``model_evidence``
 strips formed for evidence alone and given points in them, ``given_control`` and ``given_cameras`` what is given on the
 ground, ``distance_trial`` strips formed anew with other principal distances, ``control_layout`` where control lies,

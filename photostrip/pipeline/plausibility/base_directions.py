@@ -17,8 +17,8 @@ from photostrip.errors import GeometryError
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, unusable_pairs
-from photostrip.triangulation.relative_orientation.pairs import collect_pairs
+from photostrip.strip.relative_orientation.orientation import orient_unchecked, unusable_pairs
+from photostrip.strip.relative_orientation.pairs import collect_pairs
 
 LEAST_POINTS = 6  # one more than a pair has unknowns
 PAIR_SIGMA0 = 0.01  # of a pair, over the principal distance: beyond it the base is no better known than by the layout

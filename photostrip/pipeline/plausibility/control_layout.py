@@ -18,8 +18,8 @@ from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.pipeline.plausibility import evidence
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
+from photostrip.plausibility.control import given_points, layout
 from photostrip.points import ControlPoints, concatenated
-from photostrip.triangulation.plausibility.control import given_points, layout
 
 if TYPE_CHECKING:
     from photostrip.pipeline.plausibility.model_evidence import ModelStripEvidence

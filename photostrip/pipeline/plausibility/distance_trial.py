@@ -20,12 +20,12 @@ from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.strips.stages import Stages
+from photostrip.plausibility import found
+from photostrip.plausibility.control import wrong_heights
+from photostrip.plausibility.control.wrong_heights import HeightStretch
+from photostrip.plausibility.finding import Evidence
 from photostrip.points import PhotoPoints, locate, take_rows
-from photostrip.triangulation.plausibility import found
-from photostrip.triangulation.plausibility.control import wrong_heights
-from photostrip.triangulation.plausibility.control.wrong_heights import HeightStretch
-from photostrip.triangulation.plausibility.finding import Evidence
-from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs
+from photostrip.strip.relative_orientation.pairs import Pairs, collect_pairs
 
 Compare = Callable[[EvidenceStrip], HeightStretch | None]
 

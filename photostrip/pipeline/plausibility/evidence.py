@@ -17,12 +17,12 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Settings, Strip
+from photostrip.plausibility.control.straightening import Rays, StripPoints
+from photostrip.plausibility.photos import mosaic
 from photostrip.points import ControlPoints, PhotoPoints, locate, located
-from photostrip.triangulation.image_coordinates import corrections
-from photostrip.triangulation.plausibility.control.straightening import Rays, StripPoints
-from photostrip.triangulation.plausibility.photos import mosaic
-from photostrip.triangulation.relative_orientation.orientation import Orientation, refuse_unusable
-from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs, mean_points, model_points
+from photostrip.strip.image_coordinates import corrections
+from photostrip.strip.relative_orientation.orientation import Orientation, refuse_unusable
+from photostrip.strip.strip_formation.strip import FormedStrip, form_from_pairs, mean_points, model_points
 
 if TYPE_CHECKING:
     from photostrip.pipeline.strips.stages import Stages

@@ -32,14 +32,14 @@ from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import ImageEvidence, of_images
 from photostrip.pipeline.strips.stages import Stages
+from photostrip.plausibility import accepted
+from photostrip.plausibility.photos import flight, flight_order, identity, rotations, units
 from photostrip.points import PhotoPoints, locate
-from photostrip.triangulation.plausibility import accepted
-from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations, units
 
 if TYPE_CHECKING:
+    from photostrip.network.gross_errors.shifted_photo import ShiftedPhoto
     from photostrip.pipeline.results import Result
-    from photostrip.triangulation.gross_errors.rays.shifted_photo import ShiftedPhoto
-    from photostrip.triangulation.independent_models.formation import FormedModels
+    from photostrip.strip.independent_models.formation import FormedModels
 
 STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give
 OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
@@ -65,8 +65,8 @@ def of_result(result: Result, directory: Path | None = None, made: Stages | None
     """Find what the data say against themselves, the adjustment being done; made: what strips formed anew may share."""
     from photostrip.pipeline.common_points import compared_strips  # a check has no adjusted strips
     from photostrip.pipeline.plausibility import shared_control, slips
-    from photostrip.triangulation.plausibility.control.shared_by_control import StretchedHeights
-    from photostrip.triangulation.plausibility.photos import tied_strips
+    from photostrip.plausibility.control.shared_by_control import StretchedHeights
+    from photostrip.plausibility.photos import tied_strips
 
     inputs, settings = result.inputs, result.settings
     if inputs.models is not None:
@@ -277,10 +277,10 @@ def _shifted_photos(
     result: Result, formed: Sequence[EvidenceStrip], doubted: Collection[str], made: Stages
 ) -> Iterator[Finding]:
     """Look for a photo of each strip whose image coordinates are all shifted; ``doubted`` are names of control."""
-    from photostrip.triangulation.plausibility.photos import shifted_photo  # a check forms no strips
+    from photostrip.plausibility.photos import shifted_photo  # a check forms no strips
 
     def tried(strip: EvidenceStrip, position: Numbers, about: int) -> ShiftedPhoto | None:
-        from photostrip.triangulation.gross_errors.rays.shifted_photo import (
+        from photostrip.network.gross_errors.shifted_photo import (
             shifted_photo,  # needs the bundle adjustment
         )
 

@@ -18,10 +18,10 @@ from photostrip.notes import Finding
 from photostrip.pipeline.given_points import cartesian_of, rows_of_given
 from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+from photostrip.plausibility import found
+from photostrip.plausibility.photos import flight
+from photostrip.plausibility.photos import rotations as given_angles
 from photostrip.points import ControlPoints, PhotoPoints, locate
-from photostrip.triangulation.plausibility import found
-from photostrip.triangulation.plausibility.photos import flight
-from photostrip.triangulation.plausibility.photos import rotations as given_angles
 
 LEAST_POINTS = 3  # points that carry a similarity
 LEAST_BREADTH = 0.05  # second over first extent of control, below which it says nothing of the roll

@@ -16,14 +16,14 @@ from photostrip.pipeline.inputs import Inputs, Strip
 from photostrip.pipeline.plausibility import distance_trial, evidence
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
-from photostrip.points import ControlPoints
-from photostrip.triangulation.plausibility.control import (
+from photostrip.plausibility.control import (
     given_points,
     wrong_heights,
     wrong_place,
     wrong_readings,
 )
-from photostrip.triangulation.plausibility.control.straightening import GivenPoints, StripPoints
+from photostrip.plausibility.control.straightening import GivenPoints, StripPoints
+from photostrip.points import ControlPoints
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,9 @@ from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.plausibility.base_directions import closer_look
 from photostrip.pipeline.strips.stages import Stages
+from photostrip.plausibility import accepted
+from photostrip.plausibility.photos import flight_order, units
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.plausibility import accepted
-from photostrip.triangulation.plausibility.photos import flight_order, units
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ def _photo_coordinates(
     oriented = None if photo is None else photo.interior
     observations = _on_listed_photos(inputs.observations, cameras) if photo is None else photo.observations
     if photo is None and inputs.fiducials is not None:
-        from photostrip.triangulation.image_coordinates import interior  # digital cameras need none of it
+        from photostrip.strip.image_coordinates import interior  # digital cameras need none of it
 
         try:
             oriented = interior.orient(_on_listed_photos(inputs.fiducials, cameras), cameras, settings.interior)

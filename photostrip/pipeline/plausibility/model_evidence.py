@@ -12,9 +12,9 @@ from photostrip.frozen import dataclass
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
 from photostrip.pipeline.strips.models import form_models
+from photostrip.plausibility.control.straightening import StripPoints
 from photostrip.points import ControlPoints
-from photostrip.triangulation.independent_models.formation import FormedModels
-from photostrip.triangulation.plausibility.control.straightening import StripPoints
+from photostrip.strip.independent_models.formation import FormedModels
 
 UP = np.array([0.0, 0.0, 1.0])  # of a strip of models with perspective centres
 

@@ -13,18 +13,18 @@ from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Strip
 from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
 from photostrip.pipeline.results import Result, StripResult
-from photostrip.points import ControlPoints
-from photostrip.triangulation.plausibility import found
-from photostrip.triangulation.plausibility.control.shared_by_control import (
+from photostrip.plausibility import found
+from photostrip.plausibility.control.shared_by_control import (
     Shared,
     ShiftedList,
     StretchedHeights,
     significant,
 )
-from photostrip.triangulation.plausibility.finding import ERROR, Evidence
+from photostrip.plausibility.finding import ERROR, Evidence
+from photostrip.points import ControlPoints
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.error_propagation.check_errors import CheckErrors
+    from photostrip.strip.error_propagation.check_errors import CheckErrors
 
 OTHER_PLACE = "is its crs the right one: zone, datum, false easting?"
 OTHER_HEIGHTS = "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"

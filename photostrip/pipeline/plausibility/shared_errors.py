@@ -7,12 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.notes import Finding
-from photostrip.pipeline.inputs import Inputs
-from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
-from photostrip.pipeline.plausibility.shared_control import shifted_list
-from photostrip.pipeline.results import Bundle
-from photostrip.triangulation.bundle.common_errors import (
+from photostrip.network.common_errors import (
     ALL,
     DISTANCE,
     DRIFT,
@@ -23,12 +18,17 @@ from photostrip.triangulation.bundle.common_errors import (
     SHOWN_SIGMAS,
     CommonError,
 )
-from photostrip.triangulation.bundle.observations.given_orientations import drift_columns
-from photostrip.triangulation.bundle.quality.reliability import CONTROL
-from photostrip.triangulation.bundle.quality.self_calibration import Parameter
-from photostrip.triangulation.plausibility import found
-from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList
-from photostrip.triangulation.plausibility.finding import Evidence
+from photostrip.network.given_orientations import drift_columns
+from photostrip.network.reliability import CONTROL
+from photostrip.network.self_calibration import Parameter
+from photostrip.notes import Finding
+from photostrip.pipeline.inputs import Inputs
+from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
+from photostrip.pipeline.plausibility.shared_control import shifted_list
+from photostrip.pipeline.results import Bundle
+from photostrip.plausibility import found
+from photostrip.plausibility.control.shared_by_control import ShiftedList
+from photostrip.plausibility.finding import Evidence
 
 KEY = "camera_positions.correction"
 CONTINUED = "The adjustment continued with it; `processing.self_calibration` confirms or refuses it"

@@ -21,10 +21,10 @@ from photostrip.pipeline.inputs import MeasuredModels
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.results import Result
+from photostrip.plausibility.control import given_points, point_slips
+from photostrip.plausibility.control.plan_fit import ODD_PROBABILITY
 from photostrip.points import locate
 from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
-from photostrip.triangulation.plausibility.control import given_points, point_slips
-from photostrip.triangulation.plausibility.control.plan_fit import ODD_PROBABILITY
 
 CODE = "P406"
 OF_DOUBTED_CONTROL = {"control-doubtful", "control-rejected"}  # notes

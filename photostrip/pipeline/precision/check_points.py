@@ -12,11 +12,11 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.results import StripResult
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.error_propagation import control_errors
-from photostrip.triangulation.error_propagation.check_errors import CheckErrors
-from photostrip.triangulation.error_propagation.control_errors import Misclosures
-from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
+from photostrip.strip import absolute_orientation
+from photostrip.strip.error_propagation import control_errors
+from photostrip.strip.error_propagation.check_errors import CheckErrors
+from photostrip.strip.error_propagation.control_errors import Misclosures
+from photostrip.strip.error_propagation.fitted_strip import FittedStrip
 
 MOST_TESTED = 100  # check points of a strip that are tested together, spread over it
 

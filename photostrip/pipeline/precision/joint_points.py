@@ -27,7 +27,7 @@ def joint_covariance(result: Result, rows: Numbers) -> Floats:
 
 
 def _of_bundle(result: Result, rows: Numbers, axes: Floats) -> Floats:
-    from photostrip.triangulation.bundle.quality.cofactors import coordinates_of, joint_cofactors
+    from photostrip.network.cofactors import coordinates_of, joint_cofactors
 
     if result.bundle is None:
         raise _refused("only a bundle adjustment keeps joint covariances", "set processing.adjustment to bundle")

@@ -18,13 +18,13 @@ from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.triangulation.error_propagation.check_errors import CheckErrors
-from photostrip.triangulation.error_propagation.control_errors import FitOperator
-from photostrip.triangulation.error_propagation.image_variance import variance_factor
-from photostrip.triangulation.independent_models import model_errors, model_misclosures, perspective_centers
-from photostrip.triangulation.independent_models.formation import FormedModels
-from photostrip.triangulation.independent_models.model_errors import ModelErrors
-from photostrip.triangulation.polynomial.terms import POWERS
+from photostrip.strip.error_propagation.check_errors import CheckErrors
+from photostrip.strip.error_propagation.control_errors import FitOperator
+from photostrip.strip.error_propagation.image_variance import variance_factor
+from photostrip.strip.independent_models import model_errors, model_misclosures, perspective_centers
+from photostrip.strip.independent_models.formation import FormedModels
+from photostrip.strip.independent_models.model_errors import ModelErrors
+from photostrip.strip.polynomial.terms import POWERS
 
 
 def variance_of_models(formed: FormedModels) -> tuple[float, str]:

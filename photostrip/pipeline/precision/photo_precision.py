@@ -10,10 +10,10 @@ from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
-from photostrip.triangulation.error_propagation.image_variance import image_variance
-from photostrip.triangulation.error_propagation.photo_errors import PhotoErrors, differentiate_photos
-from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+from photostrip.strip.error_propagation.fitted_strip import FittedStrip
+from photostrip.strip.error_propagation.image_variance import image_variance
+from photostrip.strip.error_propagation.photo_errors import PhotoErrors, differentiate_photos
+from photostrip.strip.error_propagation.strip_errors import StripErrors
 
 MOST_PHOTOS = 400  # of a strip fitted to its control: the work grows by the square of their number, to 1 s
 

@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.pipeline.results import Adjusted, Precision, StripResult
-from photostrip.triangulation.error_propagation.check_errors import CheckErrors
+from photostrip.strip.error_propagation.check_errors import CheckErrors
 
 AT_A_TIME = 100  # control coordinates that two strips share, looked at together
 

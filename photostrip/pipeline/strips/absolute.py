@@ -20,21 +20,21 @@ from photostrip.geometry.similarity import Similarity, similarity_derivatives
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
 from photostrip.pipeline.results import StripResult
+from photostrip.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
 from photostrip.points import ControlPoints
 from photostrip.rejection import Rejection
-from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.error_propagation import control_errors
-from photostrip.triangulation.error_propagation.control_errors import FitOperator, Misclosures
-from photostrip.triangulation.error_propagation.strip_at_control import ControlRay, StripAtControl
-from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
-from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
-from photostrip.triangulation.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
-from photostrip.triangulation.polynomial.correction import Polynomial
-from photostrip.triangulation.strip_formation.strip import FormedStrip
+from photostrip.strip import absolute_orientation
+from photostrip.strip.error_propagation import control_errors
+from photostrip.strip.error_propagation.control_errors import FitOperator, Misclosures
+from photostrip.strip.error_propagation.strip_at_control import ControlRay, StripAtControl
+from photostrip.strip.gross_errors.control import control_screening
+from photostrip.strip.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
+from photostrip.strip.gross_errors.control.control_screening import ScreenedControl
+from photostrip.strip.polynomial.correction import Polynomial
+from photostrip.strip.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.independent_models.formation import FormedModels
+    from photostrip.strip.independent_models.formation import FormedModels
 
 
 class OfStrip(Protocol):

@@ -12,7 +12,7 @@ from photostrip.pipeline.inputs import SIMILARITY, Settings
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.strips.absolute import Errors, OrientedStrip, ScreenedStrip, StripStage, on_control
 from photostrip.points import ControlPoints
-from photostrip.triangulation.polynomial import correction as polynomial
+from photostrip.strip.polynomial import correction as polynomial
 
 
 def adjust(screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:

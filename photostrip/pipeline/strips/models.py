@@ -18,18 +18,18 @@ from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.model_notes import link_notes
 from photostrip.points import ModelPoints, locate, take_rows
 from photostrip.rejection import Rejection
-from photostrip.triangulation.independent_models import (
+from photostrip.strip.independent_models import (
     link_screening,
     linking,
     model_errors,
     model_misclosures,
     perspective_centers,
 )
-from photostrip.triangulation.independent_models.formation import FormedModels, form_from_models, require_links
-from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
-from photostrip.triangulation.independent_models.linking import StripModels
-from photostrip.triangulation.independent_models.settings import LinkSettings
-from photostrip.triangulation.polynomial.correction import Polynomial
+from photostrip.strip.independent_models.formation import FormedModels, form_from_models, require_links
+from photostrip.strip.independent_models.link_screening import ScreenedLinks
+from photostrip.strip.independent_models.linking import StripModels
+from photostrip.strip.independent_models.settings import LinkSettings
+from photostrip.strip.polynomial.correction import Polynomial
 from photostrip.units import MILLIMETRES
 
 if TYPE_CHECKING:

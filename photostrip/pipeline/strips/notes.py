@@ -12,16 +12,16 @@ from photostrip.notes import Note, counted
 from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.points import PhotoPoints
 from photostrip.rejection import Rejection
-from photostrip.triangulation.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
-from photostrip.triangulation.error_propagation.weak_pairs import WEAK_PAIR, times_a_good_pair
-from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
-from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
-from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
-from photostrip.triangulation.polynomial.correction import Polynomial
-from photostrip.triangulation.relative_orientation.orientation import Orientation
-from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
-from photostrip.triangulation.resection.resection import Resection
-from photostrip.triangulation.strip_formation.strip import FormedStrip
+from photostrip.strip.absolute_orientation import WEAK_LIMIT, AbsoluteOrientation
+from photostrip.strip.error_propagation.weak_pairs import WEAK_PAIR, times_a_good_pair
+from photostrip.strip.gross_errors.control.control_rejections import EITHER, EXCHANGED
+from photostrip.strip.gross_errors.control.control_screening import ScreenedControl
+from photostrip.strip.gross_errors.pairs.screening import ScreenedPairs
+from photostrip.strip.polynomial.correction import Polynomial
+from photostrip.strip.relative_orientation.orientation import Orientation
+from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.strip.resection.resection import Resection
+from photostrip.strip.strip_formation.strip import FormedStrip
 
 # of the length that the control spans: how far points may lie beyond it. Of a polynomial they are extrapolated
 BEYOND_POLYNOMIAL = 0.1

@@ -11,6 +11,7 @@ from photostrip.arrays import Floats, Numbers, distinct, median, pieces, quantil
 from photostrip.errors import GeometryError, InputError
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
+from photostrip.network.gross_errors.strip_rays import StripRays
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.results import PhotoStages, StripResult
@@ -20,20 +21,19 @@ from photostrip.pipeline.strips.screened_formation import form_screened, with_re
 from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import PhotoPoints
 from photostrip.rejection import Rejection
-from photostrip.triangulation.error_propagation import strip_errors
-from photostrip.triangulation.error_propagation.strip_at_control import ControlRay
-from photostrip.triangulation.gross_errors.pairs import screening
-from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
-from photostrip.triangulation.polynomial.correction import Polynomial
-from photostrip.triangulation.relative_orientation.orientation import (
+from photostrip.strip.error_propagation import strip_errors
+from photostrip.strip.error_propagation.strip_at_control import ControlRay
+from photostrip.strip.gross_errors.pairs import screening
+from photostrip.strip.polynomial.correction import Polynomial
+from photostrip.strip.relative_orientation.orientation import (
     Orientation,
     RelativeSettings,
     orient_unchecked,
     refuse_unusable,
 )
-from photostrip.triangulation.relative_orientation.pairs import collect_pairs
-from photostrip.triangulation.resection.resection import Resection, resect
-from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs, without_points
+from photostrip.strip.relative_orientation.pairs import collect_pairs
+from photostrip.strip.resection.resection import Resection, resect
+from photostrip.strip.strip_formation.strip import FormedStrip, form_from_pairs, without_points
 
 Oriented = OrientedStrip[strip_errors.StripErrors]
 WithControlScreened = ScreenedStrip[strip_errors.StripErrors]

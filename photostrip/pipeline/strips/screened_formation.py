@@ -9,13 +9,13 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, distinct
 from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, replace
+from photostrip.network.gross_errors.strip_rays import StripRays
 from photostrip.rejection import SEVERAL_RAYS, Rejection
-from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
-from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_again
-from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
-from photostrip.triangulation.strip_formation import non_neighbours
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.triangulation.strip_formation.strip import (
+from photostrip.strip.relative_orientation.orientation import Orientation, orient_again
+from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.strip.strip_formation import non_neighbours
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip.strip_formation.strip import (
     NOTHING_GIVEN,
     FirstPhoto,
     FormedStrip,
@@ -53,7 +53,7 @@ def form_screened(
     formed = form_from_pairs(of_pairs, settings, photos, rays.sigma, first=first, point_weight=point_weight)
     if of_pairs.used.all() and formed.junctions.used.all():
         return ScreenedFormation(of_pairs, formed, ())
-    from photostrip.triangulation.gross_errors.rays.strip_network import wrong_rays  # needs the bundle adjustment
+    from photostrip.network.gross_errors.strip_network import wrong_rays  # needs the bundle adjustment
 
     found = wrong_rays(of_pairs, formed, rays)
     if found is None:

@@ -18,7 +18,7 @@ from photostrip.errors import GeometryError
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.planning.model.element_errors import influence, measured_covariance
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
-from photostrip.triangulation.relative_orientation import six_points
+from photostrip.strip.relative_orientation import six_points
 
 DEFORMATION_TERMS = ("E0", "A", "B", "C", "D")
 LEAST_POINTS = 5

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.triangulation.relative_orientation import six_points
+from photostrip.strip.relative_orientation import six_points
 
 ELEMENTS = ("dby", "dbz", "dkappa", "dalpha", "domega")
 FREE = ("dkappa", "dbz", "dalpha2", "domega")  # dalpha2: the turn against the base, dalpha - dbz / b

@@ -15,11 +15,11 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.notes import counted
 from photostrip.points import PhotoPoints
 from photostrip.simulation import Control, Flight, Ground, Image, Points, Simulation, Spec, Terrain, simulate
-from photostrip.triangulation.error_propagation.strip_errors import StripErrors, differentiate_strip
-from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_pairs
-from photostrip.triangulation.relative_orientation.pairs import collect_pairs
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs
+from photostrip.strip.error_propagation.strip_errors import StripErrors, differentiate_strip
+from photostrip.strip.relative_orientation.orientation import Orientation, orient_pairs
+from photostrip.strip.relative_orientation.pairs import collect_pairs
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.strip.strip_formation.strip import FormedStrip, form_from_pairs
 
 SAME = 1e-6  # of a base: a point this near to the nadir of a photo belongs to its column
 LEAST_PHOTOS = 3

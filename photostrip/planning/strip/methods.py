@@ -13,19 +13,19 @@ from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geodesy.tying import tie_frames
+from photostrip.network import problem as bundle
+from photostrip.network.cofactors import cofactors_of as bundle_precision
+from photostrip.network.solve import solve
 from photostrip.notes import counted
 from photostrip.planning.strip.control_layout import USES, ControlLayout, Spot, Triple, numbers_of
 from photostrip.planning.strip.ideal_strip import IdealStrip
 from photostrip.points import ControlPoints
-from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.bundle.observations import problem as bundle
-from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as bundle_precision
-from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.error_propagation import control_errors
-from photostrip.triangulation.error_propagation.fitted_strip import FittedStrip
-from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
-from photostrip.triangulation.polynomial import correction
-from photostrip.triangulation.polynomial import terms as polynomial_terms
+from photostrip.strip import absolute_orientation
+from photostrip.strip.error_propagation import control_errors
+from photostrip.strip.error_propagation.fitted_strip import FittedStrip
+from photostrip.strip.gross_errors.pairs.screening import DETECTABLE
+from photostrip.strip.polynomial import correction
+from photostrip.strip.polynomial import terms as polynomial_terms
 
 SIMILARITY, BUNDLE = "similarity", "bundle"
 DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}

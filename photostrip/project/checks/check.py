@@ -39,7 +39,7 @@ from photostrip.project.checks.table_rows import gaps_of, observations_used, tab
 from photostrip.project.loading import Project, read_project
 from photostrip.project.tables import Tables
 from photostrip.project.yaml.tree import fault_at
-from photostrip.triangulation.image_coordinates import corrections
+from photostrip.strip.image_coordinates import corrections
 from photostrip.units import MILLIMETRES
 
 LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
@@ -169,7 +169,7 @@ def _neighbours(project: Project) -> list[Fault]:
 
 def _pairs(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
     """Refuse neighbouring photos with too few common points for their relative orientation."""
-    from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+    from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
 
     for i, (strip, count) in enumerate(zip(project.inputs.strips, common, strict=True)):
         for j in np.flatnonzero(count[: len(strip.photos) - 1] < MINIMUM_POINTS).tolist():

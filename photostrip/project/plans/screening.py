@@ -22,7 +22,7 @@ from photostrip.project.schema.values import (
     choice,
     one_of,
 )
-from photostrip.triangulation.relative_orientation.orientation import SCREENINGS
+from photostrip.strip.relative_orientation.orientation import SCREENINGS
 
 MICROMETRES = 1000.0  # in a millimetre
 USUAL = ScreeningSpec()

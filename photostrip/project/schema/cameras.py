@@ -2,6 +2,7 @@
 
 from typing import Annotated
 
+from photostrip.network.settings import ASKED
 from photostrip.project.schema.ground import Angles
 from photostrip.project.schema.sections import Before, Length, Read, Rule, Section, key, wrong
 from photostrip.project.schema.values import (
@@ -16,8 +17,7 @@ from photostrip.project.schema.values import (
     quoted,
     single,
 )
-from photostrip.triangulation.bundle.settings import ASKED
-from photostrip.triangulation.image_coordinates.certificate import PLACES
+from photostrip.strip.image_coordinates.certificate import PLACES
 
 Place = Annotated[str, choice(tuple(PLACES))]
 Parameter = Annotated[str, choice(ASKED)]

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
+from photostrip.network.settings import ASKED, SCREENINGS, TESTS
 from photostrip.pipeline.inputs import ADJUSTMENTS, Settings
 from photostrip.project.schema.cameras import AUTO, SelfCalibration
 from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong
@@ -25,11 +26,10 @@ from photostrip.project.schema.values import (
     if_empty,
     quoted,
 )
-from photostrip.triangulation.bundle.settings import ASKED, SCREENINGS, TESTS
-from photostrip.triangulation.independent_models.settings import METHODS as LINK_METHODS
-from photostrip.triangulation.polynomial.correction import DEGREES
-from photostrip.triangulation.relative_orientation.orientation import SCREENINGS as RELATIVE_SCREENINGS
-from photostrip.triangulation.strip_formation.scale_transfer import INTERSECTIONS, SCALE_TRANSFERS
+from photostrip.strip.independent_models.settings import METHODS as LINK_METHODS
+from photostrip.strip.polynomial.correction import DEGREES
+from photostrip.strip.relative_orientation.orientation import SCREENINGS as RELATIVE_SCREENINGS
+from photostrip.strip.strip_formation.scale_transfer import INTERSECTIONS, SCALE_TRANSFERS
 
 DEFAULTS = Settings()
 

@@ -4,13 +4,13 @@ from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
+from photostrip.plausibility import KINDS
 from photostrip.project.schema.cameras import Camera, Strip
 from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
 from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
 from photostrip.project.schema.processing import Processing
 from photostrip.project.schema.sections import Before, Length, Read, Section, key, wrong
 from photostrip.project.schema.values import Positive, Words, if_empty, schema_number, single, text
-from photostrip.triangulation.plausibility import KINDS
 
 SCHEMA_NUMBER = 1
 _read_schema_number = schema_number("photostrip", SCHEMA_NUMBER)

@@ -11,6 +11,8 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, median
 from photostrip.frozen import NamedTuple, as_dict
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.network import reliability
+from photostrip.network.settings import BundleSettings
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result
 from photostrip.rejection import UNCONTROLLED
@@ -18,12 +20,10 @@ from photostrip.result.numbers import PER_RADIAN, rms
 from photostrip.result.points.photos import ImageResiduals
 from photostrip.result.quantities import grouped, record, records
 from photostrip.result.records import Records, as_records
-from photostrip.triangulation.bundle.quality import reliability
-from photostrip.triangulation.bundle.settings import BundleSettings
 from photostrip.units import MICROMETRES
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.network.problem import BundleProblem
 
 OBSERVED = (reliability.IMAGE, reliability.CONTROL, reliability.POSITION, reliability.ATTITUDE)
 SHOWN = 10  # observations named as the weakest and as the worst

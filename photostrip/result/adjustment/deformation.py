@@ -15,7 +15,7 @@ from photostrip.pipeline.results import Result, StripResult
 from photostrip.planning.model.deformation import LEAST_POINTS, Paraboloid, determines_paraboloid, fit_paraboloid
 from photostrip.result.quantities import record
 from photostrip.statistics import t_p_value
-from photostrip.triangulation.absolute_orientation import Targets
+from photostrip.strip.absolute_orientation import Targets
 from photostrip.units import ARCSECONDS, MILLIMETRES
 
 LEVEL = 0.05  # of all tests together

@@ -67,11 +67,11 @@ def links_of(result: Result) -> list[Document]:
 
 
 def _links(result: Result, strip: StripResult) -> list[Document]:
-    from photostrip.triangulation.independent_models.link_screening import detectable  # strips of photos need none
+    from photostrip.strip.independent_models.link_screening import detectable  # strips of photos need none
 
     formed, names = strip.of_models.formed, strip.of_models.strip.models
     links, models, shared, solved = formed.links, formed.models, formed.links.shared, formed.links.solved
-    from photostrip.triangulation.independent_models.model_errors import far_ends
+    from photostrip.strip.independent_models.model_errors import far_ends
 
     gap, far, smallest, found = discrepancies(strip), far_ends(formed), detectable(shared, links), []
     for number in range(shared.count):

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
+from photostrip.network.gross_errors.ray_log import START
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result, StripResult
 from photostrip.points import PhotoPoints
@@ -16,10 +17,9 @@ from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import names_of
 from photostrip.result.numbers import Plain, natural, natural_rank, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record, records
-from photostrip.triangulation.gross_errors.control.control_rejections import EITHER, EXCHANGED
-from photostrip.triangulation.gross_errors.rays.ray_log import START
-from photostrip.triangulation.strip_formation.scale_transfer import depths
-from photostrip.triangulation.strip_formation.strip import model_points
+from photostrip.strip.gross_errors.control.control_rejections import EITHER, EXCHANGED
+from photostrip.strip.strip_formation.scale_transfer import depths
+from photostrip.strip.strip_formation.strip import model_points
 from photostrip.units import MICROMETRES
 
 ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity

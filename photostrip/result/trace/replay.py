@@ -13,9 +13,9 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
-from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs
-from photostrip.triangulation.relative_orientation.solution import iterate_elements, solve_elements, start_values
+from photostrip.strip import absolute_orientation
+from photostrip.strip.relative_orientation.pairs import Pairs, collect_pairs
+from photostrip.strip.relative_orientation.solution import iterate_elements, solve_elements, start_values
 
 if TYPE_CHECKING:  # single steps need none of it
     from photostrip.pipeline.results import Result, StripResult

@@ -10,11 +10,11 @@ import pytest
 
 from benchmarks.variance_components import TRUE, factors
 from photostrip.errors import GeometryError
+from photostrip.network import reliability
+from photostrip.network.solve import solve
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
-from photostrip.triangulation.bundle.quality import reliability
-from photostrip.triangulation.bundle.solve import solve
 from tests.loops import nonempty
 from tests.pipeline.blocks import adjusted, corners, errors, positions, simulate, with_control
 from tests.simulated import inputs_of, settings_of

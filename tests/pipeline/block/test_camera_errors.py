@@ -10,9 +10,9 @@ import pytest
 from scipy.stats import chi2, norm
 
 from photostrip.camera import Distortion
+from photostrip.network.camera_errors import log_probability, log_probability_of_worst
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import FILM, Control, Flight, GrossError, Points, Spec, simulate
-from photostrip.triangulation.bundle.camera_errors import log_probability, log_probability_of_worst
 from tests.pipeline.blocks import errors
 from tests.simulated import inputs_of, settings_of
 

@@ -11,8 +11,8 @@ import pytest
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.network.defects import GROWN, LOOSE
 from photostrip.simulation import Control, Flight, Ground, Spec, Terrain
-from photostrip.triangulation.bundle.normal_equations.defects import GROWN, LOOSE
 from tests.loops import nonempty
 from tests.pipeline.blocks import adjusted, errors, orientations, photos_of, positions, simulate, with_control
 from tests.simulated import inputs_of

@@ -18,10 +18,10 @@ from photostrip.pipeline.strips.models import form_models, link_strip
 from photostrip.report.sections.accuracy_report import sections_of
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Models, Points, Spec, simulate
-from photostrip.triangulation.error_propagation import strip_at_control
-from photostrip.triangulation.independent_models import model_errors, perspective_centers
-from photostrip.triangulation.independent_models.settings import LinkSettings
-from photostrip.triangulation.polynomial import correction
+from photostrip.strip.error_propagation import strip_at_control
+from photostrip.strip.independent_models import model_errors, perspective_centers
+from photostrip.strip.independent_models.settings import LinkSettings
+from photostrip.strip.polynomial import correction
 from tests.draws import orthogonal_normal
 from tests.loops import nonempty
 from tests.models import inputs, truth
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import ModelPoints
-    from photostrip.triangulation.independent_models.formation import FormedModels
+    from photostrip.strip.independent_models.formation import FormedModels
 
     Floats = NDArray[np.float64]
 

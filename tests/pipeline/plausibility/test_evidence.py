@@ -12,8 +12,8 @@ from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 
 if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Strip
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
-    from photostrip.triangulation.strip_formation.strip import FormedStrip
+    from photostrip.strip.relative_orientation.orientation import Orientation
+    from photostrip.strip.strip_formation.strip import FormedStrip
 
 
 def test_the_depth_is_the_height_above_the_mean_of_the_points_of_a_model() -> None:

@@ -17,10 +17,15 @@ from photostrip.cli.main import main
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output.simulation import project_files
 from photostrip.geometry.rotation import angles
+from photostrip.network.gross_errors import shifted_photo
+from photostrip.network.solve import solve
 from photostrip.pipeline.inputs import GivenOrientations, Settings, Strip
 from photostrip.pipeline.plausibility import distance_trial, evidence, gate, image_evidence
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.stages import Stages
+from photostrip.plausibility import KINDS
+from photostrip.plausibility.control.straightening import StripPoints
+from photostrip.plausibility.photos import flight_order
 from photostrip.points import PhotoPoints
 from photostrip.simulation import (
     DIGITAL,
@@ -35,12 +40,7 @@ from photostrip.simulation import (
     Terrain,
     simulate,
 )
-from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.gross_errors.rays import shifted_photo
-from photostrip.triangulation.image_coordinates.corrections import undistort
-from photostrip.triangulation.plausibility import KINDS
-from photostrip.triangulation.plausibility.control.straightening import StripPoints
-from photostrip.triangulation.plausibility.photos import flight_order
+from photostrip.strip.image_coordinates.corrections import undistort
 from tests.pipeline.blocks import positions
 from tests.results import write_project
 from tests.simulated import inputs_of, settings_of
@@ -51,11 +51,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.network.problem import BundleProblem
+    from photostrip.network.solution import BundleSolution
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Inputs
     from photostrip.simulation import Simulation
-    from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.solution import BundleSolution
 
     Floats = NDArray[np.float64]
 

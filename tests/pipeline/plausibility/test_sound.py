@@ -19,9 +19,9 @@ from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
+    from photostrip.plausibility.control.straightening import StripPoints
+    from photostrip.plausibility.control.wrong_readings import Reading
     from photostrip.simulation import Simulation
-    from photostrip.triangulation.plausibility.control.straightening import StripPoints
-    from photostrip.triangulation.plausibility.control.wrong_readings import Reading
 
 BLOCK = Spec(
     seed=4, flight=Flight(photos=6, strips=4, side_lap_percent=40.0), control=Control(per_band=1, check=4), gnss=Gnss()

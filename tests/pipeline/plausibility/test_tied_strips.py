@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from photostrip.pipeline.run import triangulate
+from photostrip.plausibility.photos.tied_strips import TiesOfStrips, find_shared_ids_of_strips
 from photostrip.simulation import Control, Flight, GrossError, Points, Spec
 from photostrip.simulation.simulation import simulate
-from photostrip.triangulation.plausibility.photos.tied_strips import TiesOfStrips, find_shared_ids_of_strips
 from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
 

@@ -13,7 +13,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.precision import photo_precision
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, Image, Points, Spec, simulate
-from photostrip.triangulation.polynomial import correction
+from photostrip.strip.polynomial import correction
 from tests.derivatives import UNSCREENED, oriented_of
 from tests.simulated import inputs_of
 

@@ -10,10 +10,10 @@ import pytest
 from scipy.stats import chi2
 
 from photostrip.pipeline.precision.model_precision import variance_of_models
-from photostrip.triangulation.error_propagation.image_variance import A_POSTERIORI, A_PRIORI, SIGMA_LEVEL
+from photostrip.strip.error_propagation.image_variance import A_POSTERIORI, A_PRIORI, SIGMA_LEVEL
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.independent_models.formation import FormedModels
+    from photostrip.strip.independent_models.formation import FormedModels
 
 
 @pytest.mark.parametrize("redundancy", [1, 2, 30])

@@ -25,7 +25,7 @@ from photostrip.planning.model.deformation import (
     surface_of_elements,
 )
 from photostrip.planning.model.plan import source_example
-from photostrip.triangulation.relative_orientation import six_points
+from photostrip.strip.relative_orientation import six_points
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import ground_errors, orientation_factors, relative_differentials
 from tests.vectors import cases

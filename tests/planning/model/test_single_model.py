@@ -29,7 +29,7 @@ from photostrip.planning.model.single_model import (
     orientation_operator,
     parameter_rows,
 )
-from photostrip.triangulation.relative_orientation import six_points
+from photostrip.strip.relative_orientation import six_points
 from tests.draws import orthogonal_normal
 from tests.planning.formulas import intersected, orientation_parameters, six_point_variances
 from tests.vectors import cases

@@ -17,7 +17,7 @@ from photostrip.planning.strip.ideal_strip import StripGeometry, ideal_strip
 from photostrip.planning.strip.methods import BUNDLE, METHODS, SIMILARITY, accuracy
 from photostrip.planning.strip.placement import Demand, Placement, best_places, equal_ways, worst
 from photostrip.simulation import FILM, Points
-from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
+from photostrip.strip.gross_errors.pairs.screening import DETECTABLE
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from photostrip.notes import Document
 from photostrip.planning.screening import ARC_MINUTES, MethodOutcome, ScreeningOutcome
 from photostrip.result.numbers import micrometres, rounded
-from photostrip.triangulation.relative_orientation.solution import ELEMENTS
+from photostrip.strip.relative_orientation.solution import ELEMENTS
 
 PERCENT, COUNT, MINUTES = 1, 3, 2  # decimals
 

@@ -1,0 +1,205 @@
+"""Cofactors of everything that was adjusted: of single points, photos and residuals, and joint ones.
+
+With Z the inverse of the photos' part of the normal matrix, W = Z times the border and K the cofactors of the common
+parameters, the inverse is that without common parameters and E K E', E what a common parameter does to everything else:
+-W to the photos, M W - V^-1 B'C to the points. The photos of a point lie within the band, where the elements of Z are
+known; with M = V^-1 B'A of each ray, A and B its derivatives by photo and point, V the normal matrix of the point, the
+cofactors of a point are V^-1 + sum M_i Z_ij M_j', those between its photos and it -sum Z_ij M_j'.
+"""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.frozen import dataclass
+from photostrip.network import datum
+from photostrip.network.given_orientations import LinearisedOrientations
+from photostrip.network.normal_equations import FactoredEquations
+from photostrip.network.rays import PHOTO
+from photostrip.network.solution import BundleSolution, Cofactors
+
+
+def cofactors_of(solution: BundleSolution, *, rough: bool = False) -> Cofactors:
+    """Cofactors of all parameters and residuals; ``bundle-rank`` when the normal matrix is singular at the solution.
+
+    rough: leave points and photos of a free network in the datum of its band, which no residual feels.
+    """
+    prepared, found = solution.prepared, solution.factored
+    problem, at, p = prepared.problem, found.equations.linearised, len(solution.common)
+    m, q = problem.photos, problem.points
+    inverse, rank = found.inverse, prepared.rank
+    photos = inverse.blocks(rank, rank)
+    points, cross = _of_points(solution)
+
+    # what common parameters do to everything else
+    to_photos = -found.cross.reshape(m, PHOTO, p)
+    back = found.equations.common_points.toarray() - found.equations.carried.T @ found.cross
+    to_points = -(found.equations.root.swapaxes(1, 2) @ back.reshape(q, 3, p))
+    by_photo, by_point, image = at.rays.by_photo, at.rays.by_point, problem.images
+    to_rays = by_photo @ to_photos[image.photo] + by_point @ to_points[image.point]
+    to_rays[..., : len(prepared.calibrated)] += at.rays.by_common.toarray().reshape(len(image), 2, -1)
+    half = by_photo @ cross @ by_point.swapaxes(1, 2)
+    of_rays = np.eye(2) - by_photo @ photos[image.photo] @ by_photo.swapaxes(1, 2) - half - half.swapaxes(1, 2)
+    of_rays -= by_point @ points[image.point] @ by_point.swapaxes(1, 2)
+    of_rays -= to_rays @ found.common @ to_rays.swapaxes(1, 2)
+    points = points + to_points @ found.common @ to_points.swapaxes(1, 2)
+    of_photos = np.empty((m, PHOTO + p, PHOTO + p))
+    of_photos[:, :PHOTO, :PHOTO] = photos + to_photos @ found.common @ to_photos.swapaxes(1, 2)
+    of_photos[:, :PHOTO, PHOTO:] = to_photos @ found.common
+    of_photos[:, PHOTO:, :PHOTO] = of_photos[:, :PHOTO, PHOTO:].swapaxes(1, 2)
+    of_photos[:, PHOTO:, PHOTO:] = found.common
+    positions, attitudes = (_given(each, of_photos) for each in (at.positions, at.attitudes))
+    if solution.free and not rough:
+        points, of_photos = _inner(solution, points, of_photos)
+    points[~prepared.measured] = np.nan
+    turn = _turns(solution.rotations)
+    weights = prepared.prior**-2.0
+    return Cofactors(
+        points=points,
+        photos=turn @ of_photos[:, :PHOTO, :PHOTO] @ turn.swapaxes(1, 2),
+        common=found.common,
+        image_residuals=of_rays * (image.sigma[:, :, None] * image.sigma[:, None, :]),
+        control_residuals=_control(solution, points),
+        position_residuals=positions,
+        attitude_residuals=attitudes,
+        common_residuals=np.where(weights > 0.0, prepared.prior**2 - np.diag(found.common), 0.0),
+        photo_common=turn @ of_photos[:, :PHOTO, PHOTO:],
+    )
+
+
+def _of_points(solution: BundleSolution) -> tuple[Floats, Floats]:
+    """Cofactors of points (q, 3, 3) and between the photo of each ray and its point (n, 6, 3), common ones held."""
+    found, prepared = solution.factored, solution.prepared
+    rays, inverse = found.equations.linearised.rays, found.inverse
+    inner = found.equations.root.swapaxes(1, 2) @ found.equations.root
+    share = rays.by_photo.swapaxes(1, 2) @ (rays.by_point @ inner[prepared.problem.images.point])  # (n, 6, 3): M'
+    points, cross = inner.copy(), np.empty_like(share)
+    for near in prepared.near:
+        u, s = len(near.photos), len(near.points)
+        row, column = near.photos[:, None], near.photos[None, :]
+        held = inverse.holds(row, column)  # others share no point
+        blocks = np.where(held[..., None, None], inverse.blocks(row, np.where(held, column, row)), 0.0)
+        pull = np.zeros((u, PHOTO, s, 3))
+        pull[near.photo, :, near.point] = share[near.ray]
+        carried = blocks.swapaxes(1, 2).reshape(PHOTO * u, -1) @ pull.reshape(PHOTO * u, -1)
+        carried = carried.reshape(u, PHOTO, s, 3)
+        cross[near.ray] = -carried[near.photo, :, near.point]
+        points[near.points] += np.einsum("upsi,upsj->sij", pull, carried)
+    return points, cross
+
+
+def _control(solution: BundleSolution, points: Floats) -> Floats:
+    """Cofactors of the residuals of control, along its axes."""
+    control = solution.prepared.problem.control
+    found = -control.axes @ points[control.point] @ control.axes.swapaxes(1, 2)
+    found[:, range(3), range(3)] += np.where(np.isfinite(control.sigma), control.sigma, 0.0) ** 2
+    return found
+
+
+def _given(linear: LinearisedOrientations, of_photos: Floats) -> Floats:
+    """Cofactors of the residuals of camera positions or attitudes."""
+    partials = np.concatenate([linear.by_photo, linear.by_common], axis=2)
+    found: Floats = -partials @ of_photos[linear.photo] @ partials.swapaxes(1, 2)
+    with np.errstate(divide="ignore"):
+        found[:, range(3), range(3)] += np.where(linear.weight > 0.0, linear.weight**-2.0, 0.0)
+    return found
+
+
+def _turns(rotations: Floats) -> Floats:
+    """Turn steps of photos in their own axes into the Cartesian frame: matrices (m, 6, 6)."""
+    turn = np.zeros((len(rotations), PHOTO, PHOTO))
+    turn[:, :3, :3] = turn[:, 3:, 3:] = rotations
+    return turn
+
+
+def _inner(solution: BundleSolution, points: Floats, of_photos: Floats) -> tuple[Floats, Floats]:
+    """Carry cofactors of points and photos (with common parameters) over to inner constraints on the points.
+
+    With G the generators of the similarity, E the choice of the points, H = (G'EG)^-1 and P = Q E G H: the cofactors
+    are Q - G P' - P G' + G (H G'E P) G'.
+    """
+    state, m, p = solution.state, len(of_photos), len(solution.common)
+    origin, moves = datum.point_generators(solution.prepared, state)
+    flat = moves.reshape(-1, datum.DEFECT)
+    inverse = np.asarray(np.linalg.inv(flat.T @ flat), float)
+    swept = solution.factored.solved_for_points(flat)
+    middle = inverse @ (flat.T @ swept.points) @ inverse
+    found = points + _carried_over(moves, (swept.points @ inverse).reshape(moves.shape), middle)
+    turned = np.zeros((m, PHOTO + p, datum.DEFECT))
+    turned[:, :PHOTO] = datum.photo_generators(state, origin)
+    shared = np.broadcast_to(swept.common, (m, p, datum.DEFECT))
+    own = np.concatenate([swept.photos.reshape(m, PHOTO, -1), shared], axis=1) @ inverse
+    return found, of_photos + _carried_over(turned, own, middle)
+
+
+def _carried_over(moves: Floats, swept: Floats, middle: Floats) -> Floats:
+    """Give G M G' - G P' - P G'."""
+    product = moves @ swept.swapaxes(1, 2)
+    return np.asarray(moves @ middle @ moves.swapaxes(1, 2) - product - product.swapaxes(1, 2))
+
+
+def joint_cofactors(solution: BundleSolution, functions: csr_array) -> Floats:
+    """Joint cofactors (k, k) of k linear functions (k, 3 q) of the points' coordinates; not of a free network.
+
+    With F the functions and L L' the normal matrices of the points: F L^-T L^-1 F' + G Q G', where G = F L^-T T' and Q
+    are the cofactors of photos and common parameters.
+    """
+    found = solution.factored
+    white = found.equations.roots @ functions.T
+    by_photos = (found.equations.carried @ white).toarray()
+    by_common = (found.equations.common_points.T @ white).toarray()
+    photos, common = found.shared(by_photos, by_common)
+    joint = by_photos.T @ photos + by_common.T @ common + (white.T @ white).toarray()
+    return np.asarray(0.5 * (joint + joint.T), float)
+
+
+def coordinates_of(solution: BundleSolution, points: Numbers) -> csr_array:
+    """Functions (3 k, 3 q) that are the coordinates of k points."""
+    columns = (3 * points[:, None] + np.arange(3)).ravel()
+    shape = (len(columns), 3 * len(solution.points))
+    return csr_array((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=shape)
+
+
+@dataclass(frozen=True, eq=False)
+class JointCofactors:
+    """Joint cofactors of several photos; of a free network in some datum, which nothing feels that can be observed."""
+
+    factored: FactoredEquations
+    rotations: Floats  # (m, 3, 3): photo to Cartesian frame
+
+    @classmethod
+    def of_solution(cls, solution: BundleSolution) -> Self:
+        return cls(solution.factored, solution.rotations)
+
+    def of(self, photos: Numbers, partials: Floats) -> Floats:
+        """Joint cofactors (g, k c, k c) of c functions of each of k photos, in g sets of photos (g, k).
+
+        partials: (g, k, c, 6): by shift (m) and rotation vector (rad) of the photo in the Cartesian frame.
+        """
+        (g, k, c, _), found = partials.shape, self.factored
+        inner = partials @ _turns(self.rotations)[photos]
+        half = inner @ self._blocks(found.equations.prepared.rank[photos]).swapaxes(2, 3).reshape(g, k, PHOTO, -1)
+        whole = half.reshape(g, k * c, k, PHOTO).swapaxes(1, 2) @ inner.swapaxes(2, 3)
+        joint = whole.swapaxes(1, 2).reshape(g, k * c, -1)
+        cross = (inner @ found.cross.reshape(len(self.rotations), PHOTO, -1)[photos]).reshape(g, k * c, -1)
+        return np.asarray(joint + cross @ found.common @ cross.swapaxes(1, 2), float)
+
+    def _blocks(self, sets: Numbers) -> Floats:
+        """Blocks (g, k, k, 6, 6) of Z between the photos of sets (g, k) of places in the band."""
+        inverse, factor = self.factored.inverse, self.factored.band
+        row, column = np.broadcast_arrays(sets[:, :, None], sets[:, None, :])
+        near = inverse.holds(row, column)
+        if near.all():
+            return inverse.blocks(row, column)
+        found = np.empty((*row.shape, PHOTO, PHOTO))
+        found[near] = inverse.blocks(row[near], column[near])
+        far, m = distinct(column[~near]), factor.size // PHOTO
+        unit = np.zeros((m, PHOTO, len(far), PHOTO))
+        unit[far, :, np.arange(len(far))] = np.eye(PHOTO)
+        solved = factor.solve(unit.reshape(m * PHOTO, -1)).reshape(unit.shape)
+        found[~near] = solved[row[~near], :, np.searchsorted(far, column[~near])]
+        return found

@@ -1,0 +1,112 @@
+"""Decisions on many rays at once, in columns: points with as many rays and given coordinates are linearised together.
+
+Source: derived; ``point_decisions`` decides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.frozen import dataclass
+from photostrip.network.cofactors import JointCofactors
+from photostrip.network.gross_errors.point_decisions import (
+    AGREE,
+    Decisions,
+    PointRays,
+    alike,
+    decide,
+    without_place,
+)
+from photostrip.network.problem import BundleProblem
+from photostrip.network.reliability import Limit
+from photostrip.network.selection import LEAST_RAYS, Selection
+from photostrip.network.self_calibration import image_shift
+from photostrip.network.solution import BundleSolution
+from photostrip.strip.resection.collinearity import KnownPhotos, derivatives, project
+from photostrip.strip.resection.ray_intersection import two_that_meet
+
+
+@dataclass(frozen=True, eq=False)
+class Adjusted:
+    """An adjustment by which rays are decided on."""
+
+    problem: BundleProblem  # with all observations
+    selection: Selection  # which of them took part
+    control: Flags  # (c, 3): given coordinates that count
+    solution: BundleSolution
+    joint: JointCofactors
+
+
+@dataclass(frozen=True, eq=False)
+class RayDecisions:
+    """What was decided about rays."""
+
+    row: Numbers  # (n,): rows of the observations, the rays of a point side by side
+    # place, rays: (n,): which of the points it is, and how many rays of it were decided on
+    place: Numbers
+    rays: Numbers
+    out: Flags  # (n,): that must not be used
+    cause: Numbers  # (n,): of the point, place in ``CAUSES``
+    value: Floats  # (n,): largest standardised residual of a coordinate of the point
+    size: Floats  # (n, 2): estimated errors of the coordinates in standard deviations; NaN where nothing can be said
+
+
+def decide_rays(adjusted: Adjusted, row: Numbers, xyz: Floats, limit: Limit) -> RayDecisions:
+    """Decide on rays, given by point and photo, of points linearised at places near them (m, 3).
+
+    What of these places is NaN becomes where the rays meet.
+    """
+    problem = adjusted.problem
+    point = problem.images.point[row]
+    numbers = distinct(point)
+    first = np.searchsorted(point, numbers)
+    rays = np.diff(first, append=len(row))
+    given, axis = np.nonzero(adjusted.control & np.isfinite(problem.control.sigma))
+    owner = problem.control.point[given]
+    by_owner = np.argsort(owner, kind="stable")
+    known, first_known = (
+        np.bincount(owner, minlength=problem.points)[numbers],
+        np.searchsorted(owner[by_owner], numbers),
+    )
+    n = len(row)
+    out, cause, value, size = np.zeros(n, bool), np.full(n, AGREE), np.zeros(n), np.full((n, 2), np.nan)
+    for some in alike(rays, known):
+        at = first[some, None] + np.arange(rays[some[0]])
+        of_control = by_owner[first_known[some, None] + np.arange(known[some[0]])]
+        place = xyz[some]
+        decided = _decided(adjusted, row[at], (given[of_control], axis[of_control]), place, limit)
+        xyz[some], out[at], size[at] = place, decided.out, decided.size
+        cause[at], value[at] = decided.cause[:, None], decided.value[:, None]
+    of_point = np.repeat(np.arange(len(numbers)), rays)
+    return RayDecisions(row=row, place=of_point, rays=rays[of_point], out=out, cause=cause, value=value, size=size)
+
+
+def _decided(adjusted: Adjusted, rows: Numbers, given: tuple[Numbers, Numbers], xyz: Floats, limit: Limit) -> Decisions:
+    """Decide on the r rays (m, r) of each of m points with as many given coordinates."""
+    problem, solution = adjusted.problem, adjusted.solution
+    images, control, cameras = problem.images, problem.control, problem.cameras
+    photos = KnownPhotos(solution.centers, solution.rotations, cameras.focal[cameras.of_photo])
+    (m, r), photo, sigma = rows.shape, images.photo[rows], images.sigma[rows][..., None]
+    flat, own = images.xy[rows].reshape(-1, 2), photo.ravel()
+    xy = (flat + image_shift(problem, solution.common, flat, own)).reshape(m, r, 2)
+    if r >= LEAST_RAYS and (nowhere := np.isnan(xyz[:, 0])).any():
+        xyz[nowhere] = two_that_meet(xy[nowhere], sigma[nowhere, :, :, 0], photo[nowhere], photos)
+    place = np.repeat(xyz, r, axis=0)
+    by_photo, by_point = (each.reshape(m, r, 2, -1) for each in derivatives(place, photos, own))
+    off = xy - project(place, photos, own).reshape(m, r, 2)
+    sound = np.asarray(np.isfinite(np.concatenate([off[..., None], by_photo], axis=3)).all(axis=(1, 2, 3)))
+    for each in (off, by_photo, by_point):
+        each[~sound] = 0.0
+    spread, axes = control.sigma[given], control.axes[given]
+    of_photos = np.zeros((m, 2 * r + spread.shape[1], 2 * r + spread.shape[1]))
+    of_photos[:, : 2 * r, : 2 * r] = adjusted.joint.of(photo, by_photo / sigma)
+    to_given = np.einsum("mci,mci->mc", axes, control.xyz[given[0]] - xyz[:, None]) / spread
+    rays = PointRays(
+        rays=r,
+        misfit=np.hstack([(off / sigma[..., 0]).reshape(m, -1), np.where(sound[:, None], to_given, 0.0)]),
+        by_point=np.hstack([(by_point / sigma).reshape(m, -1, 3), axes / spread[..., None]]),
+        of_photos=of_photos,
+        inside=np.hstack([np.repeat(adjusted.selection.images[rows], 2, axis=1), adjusted.selection.control[given]]),
+    )
+    return without_place(decide(rays, limit), ~sound)

@@ -1,0 +1,465 @@
+"""The search for gross errors in an adjustment of rays: test, take the worst out, adjust again, take back what fits.
+
+The adjustment is a bundle: the free network of one strip, or a block with its control and camera positions. What is
+tested are standardised residuals; of a point with a ray beyond the limit ``point_decisions`` says which rays are wrong.
+At the end every point with a ray outside is tested in the same way, by photos that the others orient.
+
+Source: [Baarda 1968], [Pope 1976].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property, partial
+
+import numpy as np
+
+from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.errors import GeometryError
+from photostrip.frozen import dataclass, replace
+from photostrip.network import camera_errors, defects, reliability, robust
+from photostrip.network.cofactors import JointCofactors, cofactors_of
+from photostrip.network.common_errors import (
+    OF_CAMERAS,
+    CommonError,
+    find_common_error,
+    given_up,
+    taken_up,
+)
+from photostrip.network.datum import is_free
+from photostrip.network.gross_errors.point_decisions import cause_of_all
+from photostrip.network.gross_errors.ray_decisions import Adjusted, RayDecisions, decide_rays
+from photostrip.network.gross_errors.ray_log import ROBUST, START, RayLog, WrongRays
+from photostrip.network.problem import BundleProblem
+from photostrip.network.reliability import CONTROL, IMAGE, Limit
+from photostrip.network.selection import LEAST_RAYS, Selection, restarted, selected, supported
+from photostrip.network.settings import BundleSettings
+from photostrip.network.solution import BundleSolution, Cofactors
+from photostrip.network.solve import solve
+from photostrip.rejection import Rejection
+from photostrip.strip.gross_errors.pairs.pair_search import AMPLE, OUT_TO_ONE_MORE
+
+RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
+PHOTOS_ENOUGH = 3  # on which a point is among the worst, for it to go, whatever more it is on
+RAYS_TO_DECIDE_AGAIN = 100  # of a photo, for each by which it may change before its points are decided on again
+BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
+
+
+@dataclass(frozen=True, eq=False)
+class ScreenedBundle:
+    """A solution and how it was cleaned."""
+
+    problem: BundleProblem  # the problem with the observations that took part
+    selection: Selection  # which those are
+    solution: BundleSolution
+    precision: Cofactors
+    limit: Limit  # what its residuals are tested against
+    rejections: tuple[Rejection, ...] = ()  # what was taken out, in order; re-admitted ones are marked
+    rounds: int = 1
+    common: tuple[CommonError, ...] = ()  # what groups of observations share, taken up as unknowns
+    held: tuple[Rejection, ...] = ()  # given coordinates beyond the limit that stay: without them the adjustment fails
+
+    @classmethod
+    def of(
+        cls, problem: BundleProblem, selection: Selection, settings: BundleSettings, *, rough: bool = False
+    ) -> ScreenedBundle:
+        chosen = selected(problem, selection)
+        solution = solve(chosen, rough=rough)
+        points_out = len(distinct(problem.images.point[~selection.images]))
+        return cls(
+            problem=chosen,
+            selection=selection,
+            solution=solution,
+            precision=cofactors_of(solution, rough=rough),
+            limit=reliability.limit_of(solution, settings, points_out, BOTH_GO if rough else 1.0),
+        )
+
+    @cached_property
+    def joint(self) -> JointCofactors:
+        return JointCofactors.of_solution(self.solution)
+
+
+def screen_bundle(
+    problem: BundleProblem,
+    begin: Selection,
+    settings: BundleSettings,
+    kept: Flags | None = None,
+    *,
+    rough: bool = False,
+) -> ScreenedBundle:
+    """Adjust a problem and take its gross errors out.
+
+    ``begin`` takes part at first, the rest is put in at the end where it fits; the rays ``kept`` (n,) stay in whatever
+    the tests say, and so does what photos, points or the datum would be open without.
+
+    rough: only the rays matter: adjust as well as their tests need it; two that only go together have ``BOTH_GO``.
+    """
+    if settings.screening == "none":
+        return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)), settings)
+    search = _Search(problem, begin, settings, kept, rough=rough)
+    chosen = supported(problem, begin)
+    if settings.screening == "robust":
+        chosen = search.robust(chosen)
+    done = search.clean(search.with_doubted_control(chosen))
+    while (more := search.fitting(done)) is not None:  # a point comes back once only
+        done = search.clean(more)
+    while search.put_back(done):
+        done = search.clean(supported(search.problem, done.selection))
+    held = tuple(each for each in search.tested(done)[1] if search.holds(each))
+    done = replace(done, rejections=tuple(search.log(done)), held=held)
+    return replace(done, rounds=search.rounds, common=tuple(search.common))
+
+
+class _Search:
+    """What is remembered from round to round."""
+
+    def __init__(
+        self, problem: BundleProblem, begin: Selection, settings: BundleSettings, kept: Flags | None, *, rough: bool
+    ) -> None:
+        self.problem, self.settings, self.rough = problem, settings, rough
+        images = problem.images
+        self.by_point = np.lexsort((images.photo, images.point))
+        self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
+        self.free = is_free(problem)
+        self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
+        self.held: set[tuple[str, int, int]] = set()  # given coordinates without which the adjustment fails
+        self.spared[images.point[[] if kept is None else kept]] = True
+        self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates not put in yet
+        self.begin = begin.images
+        self.control = begin.control.copy()  # those that were put in, and that nothing has rejected
+        # what tests took out, in order; what they said of rays stands in the columns of the log
+        self.out: dict[tuple[str, int, int], Rejection | None] = {}
+        rays, given = np.flatnonzero(~begin.images).tolist(), np.argwhere(self.waiting).tolist()
+        nothing = partial(Rejection, kind=CONTROL, test=START, value=float("nan"), limit=float("nan"))
+        self.began: dict[tuple[str, int, int], Rejection | None] = {(IMAGE, row, 0): None for row in rays}
+        self.began |= {(CONTROL, row, axis): nothing(row=row, axes=(axis,)) for row, axis in given}
+        self.rays = RayLog(begin.images)
+        self.back = np.zeros(problem.points, bool)  # points that came back; what must go again stays out
+        self.decided = Selection.everything(problem)  # what took part when rays outside were decided on
+        self.beyond = np.full(problem.points, np.inf)  # test values of points with a ray outside, when decided on
+        self.rounds = self.failed = 0
+        self.common: list[CommonError] = []
+        self.next_trial = 0  # given coordinates that are out when a common error, tried in vain, is tried again
+        # observations that are out when errors of cameras, asked for in vain, are asked for again
+        self.next_question = float("inf") if rough or not settings.search_cameras else 0
+
+    def rays_of(self, points: Numbers, among: Flags | None = None) -> Numbers:
+        """Rows of all rays of points, or of those `among` them (n,), by point, then photo."""
+        wanted = np.zeros(self.problem.points, bool)
+        wanted[points] = True
+        row = self.by_point[wanted[self.problem.images.point[self.by_point]]]
+        return row if among is None else row[among[row]]
+
+    def adjust(self, selection: Selection) -> ScreenedBundle:
+        """Adjust a selection, and start from there the next time; what was given must not all be outside."""
+        if not self.free and is_free(selected(self.problem, selection)):
+            raise GeometryError("what is given contradicts the photos, all of it", code="bundle-rank")
+        done = ScreenedBundle.of(self.problem, selection, self.settings, rough=self.rough)
+        self.problem = restarted(self.problem, done.solution)
+        self.rounds += 1
+        return done
+
+    def robust(self, selection: Selection) -> Selection:
+        """Take out at once what re-weighting leaves next to no weight."""
+        chosen = selected(self.problem, selection)
+        solution, weight = robust.adjust_robustly(chosen)
+        self.problem = restarted(self.problem, solution)
+        self.rounds += robust.REWEIGHTINGS
+        rows = np.flatnonzero(selection.images)[weight < robust.NO_WEIGHT]
+        rows = rows[~self.spared[self.problem.images.point[rows]]]
+        images = selection.images.copy()
+        images[rows] = False
+        self.out |= {(IMAGE, row, 0): None for row in rows.tolist()}
+        self.rays.test[rows] = ROBUST
+        return supported(self.problem, replace(selection, images=images))
+
+    def clean(self, selection: Selection) -> ScreenedBundle:
+        """Test and take out until nothing is beyond the limit."""
+        done = self.adjust(selection)
+        while True:
+            worst = self._worst(done)
+            if self._take_up_camera(done, worst):
+                done = self.adjust(supported(self.problem, done.selection))
+                continue
+            if isinstance(worst, WrongRays) and len(worst):
+                done = self._without_rays(done, worst)
+                continue
+            given = [] if isinstance(worst, WrongRays) else worst
+            if not given and not reliability.sigma0_test(done.solution).too_large:
+                return done
+            if self._take_up_common(done, *given[:1]):
+                done = self.adjust(supported(self.problem, done.selection))
+                continue
+            if not given:
+                return done
+            done = self._without_given(done, given)
+
+    def with_doubted_control(self, selection: Selection) -> Selection:
+        """Put in what the strips by themselves left out of the control, where an error of a camera explains it better.
+
+        Their search knows nothing of cameras: of a lens that is not as stated it throws out sound control.
+        """
+        if self.next_question or not self.waiting.any():
+            return selection
+        before = self.problem
+        everything = Selection.everything(before).control
+        try:
+            without, done = (
+                self.adjust(selection),
+                self.adjust(supported(before, replace(selection, control=everything))),
+            )
+        except GeometryError:
+            self.problem = before
+            return selection
+        unit = done.limit.unit
+        fall = max(done.solution.chi_square - without.solution.chi_square, 0.0) / unit**2
+        doubted = camera_errors.log_probability(fall, int(self.waiting.sum()))
+        likely = camera_errors.most_likely(done.problem, done.solution, unit)
+        if likely is None or likely.log_p > min(doubted, self._level_of_common()):
+            self.problem = before
+            return selection
+        self._take_up(likely.error)
+        self.waiting[:], self.control = False, everything
+        self.began = {key: each for key, each in self.began.items() if key[0] != CONTROL}
+        return supported(self.problem, done.selection)
+
+    def _level_of_common(self) -> float:
+        """Logarithm of the level at which anything but single observations is taken up: half of that of all tests."""
+        return float(np.log(self.settings.level / 2))
+
+    def _take_up(self, error: CommonError) -> None:
+        self.common.append(error)
+        self.problem = taken_up(self.problem, error)
+
+    def _take_up_camera(self, done: ScreenedBundle, worst: list[Rejection] | WrongRays) -> bool:
+        """Take up an error of a camera where it explains more, by its probability, than the worst observation."""
+        out = int((~done.selection.images).sum()) + self._given_out()
+        value = float(worst.value.max(initial=0.0)) if isinstance(worst, WrongRays) else worst[0].value
+        if out < self.next_question or not (value or reliability.sigma0_test(done.solution).too_large):
+            return False
+        likely = camera_errors.most_likely(done.problem, done.solution, done.limit.unit)
+        of_worst = camera_errors.log_probability_of_worst(value, done.solution.redundancy)
+        if likely is None or likely.log_p > min(of_worst, self._level_of_common()):
+            self.next_question = 2 * out + 1
+            return False
+        self._take_up(likely.error)
+        return True
+
+    def put_back(self, done: ScreenedBundle) -> bool:
+        """Give up errors of cameras that mean nothing in the end; whether there were any."""
+        errors = [each for each in self.common if each.kind in OF_CAMERAS]
+        unit = done.limit.unit
+        found = camera_errors.log_probabilities(done.problem, done.solution, done.precision, unit, errors)
+        gone = [each for each, log_p in zip(errors, found, strict=True) if log_p > self._level_of_common()]
+        for each in gone:
+            self.common.remove(each)
+            self.problem = given_up(self.problem, each)
+        self.next_question = float("inf")
+        return bool(gone)
+
+    def _take_up_common(self, done: ScreenedBundle, worst: Rejection | None = None) -> bool:
+        """Take up what a group of observations shares, where that explains more than the worst given coordinate."""
+        if worst and self._given_out() < self.next_trial:
+            return False
+        found = find_common_error(self.problem, done.selection, done.solution, done.limit, worst)
+        if found is None:
+            self.next_trial = 2 * self._given_out() + 1
+            return False
+        self._take_up(found)
+        return True
+
+    def _without_rays(self, done: ScreenedBundle, worst: WrongRays) -> ScreenedBundle:
+        """Take rays out; points without which nothing would hold some photos stay, whatever the tests say."""
+        images = done.selection.images.copy()
+        images[worst.row] = False
+        found = self._tried(replace(done.selection, images=images))
+        if found is not None:
+            self.out |= {(IMAGE, row, 0): None for row in worst.row.tolist()}
+            self.rays.test[worst.row] = self.settings.test
+            self.rays.say(worst)
+            return found
+        points = self.problem.images.point[worst.row]
+        first = points <= np.sort(points)[(len(points) - 1) // 2]
+        if first.all():
+            self.spared[points] = True
+            return done
+        for half in (first, ~first):
+            done = self._without_rays(done, worst.take(np.flatnonzero(half)))
+        return done
+
+    def _without_given(self, done: ScreenedBundle, worst: list[Rejection]) -> ScreenedBundle:
+        """Take given coordinates out: the worst alone where the adjustment fails without all of them, else none."""
+        selection = done.selection
+        for each in worst:
+            selection = selection.without(each.kind, each.row, each.axes[0])
+        found = self._tried(selection)
+        if found is None and len(worst) > 1:
+            return self._without_given(done, worst[:1])
+        if found is None:
+            self.held.add((worst[0].kind, worst[0].row, worst[0].axes[0]))
+            return done
+        for each in worst:
+            self.out[each.kind, each.row, each.axes[0]] = each
+            if each.kind == CONTROL:
+                self.control[each.row, each.axes[0]] = False
+        return found
+
+    def _tried(self, selection: Selection) -> ScreenedBundle | None:
+        """Adjust a selection; None where that fails."""
+        before = self.problem
+        try:
+            found = self.adjust(supported(self.problem, selection))
+            reliability.require_regular(found.problem, found.solution, found.precision)
+        except GeometryError as error:
+            self.problem = before
+            if error.code not in defects.OPEN:
+                self.failed += 1
+                rows = [row for kind, row, _ in self.out if kind == IMAGE]
+                defects.refuse_endless(before, rows, self.rounds, self.failed)
+            return None
+        return found
+
+    def _worst(self, done: ScreenedBundle) -> list[Rejection] | WrongRays:
+        """Return the worst rays of every neighbourhood, or the worst given coordinates where they are worse.
+
+        The more of these are out, the more go at a time: the work grows with the logarithm of their number.
+        """
+        rays, given = self.tested(done)
+        doubtful = self._doubtful(done.selection, rays, done.limit)
+        given = [each for each in given if not self.holds(each)]
+        if given and given[0].value >= doubtful.max(initial=0.0):
+            return given[: 1 + self._given_out() // OUT_TO_ONE_MORE]
+        return self._wrong_rays(done, np.flatnonzero(self._worst_nearby(done.selection, doubtful)), done.limit)
+
+    def tested(self, done: ScreenedBundle) -> tuple[Floats, list[Rejection]]:
+        """Test values of rays that took part, and the given coordinates beyond the limit, the worst first."""
+        limit, rays, given = done.limit, np.zeros(0), []
+        for group in reliability.groups_of(done.problem, done.solution, done.precision):
+            value = np.abs(np.nan_to_num(group.standardised)) / limit.unit
+            if group.kind == IMAGE:
+                rays = value.max(axis=1)
+                continue
+            given += [
+                Rejection(
+                    kind=group.kind,
+                    row=row,
+                    axes=(axis,),
+                    test=self.settings.test,
+                    value=float(value[row, axis]),
+                    limit=limit.value,
+                    size=tuple(group.gross[row].tolist()),
+                )
+                for row, axis in np.argwhere(value > limit.value).tolist()
+            ]
+        return rays, sorted(given, key=lambda each: -each.value)
+
+    def holds(self, given: Rejection) -> bool:
+        return (given.kind, given.row, given.axes[0]) in self.held
+
+    def _given_out(self) -> int:
+        return sum(kind != IMAGE for kind, _, _ in self.out)
+
+    def _doubtful(self, selection: Selection, value: Floats, limit: Limit) -> Floats:
+        """Test values of points, by the worst of their rays; 0 where it is within the limit, or the user keeps one."""
+        point, worst = self.problem.images.point[selection.images], np.zeros(self.problem.points)
+        np.maximum.at(worst, point, value)
+        within = worst <= limit.of(np.bincount(point, minlength=len(worst)))
+        return np.where(self.spared | within, 0.0, worst)
+
+    def _worst_nearby(self, selection: Selection, value: Floats) -> Flags:
+        """Doubtful points among the worst on enough of their photos: one, and more where much went or much is left."""
+        photo, point = self.problem.images.photo[selection.images], self.problem.images.point[selection.images]
+        out = self.problem.images.photo[self.begin & ~selection.images]
+        more = np.bincount(out, minlength=self.problem.photos)
+        rays = np.bincount(photo, minlength=self.problem.photos)
+        more += rays // RAYS_TO_ONE_MORE + np.maximum(rays - AMPLE, 0) // OUT_TO_ONE_MORE
+        order = np.lexsort((-value[point], photo))
+        worse = np.arange(len(order)) - np.searchsorted(photo[order], photo[order])
+        among = np.bincount(point[order[worse <= more[photo[order]]]], minlength=len(value))
+        enough = np.minimum(np.bincount(point, minlength=len(value)), PHOTOS_ENOUGH)
+        return np.asarray((value > 0.0) & (among >= enough), bool)
+
+    def _wrong_rays(self, done: ScreenedBundle, points: Numbers, limit: Limit) -> WrongRays:
+        """Return the rays of points that must go; all of a point where none of them alone does it."""
+        decided = self._decided(done, self.rays_of(points, done.selection.images), done.solution.points[points])
+        stays = (np.bincount(decided.place, decided.out, len(points)) == 0)[decided.place]  # within rounding of it
+        cause = np.where(stays, cause_of_all(decided.rays), decided.cause)
+        return self._rejected(replace(decided, out=decided.out | stays, cause=cause), limit)
+
+    def _rejected(self, decided: RayDecisions, limit: Limit) -> WrongRays:
+        """Say of the rays that must go what was decided."""
+        out = decided.out
+        return WrongRays(
+            row=decided.row[out],
+            value=decided.value[out] / limit.unit,
+            limit=limit.of(decided.rays[out]),
+            size=decided.size[out] * self.problem.images.sigma[decided.row[out]],
+            cause=decided.cause[out],
+        )
+
+    def _decided(self, done: ScreenedBundle, rows: Numbers, xyz: Floats) -> RayDecisions:
+        adjusted = Adjusted(
+            problem=self.problem,
+            selection=done.selection,
+            control=self.control,
+            solution=done.solution,
+            joint=done.joint,
+        )
+        return decide_rays(adjusted, rows, xyz, done.limit)
+
+    def fitting(self, done: ScreenedBundle) -> Selection | None:
+        """Put back what fits the adjustment without it; None when there is nothing new."""
+        point, images = self.problem.images.point, done.selection.images.copy()
+        limit, xyz = done.limit, self.problem.start.points.copy()
+        photo = self.problem.images.photo
+        changed = np.full(self.problem.photos, done.selection.given != self.decided.given)
+        moved = np.bincount(photo[images != self.decided.images], minlength=len(changed))
+        changed |= moved > np.bincount(photo[images], minlength=len(changed)) // RAYS_TO_DECIDE_AGAIN
+        self.decided = replace(done.selection, images=np.where(changed[photo], images, self.decided.images))
+        rays = np.bincount(point, minlength=len(xyz))
+        asked = (self.beyond <= limit.of(rays)) | np.isinf(self.beyond)  # the limit rises where less is established
+        numbers = distinct(point[~images & (changed[photo] | asked[point])])
+        placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] > 1
+        place = np.where(placed, done.solution.points[numbers], np.nan)
+        place = np.where(rays[numbers, None] < LEAST_RAYS, xyz[numbers], place)
+        decided = self._decided(done, self.rays_of(numbers), place)
+        self.rays.say(self._rejected(decided, limit))
+        row, number = decided.row, numbers[decided.place]
+        self.beyond[number] = decided.value / limit.unit
+        fit = np.bincount(decided.place, ~decided.out & ~images[row], len(numbers)) > 0
+        fit &= ~self.back[numbers]
+        self.back[numbers[fit]] = True
+        xyz[numbers[fit]] = place[fit]
+        again = fit[decided.place]
+        images[row[again]] = (~decided.out | (images[row] & self.spared[number]))[again]
+        fits = self._given(done, limit.value * limit.unit)
+        self.control, self.waiting = self.control | fits, self.waiting & ~fits
+        self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))
+        chosen = supported(self.problem, replace(done.selection, images=images, control=self.control))
+        same = (chosen.images == done.selection.images).all() and (chosen.control == done.selection.control).all()
+        return None if same else chosen
+
+    def _given(self, done: ScreenedBundle, limit: float) -> Flags:
+        """Control coordinates that were left out from the start and fit."""
+        control = self.problem.control
+        error = np.abs(done.solution.control_residuals)
+        cofactor = -np.diagonal(done.precision.control_residuals, axis1=1, axis2=2)
+        with np.errstate(invalid="ignore"):
+            fits = error < limit * np.sqrt(control.sigma**2 + np.maximum(cofactor, 0.0))
+        return np.asarray(fits & self.waiting, bool)
+
+    def log(self, done: ScreenedBundle) -> Iterator[Rejection]:
+        """Return every observation that a test took out at some time, and those that began outside and stay there."""
+        holds = done.selection.holds
+        every = self.out | {key: each for key, each in self.began.items() if key not in self.out and not holds(*key)}
+        rows = np.array([row for kind, row, _ in every if kind == IMAGE], np.intp)
+        of_rays = self.rays.records(rows, done.selection.images)
+        for (kind, row, axis), each in every.items():
+            if each is None:
+                yield of_rays[row]
+                continue
+            found = each
+            if np.isnan(each.value):
+                size = tuple((-done.solution.control_residuals[row]).tolist())
+                found = replace(each, limit=done.limit.value, size=size)
+            yield replace(found, readmitted=holds(kind, row, axis))

@@ -1,0 +1,297 @@
+"""Normal equations of a bundle at one state: points eliminated, photos in a band, common parameters as its border.
+
+With A, B, C the derivatives of the rays by their photo, point and the common parameters, all in units of sigma, and
+L L' the normal matrix of a point (its control included), the photos get A'A - T T' with T = A'B L^-T, the border is
+A'C - T R with R = L^-1 B'C, and the corner C'C - R'R. Source: [Granshaw 1980] for the elimination.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import bsr_array, csr_array
+
+from photostrip.arrays import Floats, Numbers
+from photostrip.frozen import NamedTuple, dataclass
+from photostrip.network.band import Band
+from photostrip.network.given_orientations import (
+    LinearisedOrientations,
+    attitudes_at,
+    positions_at,
+)
+from photostrip.network.parameters import Parameters, PreparedProblem
+from photostrip.network.problem import ImageObservations
+from photostrip.network.rays import PHOTO, Rays, view
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """All observations at one state."""
+
+    rays: Rays
+    # (c, 3), (c, 3, 3): given minus computed coordinates of control in units of sigma, 0 where nothing is given; their
+    # derivatives by the point
+    control: Floats
+    by_controlled: Floats
+    positions: LinearisedOrientations
+    attitudes: LinearisedOrientations
+    chi_square: float  # weighted sum of squares of all misfits, a-priori values of common parameters among them
+
+
+def linearise(prepared: PreparedProblem, state: Parameters) -> Linearised:
+    problem, calibrated = prepared.problem, len(prepared.calibrated)
+    rays = view(problem, prepared.calibrated, state.centers, state.rotations, state.points, state.common[:calibrated])
+    control = problem.control
+    counts = (1.0 / control.sigma) * prepared.measured[control.point][:, None]
+    by_controlled = control.axes * counts[:, :, None]
+    misfit = np.einsum("nij,nj->ni", by_controlled, control.xyz - state.points[control.point])
+    positions = positions_at(problem.positions, state.centers, state.rotations, state.common, calibrated)
+    attitudes = attitudes_at(problem.attitudes, state.rotations, len(state.common))
+    parts = [rays.misfit, misfit, state.common / prepared.prior]
+    parts += [each.residual * each.weight for each in (positions, attitudes)]
+    return Linearised(
+        rays=rays,
+        control=misfit,
+        by_controlled=by_controlled,
+        positions=positions,
+        attitudes=attitudes,
+        chi_square=sum(float(np.vdot(each, each)) for each in parts),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """Normal equations of photos (m), points (q) and common parameters (p) at one state."""
+
+    prepared: PreparedProblem
+    linearised: Linearised
+    root: Floats  # (q, 3, 3): L^-1 of the points
+    # (q,): least information on a direction as part of all on the point: about the square of the sine of the angle
+    # between rays. NaN where the matrix is not positive definite
+    strength: Floats
+    carried: bsr_array  # (6 m, 3 q): T
+    blocks: Floats  # (b, 6, 6): A'A - T T' for each pair of photos, with what positions and attitudes add
+    border: Floats  # (6 m, p): A'C - T R
+    common_points: csr_array  # (3 q, p): R
+    corner: Floats  # (p, p): C'C - R'R, with the a-priori weights
+    # right-hand sides: of photos and common parameters with the points eliminated, and L^-1 times those of the points
+    right_photos: Floats  # (6 m,)
+    right_points: Floats  # (3 q,)
+    right_common: Floats  # (p,)
+
+    @property
+    def own(self) -> Floats:
+        """Blocks of each photo with itself, (m, 6, 6)."""
+        return self.blocks[self.prepared.own]
+
+    @property
+    def roots(self) -> bsr_array:
+        """The inverses of the points' factors as one matrix, (3 q, 3 q)."""
+        return _blocks(self.root, np.arange(len(self.root)), len(self.root))
+
+    @property
+    def chi_square(self) -> float:
+        return self.linearised.chi_square if np.isfinite(self.strength).all() else np.inf
+
+
+def equations_at(prepared: PreparedProblem, state: Parameters, damping: float = 0.0) -> NormalEquations:
+    """Linearise everything at a state and eliminate the points.
+
+    ``damping`` is the part of its diagonal by which the normal matrix of each point is made larger.
+    """
+    problem, at = prepared.problem, linearise(prepared, state)
+    control, rays, m, q, p = problem.control, at.rays, problem.photos, problem.points, len(state.common)
+    A = _blocks(rays.by_photo, problem.images.photo, m)
+    B = _blocks(rays.by_point, problem.images.point, q)
+    by_photo, by_point, misfit = A.T, B.T, rays.misfit.ravel()
+
+    normal, right = _own_blocks(by_point @ B, q), (by_point @ misfit).reshape(q, 3)
+    np.add.at(normal, control.point, at.by_controlled.swapaxes(1, 2) @ at.by_controlled)
+    np.add.at(right, control.point, np.einsum("nip,ni->np", at.by_controlled, at.control))
+    normal[~prepared.measured] = np.eye(3)
+    normal[:, range(3), range(3)] *= 1.0 + damping
+    root, strength = _roots(normal)
+    roots = _blocks(root, np.arange(q), q)
+    pull = rays.by_photo.swapaxes(1, 2) @ (rays.by_point @ root.swapaxes(1, 2)[problem.images.point])
+    carried = _by_photo(pull, problem.images, m, q)
+    right_points = roots @ right.ravel()
+
+    own, right_photos = _own_blocks(by_photo @ A, m), (by_photo @ misfit).reshape(m, PHOTO)
+    border, corner, right_common = np.zeros((PHOTO * m, p)), np.diag(prepared.prior**-2.0), np.zeros(p)
+    for given in (at.positions, at.attitudes):
+        by_given, by_common, off = given.scaled()
+        np.add.at(own, given.photo, by_given.swapaxes(1, 2) @ by_given)
+        np.add.at(right_photos, given.photo, np.einsum("nip,ni->np", by_given, off))
+        np.add.at(border.reshape(m, PHOTO, p), given.photo, by_given.swapaxes(1, 2) @ by_common)
+        corner += np.einsum("nia,nib->ab", by_common, by_common)
+        right_common += np.einsum("nia,ni->a", by_common, off)
+    right_common -= prepared.prior**-2.0 * state.common
+    C = csr_array((rays.by_common.data, rays.by_common.indices, rays.by_common.indptr), shape=(2 * len(rays.misfit), p))
+    common_points = csr_array((3 * q, p))
+    if len(prepared.calibrated):
+        common_points = csr_array(roots @ (by_point @ C))
+        border += (by_photo @ C - carried @ common_points).toarray()
+        corner += (C.T @ C - common_points.T @ common_points).toarray()
+        right_common += C.T @ misfit - common_points.T @ right_points
+    blocks = -_squares(prepared, pull)
+    blocks[prepared.own] += own
+    return NormalEquations(
+        prepared=prepared,
+        linearised=at,
+        root=root,
+        strength=strength,
+        carried=carried,
+        blocks=blocks,
+        border=border,
+        common_points=common_points,
+        corner=corner,
+        right_photos=right_photos.ravel() - carried @ right_points,
+        right_points=right_points,
+        right_common=right_common,
+    )
+
+
+def _blocks(blocks: Floats, column: Numbers, columns: int) -> bsr_array:
+    """Sparse matrix of one block in each row of blocks, (n a, columns b), from blocks (n, a, b) and their columns."""
+    n, a, b = blocks.shape
+    return bsr_array((blocks, column, np.arange(n + 1)), shape=(n * a, columns * b))
+
+
+def _by_photo(blocks: Floats, images: ImageObservations, photos: int, points: int) -> bsr_array:
+    """Sparse matrix (6 m, 3 q) of blocks (n, 6, 3), one for each ray."""
+    order = np.argsort(images.photo, kind="stable")
+    edges = np.searchsorted(images.photo[order], np.arange(photos + 1))
+    return bsr_array((blocks[order], images.point[order], edges), shape=(PHOTO * photos, 3 * points))
+
+
+def _squares(prepared: PreparedProblem, pull: Floats) -> Floats:
+    """T T' at the pairs of photos, (b, 6, 6), from the blocks (n, 6, 3) of T: dense products of near points."""
+    found = np.zeros((len(prepared.row), PHOTO, PHOTO))
+    for near in prepared.near:
+        u = len(near.photos)
+        rows = np.zeros((u, PHOTO, len(near.points), 3))
+        rows[near.photo, :, near.point] = pull[near.ray]
+        flat = rows.reshape(PHOTO * u, -1)
+        product = (flat @ flat.T).reshape(u, PHOTO, u, PHOTO).swapaxes(1, 2)
+        pair = prepared.pair(near.photos[:, None], near.photos)
+        found[pair[pair >= 0]] += product[pair >= 0]
+    return found
+
+
+def _own_blocks(matrix: bsr_array, size: int) -> Floats:
+    """Diagonal blocks of a matrix of that many, zero where it has none."""
+    row = np.repeat(np.arange(size), np.diff(matrix.indptr))
+    own = row == matrix.indices
+    found = np.zeros((size, *matrix.blocksize))
+    found[row[own]] = matrix.data[own]
+    return found
+
+
+def _roots(normal: Floats) -> tuple[Floats, Floats]:
+    """Inverses of the Cholesky factors of matrices (q, 3, 3), and their strength, (q,); NaN where not definite.
+
+    Element by element: numpy factors 3 x 3 matrices one by one, ten times slower, and refuses all for one.
+    """
+    root = np.zeros_like(normal)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        a = 1.0 / np.sqrt(normal[:, 0, 0])
+        l21, l31 = normal[:, 1, 0] * a, normal[:, 2, 0] * a
+        b = 1.0 / np.sqrt(normal[:, 1, 1] - l21**2)
+        l32 = (normal[:, 2, 1] - l21 * l31) * b
+        c = 1.0 / np.sqrt(normal[:, 2, 2] - l31**2 - l32**2)
+        root[:, 0, 0], root[:, 1, 1], root[:, 2, 2] = a, b, c
+        root[:, 1, 0], root[:, 2, 1] = -l21 * a * b, -l32 * b * c
+        root[:, 2, 0] = (l21 * l32 * b - l31) * a * c
+        strength = 1.0 / (np.maximum(np.maximum(a, b), c) ** 2 * np.einsum("nii->n", normal))
+    return root, strength
+
+
+class Solved(NamedTuple):
+    """N^-1 times right-hand sides of k columns."""
+
+    photos: Floats  # (6 m, k)
+    points: Floats  # (3 q, k)
+    common: Floats  # (p, k)
+
+
+@dataclass(frozen=True, eq=False)
+class FactoredEquations:
+    """Normal equations with the photos' part in factors."""
+
+    equations: NormalEquations
+    band: Band  # the factor, photos in the order of ``rank``
+    damping: float = 0.0  # part by which the diagonal of what is left for the common parameters is made larger
+
+    @cached_property
+    def places(self) -> Numbers:
+        """Row within the band of each parameter of the photos, (6 m,)."""
+        return (PHOTO * self.equations.prepared.rank[:, None] + np.arange(PHOTO)).ravel()
+
+    @cached_property
+    def inverse(self) -> Band:
+        """Elements within the band of the inverse of the photos' part alone, in the order of ``rank``."""
+        return self.band.inverse()
+
+    @cached_property
+    def cross(self) -> Floats:
+        """Photos' part of the inverse times the border, (6 m, p)."""
+        return self.by_photos(self.equations.border)
+
+    @cached_property
+    def left(self) -> Floats:
+        """Normal matrix of the common parameters with everything else unknown, (p, p)."""
+        return np.asarray(self.equations.corner - self.equations.border.T @ self.cross)
+
+    @cached_property
+    def common(self) -> Floats:
+        """Cofactors of the common parameters, (p, p)."""
+        damped = self.left + self.damping * np.diag(np.diag(self.left))
+        inverse = np.linalg.inv(damped)
+        return np.asarray(0.5 * (inverse + inverse.T))
+
+    def by_photos(self, right: Floats) -> Floats:
+        """Solve for right-hand sides (6 m, k) of the photos alone."""
+        ordered = np.empty_like(right)
+        ordered[self.places] = right
+        return self.band.solve(ordered)[self.places] if right.size else right
+
+    def solved(self, photos: Floats, points: Floats, common: Floats) -> Solved:
+        """Solve for right-hand sides of photos (6 m, k) and common parameters (p, k), points (3 q, k) eliminated.
+
+        Those of the points are multiplied with L^-1 already, and subtracted from the others as in ``equations_at``.
+        """
+        equations = self.equations
+        by_photos, by_common = self.shared(photos, common)
+        rest = points - equations.carried.T @ by_photos - equations.common_points @ by_common
+        return Solved(by_photos, equations.roots.T @ rest, by_common)
+
+    def shared(self, photos: Floats, common: Floats) -> tuple[Floats, Floats]:
+        """Solve for right-hand sides of photos (6 m, k) and common parameters (p, k) with the points eliminated."""
+        alone = self.by_photos(photos)
+        by_common = self.common @ (common - self.equations.border.T @ alone)
+        return alone - self.cross @ by_common, by_common
+
+    def solved_for_points(self, right: Floats) -> Solved:
+        """Solve for right-hand sides (3 q, k) of the points alone."""
+        equations = self.equations
+        white = equations.roots @ right
+        return self.solved(-(equations.carried @ white), white, -(equations.common_points.T @ white))
+
+
+def factored(equations: NormalEquations, added: Floats | None = None, damping: float = 0.0) -> FactoredEquations | None:
+    """Factor the photos' part, with ``added`` (m, 6, 6) to the photos' own blocks; None when not positive definite."""
+    prepared, blocks = equations.prepared, equations.blocks
+    m, row, column, own = prepared.problem.photos, prepared.row, prepared.column, prepared.own
+    if added is not None:
+        blocks = blocks.copy()
+        blocks[own] += added
+    band = Band(PHOTO * m, PHOTO * (int((row - column).max()) + 1) - 1)
+    element = np.arange(PHOTO)
+    places = band.place((PHOTO * row)[:, None, None] + element[:, None], (PHOTO * column)[:, None, None] + element)
+    upper = np.zeros(places.shape, bool)
+    upper[own] = element[:, None] < element
+    places[upper] = len(band.flat) - 1  # of the diagonal blocks only the lower half belongs into the band
+    band.flat[places] = blocks
+    band.flat[-1] = 0.0
+    return FactoredEquations(equations, band, damping) if band.factor() else None

@@ -1,0 +1,200 @@
+"""What a bundle adjustment is given: frozen arrays, in one Cartesian frame, without files and without ids to look up.
+
+All coordinates are metres in one right-handed Cartesian frame whose origin lies near the points (a geocentric frame
+is shifted: 6 400 km in front of every number would cost three digits). All image coordinates are ideal: millimetres,
+relative to the principal point, without distortion. Rotations take photo axes to the Cartesian frame.
+
+A sigma that is infinite switches an observation off; a sigma of zero is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import field
+
+import numpy as np
+
+from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.camera import Distortion
+from photostrip.frozen import dataclass, replace
+from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.network.settings import CALIBRATION
+
+
+def _no_rows(*shape: int) -> Floats:
+    return np.zeros((0, *shape))
+
+
+def _no_numbers() -> Numbers:
+    return np.zeros(0, np.intp)
+
+
+@dataclass(frozen=True, eq=False)
+class ImageObservations:
+    """Measured rays."""
+
+    # photo, point: (n,): photo and point of each ray. A point is measured at most once on a photo. Any order; by photo
+    # is fastest
+    photo: Numbers
+    point: Numbers
+    xy: Floats  # (n, 2): ideal image coordinates in mm, relative to the principal point
+    sigma: Floats  # (n, 2): their standard deviations in mm
+
+    def __len__(self) -> int:
+        return len(self.photo)
+
+    def take(self, rows: Flags) -> ImageObservations:
+        return ImageObservations(
+            photo=self.photo[rows], point=self.point[rows], xy=self.xy[rows], sigma=self.sigma[rows]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ControlObservations:
+    """Given coordinates of points. What is observed are ``axes @ (X - xyz)``, each with its own sigma."""
+
+    point: Numbers = field(default_factory=_no_numbers)  # (c,): point of each row; a point may stand in several rows
+    # (c, 3): given position, Cartesian, metres. Where a coordinate is not given (height of a plan-only point) any value
+    # near the truth does: its sigma is infinite
+    xyz: Floats = field(default_factory=lambda: _no_rows(3))
+    # (c, 3, 3): directions of the three coordinates as rows, orthonormal: east, north, up of the frame of the list at
+    # the point (``GroundFrame.axes_at``), so that plan-only and height-only mean what they say in every frame
+    axes: Floats = field(default_factory=lambda: _no_rows(3, 3))
+    # (c, 3): standard deviations along the three axes, metres; infinite: not given
+    sigma: Floats = field(default_factory=lambda: _no_rows(3))
+    frame: Numbers = field(default_factory=_no_numbers)  # (c,): list that gives each row; without: all in one
+
+    def __len__(self) -> int:
+        return len(self.point)
+
+
+@dataclass(frozen=True, eq=False)
+class PositionObservations:
+    """Given camera positions, of the perspective centre or of an antenna.
+
+    What is observed are ``axes @ (S + R @ lever - xyz) - offset - drift * time``, with offset and drift of the group.
+    """
+
+    photo: Numbers = field(default_factory=_no_numbers)  # (g,): photo of each row
+    xyz: Floats = field(default_factory=lambda: _no_rows(3))  # (g, 3): given position, Cartesian, metres
+    # (g, 3, 3): directions of the three coordinates as rows, as for ``ControlObservations``
+    axes: Floats = field(default_factory=lambda: _no_rows(3, 3))
+    # (g, 3): standard deviations along the axes, metres; infinite: not given
+    sigma: Floats = field(default_factory=lambda: _no_rows(3))
+    # (g, 3): antenna minus perspective centre in photo axes, metres
+    lever: Floats = field(default_factory=lambda: _no_rows(3))
+    # (g,): group (a strip, say) whose offset and drift count; -1: none
+    group: Numbers = field(default_factory=_no_numbers)
+    # (g,): what the drift is multiplied with: time or place along the strip, best centred
+    time: Floats = field(default_factory=_no_rows)
+    # offset_sigma, drift_sigma: (groups, 3): a-priori standard deviations of the three components of a group's offset
+    # (metres) and drift (metres per unit of time) about zero; infinite: free; 0: there is none. They are what has to be
+    # added to what is given
+    offset_sigma: Floats = field(default_factory=lambda: _no_rows(3))
+    drift_sigma: Floats = field(default_factory=lambda: _no_rows(3))
+
+    def __len__(self) -> int:
+        return len(self.photo)
+
+
+@dataclass(frozen=True, eq=False)
+class AttitudeObservations:
+    """Given attitudes of photos; a given perspective centre is a row of ``PositionObservations``."""
+
+    photo: Numbers = field(default_factory=_no_numbers)  # (a,): photo of each row
+    # (a, 3, 3): given rotations, photo to Cartesian frame
+    rotations: Floats = field(default_factory=lambda: _no_rows(3, 3))
+    # (a, 3): standard deviations of the rotations about the three photo axes, radians; infinite: not given
+    sigma: Floats = field(default_factory=lambda: _no_rows(3))
+
+    def __len__(self) -> int:
+        return len(self.photo)
+
+
+@dataclass(frozen=True, eq=False)
+class BundleCameras:
+    """Cameras of the photos, and what is to be calibrated."""
+
+    of_photo: Numbers  # (m,): camera of each photo
+    focal: Floats  # (cameras,): principal distances in mm
+    # (cameras, 10), or None: a-priori standard deviations of the parameters ``CALIBRATION`` about zero, in mm and
+    # powers of mm; infinite: free; 0: not a parameter. None: no calibration
+    sigma: Floats | None = None
+    # (cameras, 10), or None: the same for parameters that an adjustment takes up unasked; None: free
+    prior: Floats | None = None
+    # of each camera: the given distortion, taken out of the image coordinates; (): none
+    distortion: tuple[Distortion | None, ...] = ()
+
+    @property
+    def unknown(self) -> Numbers:
+        """Place of each parameter among the unknowns, (cameras, 10); -1: not an unknown."""
+        found = np.full((len(self.focal), len(CALIBRATION)), -1)
+        if self.sigma is not None:
+            free = self.sigma > 0.0
+            found[free] = np.arange(int(free.sum()))
+        return found
+
+    def with_unknown(self, cameras: Numbers, columns: Sequence[int]) -> BundleCameras:
+        """Return the cameras with more parameters of some of them unknown."""
+        sigma = np.zeros((len(self.focal), len(CALIBRATION))) if self.sigma is None else self.sigma.copy()
+        prior = np.full(sigma.shape, np.inf) if self.prior is None else self.prior
+        for column in columns:
+            new = cameras[sigma[cameras, column] == 0.0]
+            sigma[new, column] = prior[new, column]
+        return replace(self, sigma=sigma)
+
+
+@dataclass(frozen=True, eq=False)
+class StartValues:
+    centers: Floats  # (m, 3): perspective centres, Cartesian, metres
+    rotations: Floats  # (m, 3, 3): rotations, photo to Cartesian frame
+    points: Floats  # (q, 3): points, Cartesian, metres
+
+
+@dataclass(frozen=True, eq=False)
+class BundleProblem:
+    """All observations and all start values of one bundle adjustment."""
+
+    images: ImageObservations
+    cameras: BundleCameras
+    start: StartValues  # start values; they say how many photos (m) and points (q) there are
+    control: ControlObservations = field(default_factory=ControlObservations)
+    positions: PositionObservations = field(default_factory=PositionObservations)
+    attitudes: AttitudeObservations = field(default_factory=AttitudeObservations)
+    # photo_ids, point_ids, camera_ids, group_ids: names for messages; empty: the numbers
+    photo_ids: tuple[str, ...] = ()
+    point_ids: tuple[str, ...] = ()
+    camera_ids: tuple[str, ...] = ()
+    group_ids: tuple[str, ...] = ()
+    position_axes: tuple[str, str, str] = GROUND_AXES  # names of the rows of ``positions.axes``
+
+    @property
+    def photos(self) -> int:
+        return len(self.start.centers)
+
+    @property
+    def points(self) -> int:
+        return len(self.start.points)
+
+    def photo_name(self, number: int) -> str:
+        return self.photo_ids[number] if self.photo_ids else f"number {number}"
+
+    def point_name(self, number: int) -> str:
+        return self.point_ids[number] if self.point_ids else f"number {number}"
+
+    def common_names(self) -> tuple[str, ...]:
+        """Names of the parameters that many photos share, in the order of ``BundleSolution.common``.
+
+        First calibration parameters (``camera RC30: k1``), then offsets and drifts of positions (``positions A: offset
+        east``; the component counts along the rows of the axes).
+        """
+        names, parameters = [], list(CALIBRATION)
+        if self.cameras.sigma is not None:
+            for camera, row in enumerate(self.cameras.sigma):
+                name = self.camera_ids[camera] if self.camera_ids else f"number {camera}"
+                names += [f"camera {name}: {parameters[k]}" for k in np.flatnonzero(row > 0.0)]
+        for title, sigma in (("offset", self.positions.offset_sigma), ("drift", self.positions.drift_sigma)):
+            for group, axis in np.argwhere(sigma > 0.0).tolist():
+                name = self.group_ids[group] if self.group_ids else f"group {group}"
+                names.append(f"positions {name}: {title} {self.position_axes[axis]}")
+        return tuple(names)

@@ -1,0 +1,174 @@
+"""How well each observation is controlled by the others: test values, detectable errors, what undetected ones can do.
+
+The residual ``v`` of an observation of standard deviation ``sigma`` has the variance ``r sigma^2``, r its redundancy
+number: the share of an error of the observation that shows in its own residual.
+"""
+
+from __future__ import annotations
+
+from types import EllipsisType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.arrays import Floats, Numbers
+from photostrip.errors import GeometryError
+from photostrip.frozen import NamedTuple, dataclass
+from photostrip.network.settings import BundleSettings
+from photostrip.rejection import UNCONTROLLED
+from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
+
+if TYPE_CHECKING:
+    from photostrip.network.problem import BundleProblem
+    from photostrip.network.solution import BundleSolution, Cofactors
+
+IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"
+SIGMA0_LEVEL = 0.05  # probability that the test of sigma0 fails with right standard deviations
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Observations of one kind after the adjustment; one row each, k coordinates."""
+
+    kind: str  # ``IMAGE``, ``CONTROL``, ``POSITION`` or ``ATTITUDE``
+    # (n, k): observed minus adjusted: mm in the image, metres, radians for attitudes; NaN where nothing is given
+    error: Floats
+    sigma: Floats  # (n, k): stated standard deviations; NaN where nothing is given
+    redundancy: Floats  # (n, k): redundancy numbers, 0 to 1; NaN where nothing is given
+
+    @property
+    def standardised(self) -> Floats:
+        """Errors over their standard deviations, shape (n, k); NaN where the redundancy is too small to tell."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            value = self.error / (self.sigma * np.sqrt(self.redundancy))
+        return np.where(self.redundancy >= UNCONTROLLED, value, np.nan)
+
+    @property
+    def gross(self) -> Floats:
+        """What error of the observation would explain its residual, in its unit, shape (n, k)."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(self.redundancy >= UNCONTROLLED, self.error / self.redundancy, np.nan)
+
+    def detectable(self, shift: float, at: tuple[int, int] | EllipsisType = ...) -> Floats:
+        """Smallest errors that are found with the wanted power, (n, k), in the unit of the observation; of one `at`.
+
+        sigma shift / sqrt(r) with ``noncentrality`` as shift; infinite where it is not controlled at all.
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self.sigma[at] * shift / np.sqrt(np.maximum(self.redundancy[at], 0.0)), float)
+
+    def external(self, shift: float) -> Floats:
+        """How far an error that is just not found can move any coordinate, in its standard deviations.
+
+        ``shift sqrt((1 - r) / r)``, (n, k): no coordinate, and no function of coordinates, moves by more.
+        Source: [Baarda 1968].
+        """
+        r = np.clip(self.redundancy, 0.0, 1.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(shift * np.sqrt((1.0 - r) / r), float)
+
+
+def groups_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Group, ...]:
+    """All observations with their redundancy numbers, image coordinates first; empty kinds are left out."""
+    found = [
+        (IMAGE, solution.image_residuals, problem.images.sigma, precision.image_residuals),
+        (CONTROL, -solution.control_residuals, problem.control.sigma, precision.control_residuals),
+        (POSITION, -solution.position_residuals, problem.positions.sigma, precision.position_residuals),
+        (ATTITUDE, -solution.attitude_residuals, problem.attitudes.sigma, precision.attitude_residuals),
+    ]
+    return tuple(_group(*each) for each in found if len(each[1]))
+
+
+def require_regular(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> None:
+    """Refuse redundancy numbers far outside 0 to 1: rounding hides that photos hang free (``bundle-rank``)."""
+    for group in groups_of(problem, solution, precision):
+        if (np.abs(np.nan_to_num(group.redundancy, nan=0.5) - 0.5) > 1.0).any():
+            raise GeometryError("the normal matrix is singular but for rounding", code="bundle-rank")
+
+
+def _group(kind: str, error: Floats, sigma: Floats, cofactors: Floats) -> Group:
+    given = np.isfinite(sigma)
+    known = np.where(given, sigma, np.nan)
+    redundancy = np.diagonal(cofactors, axis1=1, axis2=2) / known**2
+    return Group(kind=kind, error=np.where(given, error, np.nan), sigma=known, redundancy=redundancy)
+
+
+def noncentrality(alpha: float, power: float) -> float:
+    """Shift of a test value by the smallest error that is found with a wanted probability, in standard deviations.
+
+    4.13 for a level of 0.001 and a power of 0.80. Source: [Baarda 1968].
+    """
+    return normal_quantile(1 - alpha / 2) + normal_quantile(power)
+
+
+def limit(test: str, alpha: float, redundancy: int) -> float:
+    """Largest standardised residual of a good observation; infinite when the redundancy does not allow the tau test.
+
+    ``tau`` = t sqrt(r / (r - 1 + t^2)) with t of r - 1 degrees of freedom. Source: [Baarda 1968]; [Pope 1976] for tau.
+    """
+    if test == "baarda":
+        return normal_quantile(1 - alpha / 2)
+    if redundancy < 2:
+        return float("inf")
+    t = t_quantile(1 - alpha / 2, redundancy - 1)
+    return float(t * np.sqrt(redundancy / (redundancy - 1 + t**2)))
+
+
+@dataclass(frozen=True)
+class Sigma0Test:
+    """Whether the stated standard deviations are right on the whole."""
+
+    sigma0: float  # standard deviation of unit weight found
+    redundancy: int
+    # lower, upper: limits of sigma0 between which it lies with the probability 1 - ``SIGMA0_LEVEL``; NaN without
+    # redundancy
+    lower: float
+    upper: float
+
+    @property
+    def passed(self) -> bool:
+        return self.lower <= self.sigma0 <= self.upper
+
+    @property
+    def too_large(self) -> bool:
+        return self.sigma0 > self.upper
+
+
+def sigma0_test(solution: BundleSolution) -> Sigma0Test:
+    """Test sigma0 against 1: chi-square, both sides."""
+    f = solution.redundancy
+    if f < 1:
+        return Sigma0Test(sigma0=solution.sigma0, redundancy=f, lower=float("nan"), upper=float("nan"))
+    ends = (chi2_quantile(p, f) for p in (SIGMA0_LEVEL / 2, 1 - SIGMA0_LEVEL / 2))
+    lower, upper = (float(np.sqrt(end / f)) for end in ends)
+    return Sigma0Test(sigma0=solution.sigma0, redundancy=f, lower=lower, upper=upper)
+
+
+class Limit(NamedTuple):
+    """What a point is tested against."""
+
+    value: float  # largest standardised residual of a coordinate
+    both: float  # the same of a point on two photos, which loses both rays
+    alpha: float  # probability that the test of one good coordinate, or of rays that agree, rejects them
+    unit: float  # standard deviation of unit weight in force
+
+    def of(self, rays: Numbers | int) -> Floats:
+        """Largest standardised residual by number of rays of the point."""
+        return np.where(rays == 2, self.both, self.value)
+
+
+def limit_of(solution: BundleSolution, settings: BundleSettings, established: int, share_of_both: float = 1.0) -> Limit:
+    """Limit of standardised residuals: never sharper than the stated standard deviations allow.
+
+    Without errors all tests together, as many as there are conditions, have the level q of the settings. With many
+    errors q is the part of the rejections that are false: with k of m hypotheses rejected the next is tested at
+    i q / (m + 1 - i (1 - q)), i = k + 1, and m - k conditions are left. Source: [Gavrilov 2009].
+
+    share_of_both: what the test of a point on two photos has of the level of one test.
+    """
+    found = settings.test == "tau" and sigma0_test(solution).too_large
+    share = settings.level * (established + 1)
+    alpha = share / (max(solution.redundancy, 1) + share) if settings.alpha is None else settings.alpha
+    test, unit = ("tau", solution.sigma0) if found else ("baarda", 1.0)
+    value, both = (limit(test, each, solution.redundancy) for each in (alpha, alpha * share_of_both))
+    return Limit(value=value, both=both, alpha=alpha, unit=unit)

@@ -1,0 +1,37 @@
+"""Robust adjustment: rays that do not fit lose their weight before anything is tested.
+
+The weights are those of ``strip.robust``: many gross errors at once, also large ones, hardly pull the photos.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photostrip.arrays import Floats, median
+from photostrip.frozen import replace
+from photostrip.network.problem import BundleProblem
+from photostrip.network.selection import restarted
+from photostrip.network.solution import BundleSolution
+from photostrip.network.solve import solve
+from photostrip.strip.robust import falling_weights
+
+REWEIGHTINGS = 6
+NORMAL_MEDIAN = 1.1774  # median of the length of two standard normal residuals
+NO_WEIGHT = 1e-3  # weight below which a ray is out
+
+
+def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
+    """Adjust with weights that fall with the residual, and give the factor of the weight of each ray, 0 to 1.
+
+    The scale of the residuals is taken from their median.
+    """
+    weight = np.ones(len(problem.images))
+    sigma = problem.images.sigma
+    for _ in range(REWEIGHTINGS):
+        spread = sigma / np.sqrt(weight)[:, None]
+        solution = solve(replace(problem, images=replace(problem.images, sigma=spread)))
+        problem = restarted(problem, solution)
+        size = np.linalg.norm(solution.image_residuals / sigma, axis=1)
+        unit = max(median(size) / NORMAL_MEDIAN, 1e-12)
+        weight = falling_weights(size / unit)
+    return solution, weight

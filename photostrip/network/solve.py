@@ -1,0 +1,211 @@
+"""From a problem to its least-squares solution: Gauss-Newton with step control.
+
+Source: step control after [Marquardt 1963]; the step that may lead up: derived.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photostrip.arrays import Floats
+from photostrip.errors import GeometryError
+from photostrip.frozen import NamedTuple
+from photostrip.geometry.rotation import from_vector
+from photostrip.network import datum, defects
+from photostrip.network.normal_equations import (
+    NormalEquations,
+    equations_at,
+    factored,
+    linearise,
+)
+from photostrip.network.parameters import Parameters, PreparedProblem, prepare
+from photostrip.network.problem import BundleProblem
+from photostrip.network.rays import PHOTO
+from photostrip.network.solution import BundleSolution, IterationStep
+
+FIRST_DAMPING = 1e-4
+MORE, LESS = 10.0, 0.1  # factors of the damping after a refused and after a taken step
+LARGEST_DAMPING = 1e8
+MOST_STEPS = 30
+# what the steps after the last one may still move, in standard deviations over all parameters together, estimated by
+# how much shorter the last step was than the one before it
+CONVERGED = 1e-6
+SQUARES_ROUNDING = 1e-9  # part of the sum of squares by which it may seem to grow at the minimum
+# part of the sum of squares by which it falls in a step that is the last of a rough solution: what is left then are
+# bends of a whole long strip, which no ray feels
+ROUGH = 1e-3
+
+
+def solve(problem: BundleProblem, *, rough: bool = False) -> BundleSolution:
+    """Adjust a bundle of rays by Gauss-Newton steps, damped where the sum of squares grows.
+
+    Without control and positions the datum comes from inner constraints on the points: the adjusted points have no
+    shift, rotation and change of scale against their start.
+
+    rough: stop when the sum of squares hardly falls, which is enough for tests of residuals.
+    Raises GeometryError when points, photos or the datum cannot be determined, by name (``bundle-rays``,
+        ``bundle-rank``), or when the steps do not come to an end (``bundle-diverged``).
+    """
+    defects.refuse_repeated(problem)
+    prepared = prepare(problem)
+    free = datum.is_free(problem)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # starts far off: such steps are refused
+        ended = _iterate(prepared, free=free, rough=rough)
+    return _solution(prepared, ended, free=free)
+
+
+class _Ended(NamedTuple):
+    state: Parameters
+    equations: NormalEquations | None  # there, or of a rough solution before a last step that moves nothing
+    steps: list[IterationStep]
+
+
+def _iterate(prepared: PreparedProblem, *, free: bool, rough: bool) -> _Ended:
+    """Step until the next step would be short enough.
+
+    Where the sum of squares grows, the step is taken back and the diagonal of the normal equations raised, more each
+    time; where it falls again, less. Source: [Marquardt 1963].
+    """
+    state, damping, steps = prepared.begun, 0.0, []
+    if not free:
+        defects.refuse_loose(prepared, state)
+    best = equations_at(prepared, state)
+    defects.refuse_weak_points(best)
+    for _ in range(MOST_STEPS):
+        move = _move(state, best, damping, free=free)
+        steps.append(_recorded(best, move, damping))
+        moved = _moved(state, move)
+        if damping == 0.0 and _still_to_come(steps) < CONVERGED:
+            return _Ended(moved, best if rough else None, steps)
+        found = equations_at(prepared, moved)
+        if found.chi_square <= best.chi_square * (1.0 + SQUARES_ROUNDING):
+            if rough and found.chi_square > best.chi_square * (1.0 - ROUGH):
+                return _Ended(moved, found, steps)
+            state, best = moved, found
+            damping = 0.0 if damping <= FIRST_DAMPING else damping * LESS
+            continue
+        further = None if damping else _stepped(prepared, moved, found, steps, free=free)
+        if further is not None and further[1].chi_square < best.chi_square:
+            state, best = further
+            continue
+        damping = max(damping * MORE, FIRST_DAMPING)
+        if damping > LARGEST_DAMPING:
+            break
+        best = equations_at(prepared, state, damping)
+    raise defects.diverged(prepared, state, len(steps))
+
+
+def _stepped(
+    prepared: PreparedProblem, state: Parameters, equations: NormalEquations, steps: list[IterationStep], *, free: bool
+) -> tuple[Parameters, NormalEquations] | None:
+    """Go one step on from where the sum of squares has grown; None where that cannot be.
+
+    A principal distance and the heights of its photos move together along a curve: a step leaves it, the next one finds
+    it again, and steps that never leave it do not come to an end.
+    """
+    try:
+        move = _move(state, equations, 0.0, free=free)
+    except (GeometryError, np.linalg.LinAlgError):
+        return None
+    steps.append(_recorded(equations, move, 0.0))
+    moved = _moved(state, move)
+    return moved, equations_at(prepared, moved)
+
+
+def _still_to_come(steps: list[IterationStep]) -> float:
+    """Foretell the length of the next step from the last two."""
+    last = steps[-1].length
+    before = steps[-2].length if len(steps) > 1 else 1.0
+    return last * min(last / before, 1.0) if before > 0.0 else last
+
+
+class _Move(NamedTuple):
+    """A step of all parameters."""
+
+    photos: Floats  # (m, 6): of the photos, in their own axes
+    points: Floats  # (q, 3): metres
+    common: Floats  # (p,)
+    length: float  # in standard deviations: the root of dx' N dx
+
+
+def _move(state: Parameters, equations: NormalEquations, damping: float, *, free: bool) -> _Move:
+    """Find the step of all parameters from the normal equations."""
+    prepared = equations.prepared
+    anchor = datum.anchor(equations.own, prepared.rank, state) if free else None
+    added = anchor
+    if damping:
+        added = np.eye(PHOTO) * (damping * equations.own) + (0.0 if anchor is None else anchor)
+    found = factored(equations, added, damping)
+    if found is None:
+        defects.refuse_weak_points(equations)
+        defects.refuse_singular(equations, anchor)
+    defects.refuse_common(prepared, equations.corner, found.left)
+    right = equations.right_photos, equations.right_points, equations.right_common
+    by_photos, by_points, common = (each[:, 0] for each in found.solved(*(side[:, None] for side in right)))
+    square = float(right[1] @ right[1] + right[0] @ by_photos + right[2] @ common)
+    photos, points = by_photos.reshape(-1, PHOTO), by_points.reshape(-1, 3)
+    if free:
+        origin, moves = datum.point_generators(prepared, state)
+        flat = moves.reshape(-1, datum.DEFECT)
+        similarity = np.linalg.solve(flat.T @ flat, flat.T @ by_points)
+        photos = photos - datum.photo_generators(state, origin) @ similarity
+        points = points - moves @ similarity
+    return _Move(photos=photos, points=points, common=common, length=float(np.sqrt(max(square, 0.0))))
+
+
+def _moved(state: Parameters, move: _Move) -> Parameters:
+    return Parameters(
+        centers=state.centers + np.einsum("nij,nj->ni", state.rotations, move.photos[:, :3]),
+        rotations=state.rotations @ from_vector(move.photos[:, 3:]),
+        points=state.points + move.points,
+        common=state.common + move.common,
+    )
+
+
+def _recorded(equations: NormalEquations, move: _Move, damping: float) -> IterationStep:
+    shift = max(float(np.abs(part).max(initial=0.0)) for part in (move.photos[:, :3], move.points))
+    turn = float(np.abs(move.photos[:, 3:]).max(initial=0.0))
+    return IterationStep(chi_square=equations.chi_square, length=move.length, damping=damping, shift=shift, turn=turn)
+
+
+def _solution(prepared: PreparedProblem, ended: _Ended, *, free: bool) -> BundleSolution:
+    """Find the residuals of all observations at the end, in their units, and the weighted sum of their squares."""
+    problem, state = prepared.problem, ended.state
+    at = linearise(prepared, state)
+    control = problem.control
+    return BundleSolution(
+        centers=state.centers,
+        rotations=state.rotations,
+        points=state.points,
+        common=state.common,
+        image_residuals=at.rays.misfit * problem.images.sigma,
+        control_residuals=np.einsum("nij,nj->ni", control.axes, state.points[control.point] - control.xyz),
+        position_residuals=at.positions.residual,
+        attitude_residuals=at.attitudes.residual,
+        chi_square=at.chi_square,
+        redundancy=_redundancy(prepared, free=free),
+        free=free,
+        steps=tuple(ended.steps),
+        prepared=prepared,
+        equations=ended.equations,
+    )
+
+
+def _redundancy(prepared: PreparedProblem, *, free: bool) -> int:
+    """Observations, priors among them, minus unknowns: six of a photo, three of a point with rays, and those in common.
+
+    A free network has seven unknowns less, those of its datum.
+    """
+    problem = prepared.problem
+    observations = sum(
+        int(np.isfinite(sigma).sum())
+        for sigma in (
+            problem.images.sigma,
+            problem.control.sigma[prepared.measured[problem.control.point]],
+            problem.positions.sigma,
+            problem.attitudes.sigma,
+            prepared.prior,
+        )
+    )
+    unknowns = PHOTO * problem.photos + 3 * int(prepared.measured.sum()) + len(prepared.prior)
+    return observations - unknowns + (datum.DEFECT if free else 0)

@@ -1,0 +1,135 @@
+"""Given points in one level frame in the middle of them, with what their written coordinates mean there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from photostrip.arrays import Flags, Floats, Numbers, column_medians, distinct, median
+from photostrip.errors import GeometryError, InputError
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.plausibility.control.straightening import GivenPoints, WrittenAxes
+from photostrip.points import ControlPoints
+
+_LevelPoints = tuple[Floats, Callable[[], WrittenAxes]]  # (n, 3) in the level frame; what the written axes are
+
+USUAL_SIGMA = 0.1  # metres, of coordinates without one
+# times as far from the middle of a list as a good half of it: strip and map say nothing of such a place
+FAR_AWAY = 20.0
+LEAST_OF_LIST = 4  # points that tell where a list lies
+
+
+def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: bool = False) -> GivenPoints | None:
+    """Bring given points into one level frame; None when none of them has a plan position.
+
+    as_written: take the numbers as plain coordinates in metres, when their frames cannot be right.
+    """
+    plan = np.asarray(control.use[:, :2].all(axis=1), bool)
+    height = control.use[:, 2]
+    if not plan.any():
+        return None
+    written = np.where(control.use, control.enu, np.nan)
+    moved = _moved(written, control.frame)
+    filled = _filled(written - moved, control.frame)
+    decoded = None if as_written else _decoded(filled, control, frames, plan)
+    xyz, written_axes = decoded or _plain(filled, control, frames, plan)
+    known = np.column_stack([plan, plan, height])
+    sigma = np.where(known & (control.sigma > 0), control.sigma, np.nan)
+    stated = (part[np.isfinite(part)] for part in (sigma[:, :2], sigma[:, 2]))
+    usual = [median(part) if len(part) else USUAL_SIGMA for part in stated]
+    return GivenPoints(
+        ids=control.ids,
+        xyz=np.where(known, xyz, np.nan),
+        use=known,
+        check=control.check,
+        group=control.frame,
+        written=written,
+        moved=moved,
+        written_axes=written_axes,
+        sigma=(usual[0], usual[1]),
+    )
+
+
+def _plain(filled: Floats, control: ControlPoints, frames: Sequence[GroundFrame], plan: Flags) -> _LevelPoints:
+    """Take the numbers as they are written, in the units of their frames as far as these have one."""
+    written = _plain_axes(control, frames)
+    return (filled - np.mean(filled[plan], axis=0)) * written.unit, lambda: written
+
+
+def _plain_axes(control: ControlPoints, frames: Sequence[GroundFrame]) -> WrittenAxes:
+    unit = np.array([[frame.plan_factor, frame.plan_factor, frame.height_factor] for frame in frames])
+    unit = np.where(unit > 0, unit, 1.0)[control.frame]
+    return WrittenAxes(unit, np.tile(np.eye(3), (len(control), 1, 1)))
+
+
+def _moved(written: Floats, lists: Numbers) -> Floats:
+    """By how much coordinates in plan that lie far from all others of their list are moved to its middle (n, 3)."""
+    moved = np.zeros_like(written)
+    for number in distinct(lists).tolist():
+        rows = np.flatnonzero((lists == number) & np.isfinite(written[:, :2]).all(axis=1))
+        if len(rows) < LEAST_OF_LIST:
+            continue
+        off = written[rows, :2] - column_medians(written[rows, :2])
+        far = np.abs(off) > FAR_AWAY * column_medians(np.abs(off)).max()
+        moved[rows, :2] = np.where(far, off, 0.0)
+    return moved
+
+
+def _filled(written: Floats, lists: Numbers) -> Floats:
+    """Coordinates with the mean of their list, or of all, where they are not given."""
+    filled = written.copy()
+    for number in distinct(lists).tolist():
+        rows = lists == number
+        for axis in range(3):
+            values = written[rows, axis]
+            if not np.isfinite(values).any():
+                values = written[:, axis]
+            mean = median(values[np.isfinite(values)]) if np.isfinite(values).any() else 0.0
+            part = filled[rows, axis]
+            filled[rows, axis] = np.where(np.isfinite(part), part, mean)
+    return filled
+
+
+def _decoded(filled: Floats, control: ControlPoints, frames: Sequence[GroundFrame], plan: Flags) -> _LevelPoints | None:
+    """Bring the points through their frames; None where the frames refuse."""
+    cartesian = np.empty_like(filled)
+    try:
+        for number in distinct(control.frame).tolist():
+            rows = control.frame == number
+            cartesian[rows] = frames[number].cartesian_from_ground(filled[rows])
+        middle = column_medians(cartesian[plan])
+        first = frames[int(control.frame[int(np.argmax(plan))])]
+        turn = first.level_axes_at(middle[None, :])[0]
+    except (GeometryError, InputError):
+        return None
+    if not np.isfinite(cartesian).all():
+        return None
+    return (cartesian - middle) @ turn.T, lambda: _axes_through_frames(filled, cartesian, turn, control, frames)
+
+
+def _axes_through_frames(
+    filled: Floats, cartesian: Floats, turn: Floats, control: ControlPoints, frames: Sequence[GroundFrame]
+) -> WrittenAxes:
+    axes, unit = np.empty((len(filled), 3, 3)), np.ones_like(filled)
+    try:
+        for number in distinct(control.frame).tolist():
+            rows, frame = control.frame == number, frames[number]
+            axes[rows] = frame.axes_at(cartesian[rows])
+            if frame.kind != "geocentric":  # whose coordinates are no plan and no height
+                unit[rows] = _metres(frame, filled[rows])
+    except (GeometryError, InputError):  # at the edge of a projection
+        return _plain_axes(control, frames)
+    return WrittenAxes(unit, axes @ turn.T)
+
+
+def _metres(frame: GroundFrame, enu: Floats) -> Floats:
+    """Metres on the ground in a unit of each coordinate: a map has a scale of its own."""
+    unit = np.broadcast_to([frame.plan_factor, frame.plan_factor, frame.height_factor], enu.shape).astype(float)
+    if frame.kind != "local":
+        step = 1e-5 if frame.kind == "geographic" else 1.0
+        start = frame.cartesian_from_ground(enu)
+        for axis in range(2):
+            stepped = frame.cartesian_from_ground(enu + step * np.eye(3)[axis])
+            unit[:, axis] = np.linalg.norm(stepped - start, axis=1) / step
+    return unit

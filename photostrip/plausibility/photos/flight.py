@@ -1,0 +1,122 @@
+"""Perspective centres of a formed strip: heights, base lengths and base directions that do not go with the others.
+
+All is measured against the strip itself, in units of its flying height and of its usual base, so that a wrong control
+does not disturb it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from photostrip.arrays import Flags, Floats, Numbers, column_medians, median
+from photostrip.notes import Finding, listed
+from photostrip.plausibility.finding import found
+
+MOST_HEIGHT_OFF = 0.2  # of the flying height, from the line of the neighbours
+LONG_BASE, SHORT_BASE = 1.75, 0.5  # of the usual base
+TURNED_DEG = 30.0  # of a base against its neighbours
+BESIDE = 3  # bases on either side that say what is usual
+LEAST_PHOTOS = 4
+STEP_SHARE = 0.3  # of a limit: what goes beyond it among the neighbours has a step of that size somewhere
+SHORT_FLIGHT = 30  # photos of which each is looked at
+
+
+def find_odd_centers(
+    centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], strip: str
+) -> Iterator[Finding]:
+    """Look for perspective centres that do not go with their neighbours.
+
+    centers: (n, 3), perspective centres in order, any unit and frame.
+    depth: (n,), height of each above the points it shows, in that unit.
+    up: (3,), direction from the ground to the cameras.
+    """
+    names = (strip,)
+    below = np.flatnonzero(depth <= 0)
+    if len(below):
+        yield _below([photos[number] for number in below.tolist()], depth, below, names)
+    if len(photos) < LEAST_PHOTOS:
+        return
+    flying = median(np.abs(depth))
+    yield from _heights(centers @ up, flying, photos, names)
+    bases = np.diff(centers, axis=0)
+    bases = bases - (bases @ up)[:, None] * up
+    yield from _lengths(np.linalg.norm(bases, axis=1), photos, names)
+    yield from _directions(bases, up, photos, names)
+
+
+def _below(photos: Sequence[str], depth: Floats, below: Numbers, names: tuple[str, ...]) -> Finding:
+    message = (
+        f"the perspective centre of photo {photos[0]} lies below the points that it shows"
+        if len(photos) == 1
+        else f"the perspective centres of photos {listed(photos)} lie below the points that they show"
+    )
+    fix = "are x and y of the image coordinates or the axes of the control exchanged?"
+    evidence = {"lowest_over_usual": float(depth[below].min() / median(np.abs(depth)))}
+    return found("P204", message, fix, evidence, photos=photos, strips=names)
+
+
+def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
+    bend = np.zeros(len(height))
+    bend[1:-1] = height[1:-1] - (height[:-2] + height[2:]) / 2.0
+    for number in _worth_a_look(np.abs(bend) > STEP_SHARE * MOST_HEIGHT_OFF * flying):
+        near = _beside(number, len(photos))
+        line = _robust_line(np.array(near, float), height[near])
+        off = float(height[number] - line[0] - line[1] * number) / flying
+        inside = near[0] < number < near[-1]  # at an end a line is extended
+        if abs(off) > (MOST_HEIGHT_OFF if inside else 2.0 * MOST_HEIGHT_OFF):
+            message = (
+                f"the perspective centre of photo {photos[number]} lies {100 * abs(off):.0f} % of the flying height "
+                f"{'above' if off > 0 else 'below'} those of its neighbours"
+            )
+            fix = "does it have another principal distance, unit, or flight?"
+            evidence = {"off_over_flying_height": off}
+            yield found("P205", message, fix, evidence, photos=(photos[number],), strips=names)
+
+
+def _worth_a_look(conspicuous: Flags) -> list[int]:
+    """Return what stands near something conspicuous; everything of a short flight."""
+    if len(conspicuous) <= SHORT_FLIGHT:
+        return list(range(len(conspicuous)))
+    around = np.convolve(conspicuous, np.ones(2 * BESIDE + 1), "same")
+    return [int(number) for number in np.flatnonzero(np.round(around))]
+
+
+def _beside(number: int, count: int) -> list[int]:
+    """Neighbours of one of `count` photos or bases, itself left out."""
+    return [k for k in range(max(number - BESIDE, 0), min(number + BESIDE + 1, count)) if k != number]
+
+
+def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
+    """Line whose slope is the median of those of all pairs of points."""
+    i, j = np.triu_indices(len(x), 1)
+    slope = median((y[j] - y[i]) / (x[j] - x[i]))
+    return median(y - slope * x), slope
+
+
+def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
+    step = np.abs(np.diff(np.log(np.maximum(length, 1e-12))))
+    for number in _worth_a_look(np.append(step, 0.0) > STEP_SHARE * np.log(LONG_BASE)):
+        usual = median(length[_beside(number, len(length))])
+        ratio = float(length[number]) / max(usual, 1e-12)
+        if SHORT_BASE < ratio < LONG_BASE:
+            continue
+        pair = (photos[number], photos[number + 1])
+        message = f"the base of photos {pair[0]} and {pair[1]} is {ratio:.2f} times as long as those beside it"
+        fix = "is a photo missing between them?" if ratio > 1 else "is one of them from another flight?"
+        yield found("P206", message, fix, {"base_over_usual": ratio}, photos=pair, strips=names)
+
+
+def _directions(bases: Floats, up: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
+    unit = bases / np.maximum(np.linalg.norm(bases, axis=1, keepdims=True), 1e-12)
+    cosine = (unit[1:] * unit[:-1]).sum(axis=1)
+    for number in _worth_a_look(np.append(cosine, 1.0) < np.cos(np.radians(STEP_SHARE * TURNED_DEG))):
+        usual = column_medians(unit[_beside(number, len(bases))])
+        turn = np.degrees(np.arctan2(np.cross(usual, bases[number]) @ up, usual @ bases[number]))
+        if abs(turn) <= TURNED_DEG:
+            continue
+        pair = (photos[number], photos[number + 1])
+        message = f"the base of photos {pair[0]} and {pair[1]} turns by {turn:+.0f} degrees against those beside it"
+        fix = "does the strip bend there? else: is a photo listed in the wrong place or measured wrongly?"
+        yield found("P207", message, fix, {"turn_deg": float(turn)}, photos=pair, strips=names)

@@ -1,0 +1,7 @@
+"""The strip method, its operations in order.
+
+``image_coordinates`` measured to ideal image coordinates; ``relative_orientation`` of each pair; ``strip_formation`` of
+its models; ``absolute_orientation`` on the control; ``polynomial`` correction of the deformation; ``resection`` of the
+photos. Beside them ``error_propagation``, ``gross_errors`` of pairs and of control, and ``independent_models``;
+``robust`` has the weights that several of them use.
+"""

@@ -1,0 +1,105 @@
+"""Points where all rays that saw them meet, from photos of known orientation, with their precision.
+
+A point starts at the place where its rays come nearest to each other; least squares on the image coordinates follow.
+Source: derived.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.frozen import dataclass
+from photostrip.strip.resection.collinearity import KnownPhotos, derivatives, project
+from photostrip.strip.strip_formation.non_neighbours import meeting
+
+ITERATIONS = 12
+CONVERGED = 1e-12  # of the distance of a point from its photos
+PARALLEL_CONDITION = 1e-9  # reciprocal condition of rays that meet nowhere
+
+
+@dataclass(frozen=True, eq=False)
+class Intersected:
+    """Points from known photos."""
+
+    xyz: Floats  # (q, 3): points, metres; NaN where rays do not meet in front of the cameras
+    covariance: Floats  # (q, 3, 3): their covariances for the stated standard deviations, metres^2
+    residuals: Floats  # (n, 2): measured minus computed image coordinates, mm
+    rays: Numbers  # (q,): number of rays of each point
+
+
+def intersect_points(
+    xy: Floats, sigma: Floats, rows: tuple[Numbers, Numbers], photos: KnownPhotos, count: int
+) -> Intersected:
+    """Intersect points from photos of known orientation, all points in one batch.
+
+    xy, sigma: (n, 2), ideal image coordinates and their standard deviations, mm.
+    rows: photo and point of each row.
+    Returns points with their precision, the orientations taken as known. A point with one ray, with parallel rays, or
+        with rays that meet behind a camera has no coordinates.
+    """
+    (photo, point), (centers, rotations, focal) = rows, photos
+    rays = np.bincount(point, minlength=count)
+    direction = np.einsum("nij,nj->ni", rotations[photo], np.column_stack([xy, -focal[photo]]))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
+    nearest = np.einsum("nij,nj->ni", across, centers[photo])
+    xyz, sound = _solved(_summed(across, point, count), _summed(nearest, point, count))
+    far = np.ones(count)
+    np.maximum.at(far, point, np.linalg.norm(np.nan_to_num(xyz[point]) - centers[photo], axis=1))
+    covariance = np.full((count, 3, 3), np.nan)
+    for _ in range(ITERATIONS):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            _, slope = derivatives(xyz[point], photos, photo)
+            slope = slope / sigma[:, :, None]
+            misfit = (xy - project(xyz[point], photos, photo)) / sigma
+        bad = ~np.isfinite(slope).all(axis=(1, 2)) | ~np.isfinite(misfit).all(axis=1)
+        slope[bad], misfit[bad] = 0.0, 0.0
+        normal = _summed(np.einsum("nki,nkj->nij", slope, slope), point, count)
+        step, good = _solved(normal, _summed(np.einsum("nki,nk->ni", slope, misfit), point, count))
+        sound &= good
+        xyz = xyz + np.where(sound[:, None], step, 0.0)
+        if not sound.any() or np.abs(step[sound] / far[sound, None]).max() < CONVERGED:
+            break
+    covariance[sound] = np.linalg.inv(normal[sound])
+    ahead = np.einsum("ni,ni->n", xyz[point] - centers[photo], rotations[photo][:, :, 2]) < 0
+    sound &= rays >= 2
+    sound[point[~ahead]] = False
+    xyz[~sound], covariance[~sound] = np.nan, np.nan
+    with np.errstate(invalid="ignore"):
+        residuals = xy - project(xyz[point], photos, photo)
+    return Intersected(xyz=xyz, covariance=covariance, residuals=residuals, rays=rays)
+
+
+def _summed(values: Floats, point: Numbers, count: int) -> Floats:
+    flat = values.reshape(len(values), -1)
+    sums = np.column_stack([np.bincount(point, column, count) for column in flat.T])
+    return np.asarray(sums.reshape(count, *values.shape[1:]), np.float64)
+
+
+def two_that_meet(xy: Floats, sigma: Floats, photo: Numbers, photos: KnownPhotos) -> Floats:
+    """Places where two of the r rays of each of m points meet, those with which most others agree; NaN: nowhere.
+
+    xy, sigma: (m, r, 2), ideal image coordinates and their standard deviations, mm; photo: (m, r), r at least two.
+    """
+    (m, r), two = photo.shape, np.column_stack(np.triu_indices(photo.shape[1], 1))
+    direction = np.concatenate([xy, -photos.focal[photo][..., None]], axis=2)
+    direction = np.einsum("mrij,mrj->mri", photos.rotations[photo], direction)
+    xyz, _ = meeting(photos.centers[photo][:, two].reshape(-1, 2, 3), direction[:, two].reshape(-1, 2, 3))
+    seen = project(np.repeat(xyz, r, axis=0), photos, np.repeat(photo, len(two), axis=0).ravel())
+    off = np.abs(xy[:, None] - seen.reshape(m, len(two), r, 2)) / sigma[:, None]
+    best = np.log1p(np.nan_to_num(off.max(axis=3), nan=np.inf)).sum(axis=2).argmin(axis=1)
+    return np.asarray(xyz.reshape(m, len(two), 3)[np.arange(m), best], float)
+
+
+def _solved(normal: Floats, right: Floats) -> tuple[Floats, Flags]:
+    """Solve small systems; NaN where one is singular."""
+    size = np.sqrt(np.maximum(np.einsum("nii->ni", normal), 0.0))
+    size[size == 0.0] = 1.0
+    scaled = normal / size[:, :, None] / size[:, None, :]
+    values = np.linalg.eigvalsh(scaled)
+    sound = values[:, 0] > PARALLEL_CONDITION
+    scaled[~sound] = np.eye(3)
+    solution = np.linalg.solve(scaled, (right / size)[:, :, None])[:, :, 0] / size
+    solution[~sound] = np.nan
+    return solution, sound

@@ -1,0 +1,212 @@
+"""Estimates, cofactors and redundancy numbers against a dense adjustment that was written apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from photostrip.geometry.rotation import from_vector
+from photostrip.network.cofactors import (
+    JointCofactors,
+    cofactors_of,
+    coordinates_of,
+    joint_cofactors,
+)
+from photostrip.network.problem import (
+    AttitudeObservations,
+    BundleProblem,
+    ControlObservations,
+    PositionObservations,
+)
+from photostrip.network.solve import solve
+from photostrip.simulation import Control as SimulatedControl
+from photostrip.simulation import Flight, Points, Spec, simulate
+from tests.bundles import dense
+from tests.simulated_bundle import problem_of, truth_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+SAME = 1e-8  # of the standard deviations
+NO_STEP = 1e-5  # standard deviations: what a further step would still move
+
+LENS = np.zeros((1, 10))
+LENS[0, [0, 1, 2, 6, 7, 8, 9]] = np.inf
+LENS[0, [3, 4]] = 1e-8, 1e-12
+HELD_LENS = np.where(np.isinf(LENS), [[0.02, 0.02, 0.02, 0, 0, 0, 1e-6, 1e-6, 1e-4, 1e-4]], LENS)
+
+
+@cache
+def strip(photos: int = 6, strips: int = 1) -> BundleProblem:
+    """Make a small strip or block on the real Earth, with noise."""
+    spec = Spec(
+        flight=Flight(photos=photos, strips=strips),
+        points=Points(rows=3, extra_per_model=2),
+        control=SimulatedControl(bands=2),
+    )
+    return problem_of(simulate(spec))
+
+
+def with_everything() -> BundleProblem:
+    """Give the strip camera positions with offset and drift, attitudes and a camera to be calibrated."""
+    problem = strip()
+    random = np.random.default_rng(1)
+    m = problem.photos
+    spec = Spec(flight=Flight(photos=6), points=Points(rows=3, extra_per_model=2), control=SimulatedControl(bands=2))
+    truth = truth_of(simulate(spec))
+    lever = np.tile([0.1, 0.2, 1.0], (m, 1))
+    antenna = truth.centers + np.einsum("nij,nj->ni", truth.rotations, lever)
+    positions = PositionObservations(
+        photo=np.arange(m),
+        xyz=antenna + random.normal(0.0, 0.1, (m, 3)) + [1.0, 2.0, 3.0],
+        axes=np.tile(problem.control.axes[0], (m, 1, 1)),
+        sigma=np.full((m, 3), 0.1),
+        lever=lever,
+        group=np.array([0, 0, 0, 1, 1, -1]),
+        time=np.arange(m, dtype=float) - 2.5,
+        offset_sigma=np.array([[np.inf, np.inf, np.inf], [0.0, np.inf, 2.0]]),
+        drift_sigma=np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]]),
+    )
+    attitudes = AttitudeObservations(
+        np.arange(1, m),
+        (truth.rotations @ from_vector(random.normal(0.0, 1e-4, (m, 3))))[1:],
+        np.tile([1e-4, 2e-4, np.inf], (m - 1, 1)),
+    )
+    return replace(problem, positions=positions, attitudes=attitudes, cameras=replace(problem.cameras, sigma=LENS))
+
+
+def with_height_only() -> BundleProblem:
+    """Let half of the control count in height only, the rest in plan only, one in all."""
+    problem = strip()
+    sigma = problem.control.sigma.copy()
+    sigma[1::2, :2] = np.inf
+    sigma[2::2, 2] = np.inf
+    return replace(problem, control=replace(problem.control, sigma=sigma))
+
+
+PROBLEMS: dict[str, Callable[[], BundleProblem]] = {
+    "control": strip,
+    "block": lambda: strip(4, 2),
+    "plan and height apart": with_height_only,
+    "free": lambda: replace(strip(), control=ControlObservations()),
+    "free block, calibrated": lambda: replace(
+        strip(4, 2), control=ControlObservations(), cameras=replace(strip(4, 2).cameras, sigma=HELD_LENS)
+    ),
+    "calibrated": lambda: replace(strip(), cameras=replace(strip().cameras, sigma=LENS)),
+    "everything": with_everything,
+}
+
+
+def against(found: Floats, expected: Floats) -> float:
+    """Largest difference of covariances in units of the standard deviations."""
+    deviation = np.sqrt(np.einsum("nii->ni", expected))
+    return float(np.abs((found - expected) / (deviation[:, :, None] * deviation[:, None, :])).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_estimate_and_cofactors_are_those_of_a_dense_adjustment(name: str) -> None:
+    problem = PROBLEMS[name]()
+    solution = solve(problem)
+    found, expected = cofactors_of(solution), dense(problem, solution)
+    m, q, n, p = problem.photos, problem.points, len(problem.images), len(solution.common)
+    cofactors = expected.cofactors
+    deviations = np.sqrt(np.diag(cofactors))
+
+    further = cofactors @ (expected.derivatives.T @ expected.misfit)
+    assert np.abs(further / deviations).max() < NO_STEP
+    assert solution.chi_square == pytest.approx(float(expected.misfit @ expected.misfit), rel=1e-9)
+    images = solution.image_residuals / problem.images.sigma
+    np.testing.assert_allclose(images.ravel(), expected.misfit[: 2 * n], atol=1e-9)
+
+    own = cofactors[: 6 * m, : 6 * m].reshape(m, 6, m, 6)[range(m), :, range(m)]
+    assert against(found.photos, own) < SAME
+    of_points = cofactors[6 * m : 6 * m + 3 * q, 6 * m : 6 * m + 3 * q].reshape(q, 3, q, 3)
+    assert against(found.points, of_points[range(q), :, range(q)]) < SAME
+    if p:
+        assert against(found.common[None], cofactors[None, -p:, -p:]) < SAME
+        mixed = cofactors[: 6 * m, -p:] / np.outer(deviations[: 6 * m], deviations[-p:])
+        scaled = found.photo_common.reshape(6 * m, p) / np.outer(deviations[: 6 * m], deviations[-p:])
+        np.testing.assert_allclose(scaled, mixed, atol=SAME)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
+    problem = PROBLEMS[name]()
+    solution = solve(problem)
+    found, expected = cofactors_of(solution), dense(problem, solution).of_misfits()
+    done = 0
+    for cofactors, sigma in (
+        (found.image_residuals, problem.images.sigma),
+        (found.control_residuals, problem.control.sigma),
+        (found.position_residuals, problem.positions.sigma),
+        (found.attitude_residuals, problem.attitudes.sigma),
+    ):
+        rows, size = sigma.shape
+        block = expected[done : done + rows * size, done : done + rows * size].reshape(rows, size, rows, size)
+        scaled = cofactors / (sigma[:, :, None] * sigma[:, None, :])
+        given = np.isfinite(sigma)
+        both = given[:, :, None] & given[:, None, :]
+        np.testing.assert_allclose(scaled[both], block[range(rows), :, range(rows)][both], atol=SAME)
+        done += rows * size
+    weighted = np.isfinite(solution.prepared.prior)
+    parts = found.common_residuals[weighted] / solution.prepared.prior[weighted] ** 2
+    np.testing.assert_allclose(parts, np.diag(expected)[done:][weighted], atol=SAME)
+    every = [
+        np.where(np.isfinite(sigma), np.einsum("nii->ni", cofactors) / sigma**2, 0.0).sum()
+        for cofactors, sigma in (
+            (found.image_residuals, problem.images.sigma),
+            (found.control_residuals, problem.control.sigma),
+            (found.position_residuals, problem.positions.sigma),
+            (found.attitude_residuals, problem.attitudes.sigma),
+        )
+    ]
+    assert sum(every) + parts.sum() == pytest.approx(solution.redundancy, abs=1e-5)
+
+
+@pytest.mark.parametrize("problem", [strip(), with_everything()])
+def test_sums_of_coordinates_have_the_cofactors_of_the_joint_ones(problem: BundleProblem) -> None:
+    solution = solve(problem)
+    wanted = np.unique(problem.images.point)[::3]
+    factors = np.random.default_rng(2).standard_normal((len(wanted), 3, 2))
+    flat, coordinates = factors.reshape(-1, 2), coordinates_of(solution, wanted)
+    expected = flat.T @ joint_cofactors(solution, coordinates) @ flat
+    assert joint_cofactors(solution, csr_array(flat.T) @ coordinates) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["block", "everything"])
+def test_functions_of_photos_have_joint_cofactors(name: str) -> None:
+    """Three functions of photos one beside the other, in any order: the photos' own cofactors carried over."""
+    problem = PROBLEMS[name]()
+    solution = solve(problem)
+    joint, m = JointCofactors.of_solution(solution), problem.photos
+    functions = np.random.default_rng(4).normal(size=(m, 1, 3, 6))
+    own, photos = functions[:, 0], cofactors_of(solution).photos
+    np.testing.assert_allclose(
+        joint.of(np.arange(m)[:, None], functions), own @ photos @ own.swapaxes(1, 2), rtol=1e-7, atol=1e-18
+    )
+    expected = dense(problem, solution).cofactors[: 6 * m, : 6 * m].reshape(m, 6, m, 6)
+    for some in ((1, 0), (0, 2, 1), (m - 1, 0, 2)):
+        sets, by = np.array([some]), functions[list(some), 0]
+        wanted = np.einsum("icp,ipjq,jdq->icjd", by, expected[list(some)][:, :, list(some)], by)
+        found = joint.of(sets, by[None])[0].reshape(wanted.shape)
+        np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
+
+
+def test_a_rough_solution_has_the_cofactors_of_its_residuals() -> None:
+    problem = PROBLEMS["free"]()
+    exact, rough = solve(problem), solve(problem, rough=True)
+    found, expected = cofactors_of(rough, rough=True), cofactors_of(exact)
+    np.testing.assert_allclose(found.image_residuals, expected.image_residuals, rtol=1e-4, atol=1e-9)
+    assert rough.equations is not None
+    assert exact.equations is None

@@ -1,0 +1,261 @@
+"""The parts of the gate on their own: slips of digits, flight, layout of the control, angles, fits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from photostrip.plausibility.control import layout
+from photostrip.plausibility.control.digits import slip
+from photostrip.plausibility.control.plan_fit import fit_robustly, fit_similarity, upright
+from photostrip.plausibility.control.straightening import Rays
+from photostrip.plausibility.photos import flight, flight_order, rotations
+from photostrip.simulation.simulation import simulate
+from photostrip.simulation.spec import Flight, Spec, Terrain
+from tests.simulated import inputs_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+
+# --------------------------------------------------------------------------------------------------------- digits
+
+
+@given(
+    value=st.integers(100_000_000, 999_999_999),
+    place=st.integers(1, 5),
+    digit=st.integers(0, 9),
+    noise=st.floats(-0.05, 0.05),
+)
+@settings(max_examples=60)
+def test_any_single_wrong_digit_is_put_right(value: int, place: int, digit: int, noise: float) -> None:
+    text = str(value)
+    wrong = text[:place] + str(digit) + text[place + 1 :]
+    found = slip(int(wrong) / 1000, value / 1000 + noise, 0.05, 0.2)
+    if wrong == text:
+        assert found is None
+    else:
+        assert found is not None
+        assert found.meant == pytest.approx(value / 1000, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant", "words"),
+    [
+        (434733.71, 443733.71, "the second and the third digit exchanged"),
+        (-1203.5, 1203.5, "the sign is wrong"),
+        (43473.371, 434733.71, "the decimal point is 1 place"),
+        (4733.71, 34733.71, "a leading 3 is missing"),
+        (434733.71, 435733.71, "a typing error in the third digit (4 for 5)"),
+    ],
+)
+def test_other_slips_are_named(written: float, meant: float, words: str) -> None:
+    found = slip(written, meant + 0.01, 0.05, 0.2)
+    assert found is not None
+    assert words in found.text
+    assert found.meant == pytest.approx(meant, abs=1e-6)
+
+
+@given(st.floats(-0.29, 0.29))
+def test_what_is_within_noise_is_no_slip(off: float) -> None:
+    assert slip(434733.71, 434733.71 + off, 0.05, 0.2) is None
+
+
+def test_an_error_that_no_slip_explains_is_none() -> None:
+    assert slip(434733.71, 434756.14, 0.05, 0.2) is None  # 22.43 m: two digits and more
+
+
+# --------------------------------------------------------------------------------------------------------- flight
+
+
+def straight(photos: int = 8) -> Floats:
+    """Give perspective centres of a straight level flight, base 100, at height 150."""
+    return np.column_stack([100.0 * np.arange(photos), np.zeros(photos), np.full(photos, 150.0)])
+
+
+def flown(centers: Floats, depth: Floats | None = None) -> list[tuple[str, tuple[str, ...]]]:
+    """Examine a flight."""
+    names = [f"{number}" for number in range(len(centers))]
+    height = np.full(len(centers), 150.0) if depth is None else depth
+    up = np.array([0.0, 0.0, 1.0])
+    return [(each.code, each.photos) for each in flight.find_odd_centers(centers, height, up, names, "A")]
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=40, deadline=None)
+def test_a_usual_flight_has_no_finding(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    centers = straight(10) + rng.normal(0.0, [5.0, 5.0, 3.0], (10, 3)).clip(-12, 12)
+    assert flown(centers) == []
+
+
+@pytest.mark.parametrize(("factor", "photos"), [(1.0, []), (1 / 1.5, [("1003",)]), (1.5, [("1003",)])])
+def test_a_photo_at_another_scale_is_named_by_the_images_alone(factor: float, photos: list[tuple[str]]) -> None:
+    done = simulate(Spec(flight=Flight(photos=6, attitude_sigma_deg=(1.0, 1.0, 1.0)), terrain=Terrain(relief=60.0)))
+    observations = done.observations
+    xy = observations.xy.copy()
+    xy[observations.photo == observations.photo_ids.index("1003")] *= factor
+    strip = inputs_of(done).strips[0]
+    found = list(flight_order.find_other_scale(replace(observations, xy=xy), strip.id, strip.photos))
+    assert [each.photos for each in found] == photos
+    scales = [each.evidence["scale_over_neighbours"] for each in found]
+    assert scales == pytest.approx([factor] * len(photos), rel=0.1)
+
+
+def test_what_does_not_go_with_its_neighbours_is_named() -> None:
+    high = straight()
+    high[4, 2] += 60.0
+    assert ("P205", ("4",)) in flown(high)
+    long_base = straight()
+    long_base[5:, 0] += 120.0
+    assert flown(long_base) == [("P206", ("4", "5"))]
+    turned = straight()
+    turned[3:, 1] += 80.0
+    assert ("P207", ("2", "3")) in flown(turned)
+    below = np.full(8, 150.0)
+    below[2] = -150.0
+    assert flown(straight(), below) == [("P204", ("2",))]
+
+
+# --------------------------------------------------------------------------------------------------------- layout
+
+
+def laid_out(along: list[float], across: list[float], photos: int = 8) -> list[str]:
+    """Examine control given by its places along (photos) and across (half breadths) a strip."""
+    plan = np.column_stack([100.0 * np.array(along), 150.0 * np.array(across)])
+    names = [f"G{number}" for number in range(len(along))]
+    listed = [f"{number}" for number in range(photos)]
+    on_a_line = layout.find_line(plan, 150.0, names, "strip A", ["A"])
+    return [each.code for each in (*on_a_line, *layout.find_weak_ends(np.array(along), listed, "A", names))]
+
+
+def test_where_control_lies() -> None:
+    across = [-0.8, 0.0, 0.8]
+    assert laid_out([0, 0, 0, 7, 7, 7], across * 2) == []
+    assert laid_out([0, 0, 0, 2, 2, 2], across * 2) == ["P501"]
+    assert laid_out([0, 0, 0, 4, 4, 4], across * 2) == ["P503"]
+    assert laid_out([0, 3, 7], [0.01, -0.02, 0.01]) == ["P502"]
+    assert laid_out([0, 3, 7], [0.4, -0.5, 0.4]) == []
+
+
+def test_findings_on_the_layout_count_photos_from_one() -> None:
+    names, photos = ["a", "b", "c", "d", "e", "f"], [f"{number}" for number in range(8)]
+    place = np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0])
+    (found,) = layout.find_weak_ends(place, photos, "A", names)
+    assert found.evidence == {"first_control_at_photo": 2.0, "last_control_at_photo": 4.0, "photos": 8}
+
+
+# --------------------------------------------------------------------------------------------------------- angles
+
+
+def attitudes(count: int = 6) -> tuple[Floats, Floats]:
+    """Give omega, phi, kappa and the rotations they stand for, by a library that is not ours."""
+    rng = np.random.default_rng(4)
+    values = np.column_stack([rng.normal(0, np.radians(2), (count, 2)), rng.uniform(-3, 3, count)])
+    return values, Rotation.from_euler("XYZ", values).as_matrix()
+
+
+@pytest.mark.parametrize(
+    ("factor", "word"),
+    [(200 / 180, "gons"), (180 / 200, "degrees"), (180 / np.pi, "degrees"), (np.pi / 180, "radians")],
+)
+def test_angles_in_another_unit(factor: float, word: str) -> None:
+    values, matrices = attitudes()
+    names = [f"{number}" for number in range(len(values))]
+    assert list(rotations.find_wrong_angles(values, "omega-phi-kappa", matrices, names)) == []
+    (finding,) = rotations.find_wrong_angles(values * factor, "omega-phi-kappa", matrices, names)
+    assert finding.code == "P601"
+    assert f"; as {word} they differ by 0.00" in finding.message
+    assert finding.evidence["rms_as_read_otherwise_deg"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_angles_in_another_system() -> None:
+    values, matrices = attitudes()
+    names = [f"{number}" for number in range(len(values))]
+    for wrong in (values * [1, 1, -1], values + np.array([0, 0, np.pi / 2]), values * [-1, 1, 1]):
+        assert [each.code for each in rotations.find_wrong_angles(wrong, "omega-phi-kappa", matrices, names)] == [
+            "P602"
+        ]
+    rough = values + np.random.default_rng(1).normal(0, np.radians(3), values.shape)
+    assert list(rotations.find_wrong_angles(rough, "omega-phi-kappa", matrices, names)) == []
+
+
+# --------------------------------------------------------------------------------------------------------- fits
+
+
+@given(st.integers(0, 10_000), st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_a_strip_is_laid_on_control_of_which_a_third_is_wrong(seed: int, mirrored: bool) -> None:
+    rng = np.random.default_rng(seed)
+    w = rng.uniform(0, 10, 12) + 1j * rng.uniform(-1, 1, 12)
+    turn = 50.0 * np.exp(1j * rng.uniform(-3, 3))
+    plan = turn * (np.conj(w) if mirrored else w) + (3e5 + 5e6j)
+    plan[:4] += rng.uniform(100, 1e5, 4) * np.exp(1j * rng.uniform(-3, 3, 4))
+    right, wrong = fit_similarity(w, plan, mirrored=mirrored), fit_similarity(w, plan, mirrored=not mirrored)
+    assert right is not None
+    assert wrong is not None
+    assert right.median < 1e-6
+    assert wrong.median > 1.0
+    assert right.turn == pytest.approx(turn, rel=1e-9)
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=30, deadline=None)
+def test_a_fit_is_not_disturbed_by_wrong_values(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    columns = np.column_stack([np.ones(15), rng.uniform(-1, 1, (15, 2))])
+    values = columns @ [3.0, -2.0, 1.0] + rng.normal(0, 0.01, 15)
+    values[[2, 7, 11]] += rng.choice([-1, 1], 3) * rng.uniform(5, 1e4, 3)
+    fit = fit_robustly(columns, values, np.ones(15, bool), 0.01)
+    assert np.flatnonzero(fit.odd).tolist() == [2, 7, 11]
+    assert fit.coefficient == pytest.approx([3.0, -2.0, 1.0], abs=0.06)
+
+
+def test_image_residuals_and_how_a_step_moves_them() -> None:
+    rng = np.random.default_rng(8)
+    rotations = Rotation.from_euler("xyz", rng.normal(0, 0.1, (4, 3))).as_matrix()
+    centers, place = np.column_stack([np.arange(4.0), rng.normal(0, 0.1, (4, 2))]), np.array([1.3, 0.4, -2.0])
+    axes = (rotations.transpose(0, 2, 1) @ (place - centers)[:, :, None])[:, :, 0]
+    xy = -153.0 * axes[:, :2] / axes[:, 2:]  # the camera looks along -z
+    rays = Rays(xy, np.full(4, 0.005), centers, rotations, 153.0)
+    residual, jacobian = rays.residuals(place)
+    assert np.abs(residual).max() < 1e-10
+    assert rays.shown(place)
+    assert not rays.shown(np.array([1.3, 0.4, 5.0]))  # above the cameras
+    for axis in range(3):
+        step = 1e-6 * np.eye(3)[axis]
+        numeric = (rays.residuals(place + step)[0] - rays.residuals(place - step)[0]) / 2e-6
+        assert jacobian[:, :, axis] == pytest.approx(numeric, abs=1e-5)
+
+
+def test_a_strip_is_set_upright() -> None:
+    axes = Rotation.from_euler("XYZ", [[30, 20, 10], [31, 19, 200]], degrees=True).as_matrix()[:, :, 2]
+    turn = upright(axes)
+    assert turn @ turn.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    mean = axes.mean(axis=0)
+    assert turn @ mean / np.linalg.norm(mean) == pytest.approx([0, 0, 1], abs=1e-12)
+
+
+def test_the_spread_of_a_fit_is_that_of_another_measurement() -> None:
+    """Of a mean of n values: sigma of one value times sqrt(1 + 1/n), also for what took no part."""
+    values = np.array([-1.0, 1.0] * 6)
+    found = fit_robustly(np.ones((12, 1)), values, np.ones(12, bool), 1e-3)
+    assert found.sigma0 == pytest.approx(np.std(values, ddof=1))
+    assert found.spread == pytest.approx(np.full(12, found.sigma0 * np.sqrt(1 + 1 / 12)))
+    assert found.sigma == pytest.approx([found.sigma0 / np.sqrt(12)])
+
+
+def test_a_finding_says_between_which_photos_control_lies() -> None:
+    photos = [f"{number}" for number in range(1, 12)]
+    (found,) = layout.find_weak_ends(np.array([2.0, 2.1, 2.9, 3.0]), photos, "A", list("abcd"))
+    assert found.code == "P501"
+    assert found.evidence == {"first_control_at_photo": 3.0, "last_control_at_photo": 4.0, "photos": 11}

@@ -1,0 +1,224 @@
+"""Errors of a strip against differences of the whole run, and its covariances against derivatives written out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.pipeline.inputs import Settings
+from photostrip.pipeline.precision.photo_precision import photo_errors
+from photostrip.pipeline.run import triangulate
+from photostrip.strip.error_propagation import fitted_strip as fitted
+from photostrip.strip.polynomial import correction
+from photostrip.strip.strip_formation.scale_transfer import StripFormationSettings
+from tests.derivatives import (
+    UNSCREENED,
+    differenced,
+    differenced_by_control,
+    fitted_strip,
+    spec,
+    without_noise,
+    written_out,
+)
+from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    from photostrip.arrays import Floats
+    from photostrip.pipeline.results import Result
+    from photostrip.strip.error_propagation.fitted_strip import FittedStrip
+
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
+CLOSE = 1e-6  # of the largest derivative; differences of a run know no more
+MIXED = {"xyz": 0.4, "xy": 0.3, "z": 0.3}
+
+
+def settings(adjustment: str, transfer: str = "least_squares", intersection: str = "mean") -> Settings:
+    degree = adjustment if adjustment in {"1", "2", "3"} else "auto"
+    return Settings(
+        adjustment="similarity" if adjustment == "similarity" else "polynomial",
+        relative=UNSCREENED,
+        formation=StripFormationSettings(transfer, intersection=intersection),
+        polynomial=correction.PolynomialSettings(degree),
+    )
+
+
+CASES = [
+    ("similarity", 60.0, 0.0, "least_squares", "mean", None),
+    ("similarity", 80.0, 0.0, "distances", "mean", None),
+    ("similarity", 62.0, 0.0, "distances", "left", None),
+    ("similarity", 62.0, 95.7, "distances", "left", None),
+    ("3", 62.0, 0.0, "least_squares", "mean", None),
+    ("2", 70.0, 0.0, "least_squares", "mean", MIXED),
+]
+
+
+def after_fit(found: FittedStrip, rows: csr_array, influence: Floats, size: int) -> Floats:
+    """Derivatives (n, d, ...) of things of d rows by all errors of the strip, then of the control."""
+    control = found.control
+    misclosures = written_out(found.errors, found.errors.along(control.row, control.direction))
+    by_control = influence @ found.fit.operator
+    by_strip = written_out(found.errors, rows) - by_control @ misclosures
+    whole = np.concatenate([by_strip, by_control * np.sqrt(control.variance)], axis=1)
+    return whole.reshape(-1, size, whole.shape[1])
+
+
+def points_of(found: FittedStrip) -> Floats:
+    rows = found.errors.points(np.arange(len(found.xyz)))
+    return after_fit(found, rows, found.fit.influence(found.xyz).reshape(rows.shape[0], -1), 3)
+
+
+def photos_of(found: FittedStrip, result: Result) -> Floats:
+    by = photo_errors(result.strips[0], found.errors, result.refined.observations)
+    rows = by.by_point @ found.errors.points(np.arange(len(found.xyz))) + by.by_image
+    return after_fit(found, rows, by.by_point @ found.fit.influence(found.xyz).reshape(3 * len(found.xyz), -1), 6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("adjustment", "lap", "kappa", "transfer", "intersection", "use"), CASES)
+def test_derivatives_are_those_of_the_whole_run(
+    adjustment: str, lap: float, kappa: float, transfer: str, intersection: str, use: dict[str, float] | None
+) -> None:
+    """Relative orientation, chain, scale transfer, intersection, means, similarity, polynomials, resection at once."""
+    wanted_strip = spec(8, lap, use=use)
+    inputs = without_noise(replace(wanted_strip, flight=replace(wanted_strip.flight, photo_rotation_deg=kappa)))
+    wanted = settings(adjustment, transfer, intersection)
+    result = triangulate(inputs, wanted)
+    found = fitted_strip(result)
+    errors, points, photos = found.errors, points_of(found), photos_of(found, result)
+    rng = np.random.default_rng(2)
+    for image in nonempty(rng.choice(np.unique(errors.orientation.rows), 4, replace=False).tolist()):
+        axis = int(rng.integers(2))
+        by_points, by_photos = differenced(result, (image, axis), 2e-4)
+        column, sigma = errors.image_columns(np.array(image))[axis], errors.sigma[image, axis]
+        assert points[:, :, column] / sigma == pytest.approx(by_points, abs=CLOSE * np.abs(by_points).max())
+        for part in (slice(0, 3), slice(3, 6)):
+            expected = by_photos[:, part]
+            close = 10 * CLOSE * np.abs(expected).max()
+            assert photos[:, part, column] / sigma == pytest.approx(expected, abs=close)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("adjustment", "use"), [("similarity", MIXED), ("3", None), ("1", MIXED)])
+def test_the_fit_passes_on_errors_of_the_control(adjustment: str, use: dict[str, float] | None) -> None:
+    inputs, wanted = without_noise(spec(7, use=use)), settings(adjustment)
+    result = triangulate(inputs, wanted)
+    found = fitted_strip(result)
+    by_control = points_of(found)[:, :, -len(found.control.point) :] / np.sqrt(found.control.variance)
+    names = [inputs.control.ids.index(name) for name in result.strips[0].control.ids]
+    for column in nonempty(range(0, len(found.control.point), 5)):
+        row, axis = names[found.control.point[column]], int(found.control.axis[column])
+        expected = differenced_by_control(result, row, axis, 0.01)
+        # a map's coordinates are those of the ground to within its scale; a level axis turns by the Earth's curvature
+        assert by_control[:, :, column] == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("photos", "lap"), [(2, 62.0), (4, 70.0), (9, 80.0)])
+def test_covariances_are_products_of_derivatives(photos: int, lap: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of points and photos, some at a time, and of coordinates together; the variance factor is of images alone."""
+    result = triangulate(without_noise(spec(photos, lap, bands=min(4, photos))), settings("similarity"))
+    found, plain = fitted_strip(result, 1.7), fitted_strip(result)
+    count = len(found.control.point)
+    points, photo = (np.array(each) for each in (points_of(plain), photos_of(plain, result)))
+    for derivatives in (points, photo):
+        derivatives[..., :-count] *= np.sqrt(1.7)
+    monkeypatch.setattr(fitted, "AT_A_TIME", 20 * photos)
+    some = np.random.default_rng(1).permutation(len(points))
+    assert found.covariances_of_points(some) == pytest.approx((points @ points.transpose(0, 2, 1))[some])
+    by = photo_errors(result.strips[0], found.errors, result.refined.observations)
+    covariances = found.covariances_of_photos(by, np.arange(photos))
+    expected = photo @ photo.transpose(0, 2, 1)
+    size = np.sqrt(np.einsum("nii->ni", expected))
+    assert np.abs(
+        covariances / size[:, None] / size[:, :, None] - expected / size[:, None] / size[:, :, None]
+    ).max() < (1e-9)
+    directions = np.random.default_rng(2).normal(size=(len(some), 3))
+    along = np.einsum("ni,nic->nc", directions, points[some])
+    expected = along @ along.T
+    assert found.joint_covariance(some, directions) == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("doubt", [0.0, 1e-4])
+def test_parts_of_a_strip_have_the_covariances_of_the_whole(doubt: float) -> None:
+    """But for a similarity of all their points; doubts about scales count like other errors."""
+    result = triangulate(without_noise(spec(14)), settings("similarity"))
+    errors = fitted_strip(result).errors.with_doubt(np.full(12, doubt))
+    along = np.argsort(errors.xyz[:, 0], kind="stable")
+    for some in nonempty((along, along[:9], along[20:26], along[-9:])):
+        rows = errors.points(some)
+        design = similarity_derivatives(errors.xyz[some] - errors.xyz[some].mean(axis=0), np.zeros(3)).reshape(-1, 7)
+        left = np.eye(len(design)) - design @ np.linalg.pinv(design)  # after a similarity
+        whole = left @ written_out(errors, rows)
+        expected = whole @ whole.T
+        close = 1e-9 * np.abs(expected).max()
+        assert left @ errors.joint_covariance(rows, errors.frames(rows)[0]) @ left.T == pytest.approx(
+            expected, abs=close
+        )
+
+
+def test_the_operator_makes_the_correction_that_was_made() -> None:
+    """Parameters times misclosures of a noisy strip are what the run subtracted."""
+    wanted = settings("3")
+    inputs = without_noise(spec(9))
+    rng = np.random.default_rng(4)
+    noisy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
+    result = triangulate(replace(inputs, observations=replace(inputs.observations, xy=noisy)), wanted)
+    (strip,) = result.strips
+    found = fitted_strip(result)
+    similar = strip.absolute.similarity(strip.formed.xyz)
+    given = strip.absolute.misclosures[found.control.point, found.control.axis]
+    moved = similar - found.fit.influence(found.xyz) @ (found.fit.operator @ given)
+    assert moved == pytest.approx(strip.xyz, abs=1e-6)
+
+
+def test_a_photo_goes_where_all_its_points_go() -> None:
+    """Points that move together take the photo with them: the sum over its points is a motion of the whole."""
+    result = triangulate(without_noise(spec(6)), settings("similarity"))
+    errors = fitted_strip(result).errors
+    centers = result.strips[0].of_photos.resection.centers - errors.origin
+    by = photo_errors(result.strips[0], errors, result.refined.observations)
+    together = similarity_derivatives(errors.xyz, np.zeros(3)).reshape(-1, 7)
+    photos = (by.by_point @ together).reshape(6, 6, 7)
+    assert photos[:, :3, :3] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
+    assert photos[:, :3, 6] == pytest.approx(centers, abs=1e-6)
+    assert photos[:, 3:, 3:6] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
+    assert photos[:, 3:, [0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("adjustment", ["similarity", "polynomial"])
+def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
+    """A point whose middle measurement is wrong is placed by the outer two; its derivatives against differences."""
+    inputs = without_noise(spec(7, 62.0))
+    observations = inputs.observations
+    counts = np.bincount(observations.point)
+    point = int(np.flatnonzero(counts == 3)[5])
+    rows = np.flatnonzero(observations.point == point)
+    rows = rows[np.argsort(observations.photo[rows])]
+    xy = observations.xy.copy()
+    xy[rows[1]] += [0.3, 0.4]
+    inputs = replace(inputs, observations=replace(observations, xy=xy))
+    plain = Settings(adjustment="similarity")
+    result = triangulate(inputs, plain)
+    formed = result.strips[0].of_photos.formed
+    assert set(formed.bridging) == {rows[0], rows[2]}
+    found = fitted_strip(result)
+    errors, by_errors = found.errors, points_of(found)
+    place = int(np.searchsorted(formed.point, point))
+    for row in (rows[0], rows[2], int(np.flatnonzero(observations.photo == 3)[2])):
+        by_points, _ = differenced(result, (int(row), 1), 2e-4)
+        column = int(errors.image_columns(np.array(row))[1])
+        derivative = by_errors[place, :, column] / errors.sigma[row, 1]
+        assert derivative == pytest.approx(by_points[place], abs=CLOSE * np.abs(by_points).max())
+    precise = triangulate(inputs, Settings(adjustment=adjustment)).precision
+    assert precise is not None
+    sigma = np.sqrt(np.diagonal(precise.points, axis1=1, axis2=2))
+    ratio = sigma[place] / np.median(sigma, axis=0)
+    assert (ratio > 0.5).all()
+    assert (ratio < 3.0).all()

@@ -1,0 +1,95 @@
+"""Weak pairs: what six standard points give, what a narrow band costs, and that sound strips have none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.pipeline.run import triangulate
+from photostrip.simulation import DIGITAL, Flight, Ground, Image, Points, Spec, Terrain, simulate
+from photostrip.strip.error_propagation.weak_pairs import times_a_good_pair
+from photostrip.strip.relative_orientation.orientation import orient_pairs
+from photostrip.strip.relative_orientation.pairs import Pairs
+from photostrip.strip.relative_orientation.solution import base_rays, solve_elements, turns
+from tests.simulated import inputs_of, settings_of
+
+if TYPE_CHECKING:
+    from photostrip.arrays import Floats
+
+
+FOCAL, BASE = 100.0, 70.0
+DRAWS = 2000
+NOISE = 0.001  # mm
+
+
+def band(spread: float, kappa: float = 0.0) -> tuple[Floats, Floats]:
+    """Six points of two level photos, in rows as far apart as `spread`, the camera turned by `kappa`."""
+    left = np.array([[x, y] for x in (0.0, BASE) for y in (-spread, 0.0, spread)])
+    turn = np.array([[np.cos(kappa), -np.sin(kappa)], [np.sin(kappa), np.cos(kappa)]])
+    return left @ turn, (left - [BASE, 0.0]) @ turn
+
+
+def repeated(left: Floats, right: Floats, times: int = 1, noise: float = 0.0) -> Pairs:
+    """Pairs of the same points, each measured anew."""
+    rng, n = np.random.default_rng(3), len(left)
+    rows = np.arange(times * n)
+    return Pairs(
+        starts=np.arange(times) * n,
+        pair=rows // n,
+        left=np.tile(left, (times, 1)) + rng.normal(0.0, noise, (times * n, 2)),
+        right=np.tile(right, (times, 1)) + rng.normal(0.0, noise, (times * n, 2)),
+        weight=np.ones(times * n),
+        focal=FOCAL,
+        point=rows % n,
+        rows=np.column_stack([rows, rows]),
+    )
+
+
+def of(left: Floats, right: Floats) -> float:
+    (found,) = times_a_good_pair(orient_pairs(repeated(left, right), ("1", "2")))
+    return float(found)
+
+
+def scatter(elements: Floats, pairs: Pairs) -> float:
+    """Rms scatter of points intersected with given elements, as the left photo sees them."""
+    (x1, y1, z1), (x2, y2, z2) = base_rays(elements, pairs)
+    x1, y1, x2, y2 = -x1 / z1, -y1 / z1, -x2 / z2, -y2 / z2
+    in_base = np.column_stack([x1, (y1 + y2) / 2, -np.ones(len(x1))]) / (x1 - x2)[:, None]
+    rotations = turns(elements)[0][pairs.pair]
+    points = np.einsum("mi,mij->mj", in_base, rotations).reshape(pairs.size, -1, 3)
+    return float(np.sqrt(points.var(axis=0).sum(axis=1).mean()))
+
+
+@pytest.mark.parametrize("kappa", [0.0, 2.0])
+def test_a_pair_of_six_standard_points_is_a_good_one(kappa: float) -> None:
+    assert of(*band(BASE, kappa)) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("spread", "kappa"), [(BASE / 8, 0.0), (BASE / 3, 2.0), (1.3 * BASE, 1.0)])
+def test_points_scatter_as_many_times_as_in_a_good_pair(spread: float, kappa: float) -> None:
+    """Pairs measured anew, their points intersected with their own elements and with those of good pairs."""
+    measured = repeated(*band(spread, kappa), DRAWS, NOISE)
+    good = repeated(*band(BASE, kappa), DRAWS, NOISE)
+    by_itself, by_good = (scatter(solve_elements(pairs).elements, measured) for pairs in (measured, good))
+    assert of(*band(spread, kappa)) == pytest.approx(by_itself / by_good, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_sound_strips_along_the_long_side_of_the_format_are_not_weak(seed: int) -> None:
+    """Condition numbers of up to 260, which grow with the focal length; their points are fine."""
+    camera = replace(DIGITAL, principal_distance=24.0, format=(23.5, 15.6), pixel_size=0.0044)
+    flight = Flight(
+        photos=8,
+        strips=2,
+        flying_height=100.0,
+        end_lap_percent=80.0,
+        side_lap_percent=60.0,
+        attitude_sigma_deg=(2.0, 2.0, 2.0),
+    )
+    spec = Spec(seed=seed, camera=camera, ground=Ground(crs="local"), flight=flight, terrain=Terrain(relief=10.0))
+    simulation = simulate(replace(spec, points=Points(extra_per_model=40), image=Image(sigma_um=2.0)))
+    result = triangulate(inputs_of(simulation), settings_of(simulation))
+    assert [note.message for note in result.notes if note.code == "weak-pair"] == []

@@ -1,0 +1,580 @@
+"""Refinement of image coordinates: rays through an atmosphere, formulas written out, round trips, refusals."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from photostrip.camera import Camera, Distortion
+from photostrip.errors import GeometryError, InputError
+from photostrip.points import PhotoPoints
+from photostrip.strip.image_coordinates import corrections, lens_distortion
+from photostrip.strip.image_coordinates.corrections import Bending, Refined
+from photostrip.strip.image_coordinates.refraction import curvature_constant, refraction_constant
+from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings
+
+Floats = NDArray[np.float64]
+
+DATA = Path(__file__).parents[2] / "data" / "interior"
+MICROMETRE = 1e-3  # mm
+PICOMETRE = 1e-9
+FOCAL = 153.0
+FORWARD, BACKWARD = "image_to_ideal", "ideal_to_image"
+directions = pytest.mark.parametrize("direction", [FORWARD, BACKWARD])
+PLAIN = Camera("plain", FOCAL, format=(230.0, 230.0))
+NODES = tuple(np.arange(0.0, 171.0, 10.0))
+
+
+def refraction_shift(radius: Floats | float, principal_distance: float, constant: float) -> Floats:
+    """Outward shift dr = K (r + r^3 / f^2) of image points by refraction [Saastamoinen 1972].
+
+    Tilts of a few degrees change it by K f tan(tilt), the same for the whole photo, which the orientation takes up.
+    """
+    r = np.asarray(radius, float)
+    return np.asarray(constant * r * (1 + (r / principal_distance) ** 2), np.float64)
+
+
+def old_lens(radius: Floats) -> Floats:
+    """Distortion of an old wide-angle lens, mm: -4 to 8 micrometres, odd in the radius."""
+    u = np.asarray(radius) / 110
+    return np.asarray(1e-3 * u * (-23.1 + 77.3 * u**2 - 31.4 * u**4 - 18.9 * u**6))
+
+
+def table(direction: str, nodes: tuple[float, ...] = NODES) -> Distortion:
+    values = 0.02 * np.sin(np.array(nodes) / 28)  # 20 micrometres, up and down and up again
+    return Distortion("radial-table", direction, radius=nodes, distortion=tuple(values))
+
+
+def brown(
+    direction: str,
+    k: tuple[float, float, float],
+    p: tuple[float, float] = (0.0, 0.0),
+    b: tuple[float, float] = (0.0, 0.0),
+) -> Distortion:
+    return Distortion("brown", direction, k=k, p=p, b=b)
+
+
+def observed(xy: Floats, photos: tuple[str, ...] = ("1",)) -> PhotoPoints:
+    n = len(xy)
+    return PhotoPoints(
+        photos,
+        tuple(f"P{i}" for i in range(n)),
+        np.repeat(np.arange(len(photos)), n),
+        np.tile(np.arange(n), len(photos)),
+        np.tile(xy, (len(photos), 1)),
+        np.full((n * len(photos), 2), 0.005),
+    )
+
+
+def refine(xy: Floats, camera: Camera, settings: ImageCorrectionSettings | None = None) -> Refined:
+    return corrections.refine(observed(xy), {"1": camera}, settings or ImageCorrectionSettings())
+
+
+unit = st.floats(-1, 1)
+# up to 7 % of pincushion or barrel in the corner, far more than any camera for photogrammetry has
+browns = st.builds(
+    lambda direction, a, b, c, d, e, f, g: brown(
+        direction, (a * 1e-6, b * 3e-11, c * 1e-15), (d * 2e-6, e * 2e-6), (f * 1e-3, g * 1e-3)
+    ),
+    st.sampled_from([FORWARD, BACKWARD]),
+    unit,
+    unit,
+    unit,
+    unit,
+    unit,
+    unit,
+    unit,
+)
+tables = st.builds(
+    lambda direction, values: Distortion(
+        "radial-table",
+        direction,
+        radius=tuple(np.arange(1, len(values) + 1) * 180 / len(values)),
+        distortion=tuple(0.05 * v for v in values),
+    ),
+    st.sampled_from([FORWARD, BACKWARD]),
+    st.lists(unit, min_size=1, max_size=12),
+)
+cameras = st.builds(
+    lambda distortion, x0, y0: replace(PLAIN, principal_point=(x0, y0), distortion=distortion),
+    st.one_of(browns, tables),
+    unit,
+    unit,
+)
+image_points = st.lists(st.tuples(st.floats(-115, 115), st.floats(-115, 115)), min_size=1, max_size=8).map(np.array)
+
+
+# ------------------------------------------------------------------------------------------- order and inverse
+
+
+bendings = st.builds(Bending, st.floats(-4e-4, 4e-4), st.floats(0, 1e-3))
+
+
+@pytest.mark.slow
+@given(cameras, image_points, bendings)
+def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constant: Bending) -> None:
+    ideal = corrections.undistort(image, camera, constant)
+    assert np.abs(corrections.distort(ideal, camera, constant) - image).max() < PICOMETRE
+    again = corrections.undistort(corrections.distort(ideal, camera, constant), camera, constant)
+    assert np.abs(again - ideal).max() < PICOMETRE
+
+
+@pytest.mark.slow
+@given(cameras, image_points)
+def test_a_table_of_points_is_refined_as_its_camera_alone(camera: Camera, image: Floats) -> None:
+    settings = ImageCorrectionSettings(refraction=True, flying_height=3000.0, ground_height=200.0)
+    found = refine(image, camera, settings).observations
+    constant = Bending(refraction_constant(3000.0, 200.0))
+    assert np.array_equal(found.xy, corrections.undistort(image, camera, constant))
+    assert found.photo_ids == ("1",)
+
+
+def test_the_order_is_principal_point_distortion_refraction_curvature() -> None:
+    camera = replace(PLAIN, principal_point=(0.5, -0.3), distortion=brown(FORWARD, (3e-7, 0.0, 0.0)))
+    x, y = 100.5, -70.3
+    x, y = x - 0.5, y + 0.3
+    stretch = 1 + 3e-7 * (x * x + y * y)
+    x, y = x * stretch, y * stretch
+    shrink = 1 - 5e-5 * (1 + (x * x + y * y) / FOCAL**2)
+    x, y = x * shrink, y * shrink
+    stretch = 1 + 2e-4 * (x * x + y * y) / FOCAL**2
+    expected = [x * stretch, y * stretch]
+    found = corrections.undistort(np.array([[100.5, -70.3]]), camera, Bending(5e-5, 2e-4))
+    assert found[0] == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.sampled_from([FORWARD, BACKWARD]), st.tuples(*[unit] * 7), st.floats(-100, 100), st.floats(-100, 100))
+def test_brown_is_the_formula_of_the_project_file(direction: str, c: tuple[float, ...], x: float, y: float) -> None:
+    k1, k2, k3, p1, p2 = c[0] * 1e-6, c[1] * 1e-11, c[2] * 1e-16, c[3] * 1e-6, c[4] * 1e-6
+    b1, b2 = c[5] * 1e-3, c[6] * 1e-3
+    camera = replace(PLAIN, distortion=brown(direction, (k1, k2, k3), (p1, p2), (b1, b2)))
+    r2 = x**2 + y**2
+    dx = x * (k1 * r2 + k2 * r2**2 + k3 * r2**3) + p1 * (r2 + 2 * x**2) + 2 * p2 * x * y + b1 * x + b2 * y
+    dy = y * (k1 * r2 + k2 * r2**2 + k3 * r2**3) + p2 * (r2 + 2 * y**2) + 2 * p1 * x * y
+    given_points, shifted = np.array([[x, y]]), np.array([[x + dx, y + dy]])
+    shift = corrections.undistort if direction == FORWARD else corrections.distort
+    assert shift(given_points, camera) == pytest.approx(shifted, abs=1e-12)
+
+
+@given(st.one_of(browns, tables), image_points)
+def test_the_jacobian_agrees_with_differences(distortion: Distortion, points: Floats) -> None:
+    points = points[np.hypot(*points.T) > 1]
+    h = 1e-4
+    ways = (
+        [points + h * unit_vector for unit_vector in np.eye(2)],
+        [points - h * unit_vector for unit_vector in np.eye(2)],
+    )
+    columns = [
+        (a + lens_distortion.shift(a, distortion) - b - lens_distortion.shift(b, distortion)) / (2 * h)
+        for a, b in zip(*ways, strict=True)
+    ]
+    assert np.allclose(lens_distortion.jacobian(points, distortion), np.stack(columns, -1), rtol=0, atol=1e-7)
+
+
+# ------------------------------------------------------------------------------------------- signs
+
+
+def test_the_principal_point_itself_becomes_the_origin() -> None:
+    camera = replace(PLAIN, principal_point=(0.012, -0.004), distortion=table(FORWARD))
+    found = refine(np.array([[0.012, -0.004]]), camera)
+    assert np.array_equal(found.observations.xy, [[0.0, 0.0]])
+    assert found.largest_um == {"principal point": pytest.approx(12.65, abs=0.01), "distortion": 0.0}
+
+
+@directions
+def test_a_pincushion_image_is_drawn_in(direction: str) -> None:
+    """A lens that draws the corners out: the image is larger than the ideal, in whatever direction it is written."""
+    sign = 1 if direction == BACKWARD else -1
+    camera = replace(PLAIN, distortion=brown(direction, (sign * 1e-7, 0.0, 0.0)))
+    image = np.array([[100.0, 0.0], [0.0, -100.0]])
+    found = refine(image, camera)
+    assert found.observations.xy == pytest.approx(image * 0.999, abs=0.5 * MICROMETRE)
+    assert found.largest_um["distortion"] == pytest.approx(100.0, rel=0.005)
+
+
+@directions
+def test_a_table_has_the_sign_of_its_direction(direction: str) -> None:
+    distortion = Distortion(
+        "radial-table", direction, radius=(0.0, 50.0, 100.0, 150.0), distortion=(0.0, 0.003, 0.006, 0.009)
+    )
+    camera = replace(PLAIN, format=None, distortion=distortion)
+    image = np.array([[60.0, -80.0]])
+    expected = image * (1 + 6e-5) if direction == FORWARD else image / (1 + 6e-5)
+    assert corrections.undistort(image, camera) == pytest.approx(expected, abs=1e-9)
+
+
+# ------------------------------------------------------------------------------------------- tables
+
+
+def test_a_spline_through_a_cubic_is_the_cubic() -> None:
+    polynomial = brown(FORWARD, (3e-8, 0.0, 0.0))
+    for nodes in ((60.0, 170.0), (0.0, 20.0, 50.0, 90.0, 170.0), NODES):
+        tabulated = Distortion("radial-table", FORWARD, radius=nodes, distortion=tuple(3e-8 * r**3 for r in nodes))
+        points = np.random.default_rng(1).uniform(-110, 110, (200, 2))
+        assert (
+            np.abs(lens_distortion.shift(points, tabulated) - lens_distortion.shift(points, polynomial)).max() < 1e-12
+        )
+        assert np.allclose(
+            lens_distortion.jacobian(points, tabulated),
+            lens_distortion.jacobian(points, polynomial),
+            rtol=0,
+            atol=1e-12,
+        )
+
+
+def test_the_spline_is_that_of_scipy_with_the_table_mirrored() -> None:
+    distortion = table(FORWARD)
+    nodes, values = np.array(distortion.radius), np.array(distortion.distortion)
+    other = CubicSpline(np.append(-nodes[:0:-1], nodes), np.append(-values[:0:-1], values), bc_type="not-a-knot")
+    radius = np.linspace(0, 170, 1001)
+    found = lens_distortion.shift(np.stack([radius, np.zeros_like(radius)], -1), distortion)
+    assert np.abs(found[:, 0] - other(radius)).max() < 1e-12
+    assert not found[:, 1].any()
+
+
+@given(st.floats(0, 170), st.floats(0, 2 * np.pi))
+def test_a_table_is_the_same_in_all_directions(radius: float, azimuth: float) -> None:
+    direction = np.array([np.cos(azimuth), np.sin(azimuth)])
+    found = lens_distortion.shift(radius * direction[None], table(FORWARD))[0]
+    along_x = lens_distortion.shift(np.array([[radius, 0.0]]), table(FORWARD))[0, 0]
+    assert found == pytest.approx(along_x * direction, abs=1e-12)
+
+
+def test_the_values_of_the_table_are_kept() -> None:
+    rows = np.loadtxt(DATA / "published_distortion.csv", delimiter=",", skiprows=1)
+    distortion = Distortion("radial-table", FORWARD, radius=tuple(rows[:, 0]), distortion=tuple(rows[:, 1]))
+    found = lens_distortion.shift(np.stack([rows[:, 0], 0 * rows[:, 0]], -1), distortion)
+    assert found[:, 0] == pytest.approx(rows[:, 1], abs=1e-12)
+    between = lens_distortion.shift(np.stack([np.linspace(0, 110, 500), np.zeros(500)], -1), distortion)[:, 0]
+    # a spline may swing over: on this table, rounded to micrometres, by 0.1 micrometres
+    assert rows[:, 1].min() - 0.0001 < between.min()
+    assert between.max() < rows[:, 1].max() + 0.0001
+
+
+@pytest.mark.parametrize(
+    ("step", "spline_um", "monotone_um", "lines_um"), [(10.0, 0.05, 0.25, 0.7), (22.0, 0.6, 1.5, 2.5)]
+)
+def test_the_spline_follows_a_lens_better_than_other_interpolations(
+    step: float, spline_um: float, monotone_um: float, lines_um: float
+) -> None:
+    nodes, radius = np.arange(0, 111, step), np.linspace(0, 110, 1101)
+    distortion = Distortion("radial-table", FORWARD, radius=tuple(nodes), distortion=tuple(old_lens(nodes)))
+    found = lens_distortion.shift(np.stack([radius, 0 * radius], -1), distortion)[:, 0]
+
+    def off_um(values: Floats) -> float:
+        return float(np.abs(values - old_lens(radius)).max() / MICROMETRE)
+
+    assert off_um(found) < spline_um
+    assert off_um(PchipInterpolator(nodes, old_lens(nodes))(radius)) > monotone_um
+    assert off_um(np.interp(radius, nodes, old_lens(nodes))) > lines_um
+
+
+@directions
+def test_points_beyond_the_table_are_refused_by_name(direction: str) -> None:
+    camera = replace(PLAIN, principal_point=(1.0, 0.0), format=None, distortion=table(direction, (0.0, 50.0, 100.0)))
+    image = np.array([[80.0, 0.0], [99.0, 50.0], [-60.0, 80.5]])
+    with pytest.raises(InputError) as caught:
+        refine(image, camera)
+    places = [fault.message.partition(" mm from")[0] for fault in caught.value.faults]
+    assert places == ["photo 1, point P1: 110.018", "photo 1, point P2: 101.001"]
+    assert "the distortion table of camera plain ends at " in caught.value.faults[0].message
+    assert caught.value.faults[0].key == "cameras.plain.distortion.radius"
+    for convert in (corrections.distort, corrections.undistort):
+        with pytest.raises(InputError, match="lies beyond the distortion table"):
+            convert(image, camera)
+
+
+def test_of_many_points_beyond_the_table_the_first_are_named_and_all_counted() -> None:
+    camera = replace(PLAIN, format=None, distortion=table(FORWARD, (0.0, 50.0, 100.0)))
+    with pytest.raises(InputError) as caught:
+        refine(np.full((50, 2), 90.0), camera)
+    assert len(caught.value.faults) == corrections.SHOWN + 1
+    assert caught.value.faults[-1].message == "30 more points lie beyond the distortion table of camera plain"
+
+
+@directions
+def test_the_last_radius_of_a_table_belongs_to_it(direction: str) -> None:
+    camera = replace(PLAIN, format=None, distortion=table(direction, (0.0, 50.0, 100.0)))
+    image_limit, ideal_limit = lens_distortion.reach(table(direction, (0.0, 50.0, 100.0)))
+    ideal = corrections.undistort(np.array([[0.0, image_limit]]), camera)
+    assert ideal == pytest.approx(np.array([[0.0, ideal_limit]]), abs=PICOMETRE)
+    assert sorted([image_limit, ideal_limit]) == pytest.approx([100 + 0.02 * np.sin(100 / 28), 100.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("radius", "values", "message"),
+    [
+        ((10.0, 20.0), (0.001,), "2 radii and 1 distortions"),
+        ((), (), "0 radii and 0 distortions"),
+        ((0.0,), (0.0,), "a radius above 0"),
+        ((0.0, 20.0, 10.0), (0.0, 0.001, 0.002), "must increase"),
+        ((-1.0, 20.0), (0.0, 0.001), "must increase from 0 or above"),
+        ((0.0, 20.0), (0.003, 0.001), "at radius 0 is 0.003 mm; it must be 0"),
+    ],
+)
+def test_a_table_that_is_none_is_refused(radius: tuple[float, ...], values: tuple[float, ...], message: str) -> None:
+    camera = replace(PLAIN, distortion=Distortion("radial-table", FORWARD, radius=radius, distortion=values))
+    (fault,) = lens_distortion.faults(camera)
+    assert message in fault.message
+    assert fault.key == "cameras.plain.distortion"
+
+
+# ------------------------------------------------------------------------------------------- no inverse
+
+
+@pytest.mark.parametrize(
+    ("direction", "k1", "folds"),
+    [
+        (FORWARD, -1.0e-5, False),  # turns back at 182.6 mm, the corner of the format is at 162.6
+        (FORWARD, -1.3e-5, True),  # at 160.1
+        (BACKWARD, -1.0e-5, True),  # at an ideal radius of 182.6, but the image there is at 121.7 only
+        (BACKWARD, -5.0e-6, False),  # at 258.2, the image at 172.1
+        (BACKWARD, -6.0e-6, True),  # at 235.7, the image at 157.1
+        (FORWARD, 1e-5, False),
+        (BACKWARD, 1e-5, False),
+    ],
+)
+def test_distortion_that_folds_the_photo_is_refused(direction: str, k1: float, folds: bool) -> None:
+    camera = replace(PLAIN, distortion=brown(direction, (k1, 0.0, 0.0)))
+    found = lens_distortion.faults(camera)
+    assert bool(found) == folds
+    if folds:
+        # r (1 + k1 r^2) turns back where 1 + 3 k1 r^2 = 0; radii are tried in steps of at most 1 % of the corner's
+        turn = 1 / np.sqrt(-3 * k1)
+        radius = float(found[0].message.split("folds ")[1].split(" mm")[0])
+        assert turn - 0.06 < radius < turn + 0.01 * 162.7 + 0.06
+        with pytest.raises(InputError, match="the distortion has no inverse"):
+            refine(np.array([[10.0, 10.0]]), camera)
+
+
+def test_only_the_format_and_the_measured_points_must_have_an_inverse() -> None:
+    folds_at_105 = brown(FORWARD, (-1 / (3 * 105.0**2), 0.0, 0.0))
+    small = Camera("small", 50.0, format=(100.0, 100.0), distortion=folds_at_105)
+    assert not lens_distortion.faults(small)
+    assert lens_distortion.faults(replace(small, format=(160.0, 160.0)))
+    assert lens_distortion.faults(replace(small, principal_point=(40.0, 40.0)))
+    assert lens_distortion.faults(small, 110.0)
+    assert not lens_distortion.faults(replace(small, format=None))
+    with pytest.raises(InputError, match="folds"):
+        refine(np.array([[0.0, 110.0]]), replace(small, format=None))
+    with pytest.raises(GeometryError, match="no inverse at some point"):
+        corrections.distort(np.array([[90.0, 0.0]]), small)  # the largest ideal radius is 70 mm
+
+
+def test_an_ideal_point_may_lie_farther_out_than_its_image() -> None:
+    """Barrel distortion written from the ideal to the image folds beyond the format, not in it."""
+    camera = replace(PLAIN, format=(160.0, 160.0), distortion=brown(BACKWARD, (-9e-6, 0.0, 0.0)))  # images to 128.3 mm
+    image = np.array([[80.0, 80.0], [-80.0, 1.0]])
+    assert not lens_distortion.faults(camera)
+    ideal = refine(image, camera).observations.xy
+    assert np.hypot(*ideal[0]) > 135
+    assert np.abs(corrections.distort(ideal, camera) - image).max() < PICOMETRE
+
+
+# ------------------------------------------------------------------------------------------- refraction
+
+
+def atmosphere(height: Floats) -> Floats:
+    """Refractive index by heights in metres, by integrating the weight of the air: Gladstone and Dale, 0.226 cm3/g."""
+    fine = np.arange(-1000.0, 40_001.0, 1.0)
+    temperature = 288.15 - 0.0065 * np.minimum(fine, 11_000) + 0.001 * np.maximum(fine - 20_000, 0)
+    weight = 9.80665 / (287.053 * temperature)  # dp / p per metre
+    log_pressure = -np.concatenate([[0.0], np.cumsum((weight[1:] + weight[:-1]) / 2)])
+    pressure = 101_325 * np.exp(log_pressure - log_pressure[1000])
+    return np.asarray(1 + 2.26e-4 * np.interp(height, fine, pressure / (287.053 * temperature)))
+
+
+def traced(radius: float, flying: float, ground: float, earth_radius: float = np.inf) -> tuple[float, float]:
+    """Image radius without refraction of the ray that the camera sees at `radius`, and how far that ray goes, metres.
+
+    The ray is followed down through 4000 layers by Snell's law, in spherical layers by Bouguer's. Only heights count
+    on the way: the ideal direction is that of the straight line to the point where the ray meets the ground.
+    """
+    edges = np.linspace(flying, ground, 4001)
+    middle, step = (edges[1:] + edges[:-1]) / 2, (flying - ground) / 4000
+    level = 1 / (1 + middle / earth_radius) if np.isfinite(earth_radius) else np.ones_like(middle)
+    top = 1 / (1 + flying / earth_radius)
+    sine = atmosphere(np.array([flying]))[0] * np.sin(np.arctan(radius / FOCAL)) / atmosphere(middle) * level / top
+    tangent = sine / np.sqrt(1 - sine**2)
+    if not np.isfinite(earth_radius):
+        away, down = (step * tangent).sum(), flying - ground
+    else:
+        turned = (step * tangent / (earth_radius + middle)).sum()
+        away, down = (
+            (earth_radius + ground) * np.sin(turned),
+            earth_radius + flying - (earth_radius + ground) * np.cos(turned),
+        )
+    return FOCAL * away / down, away
+
+
+HEIGHTS = pytest.mark.parametrize(
+    ("flying", "ground"),
+    [(1000.0, 0.0), (3000.0, 500.0), (5000.0, 0.0), (8000.0, 4000.0), (12_000.0, 1000.0), (20_000.0, 0.0)],
+)
+
+
+@HEIGHTS
+@pytest.mark.parametrize("radius", [20.0, 90.0, 150.0])
+def test_refraction_is_that_of_a_ray_through_the_standard_atmosphere(
+    radius: float, flying: float, ground: float
+) -> None:
+    ideal, _ = traced(radius, flying, ground)
+    assert ideal < radius  # the ray bends towards the denser air below: the image lies too far outside
+    settings = ImageCorrectionSettings(refraction=True, flying_height=flying, ground_height=ground)
+    found = refine(np.array([[0.6 * radius, -0.8 * radius]]), PLAIN, settings)
+    corrected = np.hypot(*found.observations.xy[0])
+    assert corrected < radius
+    assert abs(corrected - ideal) < 0.03 * MICROMETRE
+    assert found.largest_um == {"refraction": pytest.approx((radius - ideal) / MICROMETRE, rel=0.004)}
+
+
+@HEIGHTS
+def test_the_curvature_of_the_layers_does_not_matter(flying: float, ground: float) -> None:
+    """Two rays that differ by refraction only, through round layers: what the plane formula leaves."""
+    bent, _ = traced(150.0, flying, ground, 6_371_000.0)
+    constant = refraction_constant(flying, ground)
+    assert abs(150.0 - refraction_shift(150.0, FOCAL, constant) - bent) < 0.1 * MICROMETRE
+
+
+@pytest.mark.parametrize(
+    ("flying", "ground", "off"), [(1000.0, 0.0, -0.22), (5000.0, 0.0, -0.05), (8000.0, 4000.0, 0.68)]
+)
+def test_why_the_formula_with_2410_is_not_used(flying: float, ground: float, off: float) -> None:
+    """The form printed in many textbooks (ARDC atmosphere), against the ray."""
+    H, h = flying / 1000, ground / 1000
+    constant = (2410 * H / (H**2 - 6 * H + 250) - 2410 * h / (h**2 - 6 * h + 250) * h / H) * 1e-6
+    shift = 90.0 - traced(90.0, flying, ground)[0]
+    assert constant * (90 + 90**3 / FOCAL**2) / shift - 1 == pytest.approx(off, abs=0.01)
+
+
+def test_the_constant_agrees_with_the_printed_formula() -> None:
+    for flying, ground in ((1000.0, 0.0), (5000.0, 300.0), (11_000.0, 2000.0)):
+        H, h = flying / 1000, ground / 1000
+        printed = 2335 / (H - h) * ((1 - 0.02257 * h) ** 5.256 - (1 - 0.02257 * H) ** 5.256)
+        printed = (printed - 277.0 * (1 - 0.02257 * H) ** 4.256) * 1e-6
+        assert refraction_constant(flying, ground) == pytest.approx(printed, rel=0.006)
+
+
+def test_the_constant_runs_on_through_the_tropopause() -> None:
+    below, at, above = (refraction_constant(11_000.0 + d, 0.0) for d in (-1, 0, 1))
+    assert 0 < at - below < 1e-8
+    assert 0 < above - at < 1e-8  # steeper, because the density falls faster above, but without a jump
+
+
+@given(st.floats(0, 170), st.floats(1000, 12_000))
+def test_refraction_shift_is_the_textbook_form(radius: float, flying: float) -> None:
+    constant = refraction_constant(flying, 0.0)
+    found = refraction_shift(radius, FOCAL, constant)
+    assert found == pytest.approx(constant * (radius + radius**3 / FOCAL**2), rel=1e-12)
+    corrected = corrections.undistort(np.array([[radius, 0.0]]), PLAIN, Bending(constant))
+    assert corrected[0, 0] == pytest.approx(radius - found, abs=1e-12)
+
+
+def test_refraction_without_heights_or_below_the_ground_is_refused() -> None:
+    image = np.array([[1.0, 1.0]])
+    with pytest.raises(InputError, match="flying height and height of the ground are not known"):
+        refine(image, PLAIN, ImageCorrectionSettings(refraction=True, flying_height=3000.0))
+    with pytest.raises(InputError, match="the flying height 400 m is not above the ground, 900 m"):
+        refine(image, PLAIN, ImageCorrectionSettings(refraction=True, flying_height=400.0, ground_height=900.0))
+
+
+# ------------------------------------------------------------------------------------------- Earth curvature
+
+
+@pytest.mark.parametrize("flying", [1500.0, 5000.0, 9000.0])
+@pytest.mark.parametrize("angle_deg", [15.0, 40.0, 55.0])
+def test_curvature_is_that_of_a_sphere_seen_from_above(flying: float, angle_deg: float) -> None:
+    radius = 6371000.0
+    tangent = np.tan(np.radians(angle_deg))
+    arc = flying * tangent / radius  # as a plane map has it: distances along the sphere
+    below = flying + radius * (1 - np.cos(arc))
+    seen = FOCAL * radius * np.sin(arc) / below
+    bending = Bending(curvature=curvature_constant(flying, 0.0, radius))
+    found = corrections.undistort(np.array([[0.0, seen]]), PLAIN, bending)
+    missing = FOCAL * tangent - seen
+    assert missing > 0  # the ground falls away from the plane, so its images lie too far inside
+    assert found[0, 0] == 0
+    assert found[0, 1] == pytest.approx(seen + missing, abs=0.01 * missing)
+
+
+def test_the_textbook_size_of_curvature() -> None:
+    # wide angle, 1:30 000, 140 mm from the middle: dr = r^3 H / (2 R f^2)
+    bending = Bending(curvature=curvature_constant(4590.0, 0.0, 6370000.0))
+    found = corrections.undistort(np.array([[140.0, 0.0]]), PLAIN, bending)
+    assert found[0, 0] - 140.0 == pytest.approx(140.0**3 * 4590.0 / (2 * 6370000.0 * FOCAL**2), rel=1e-9)
+    assert 0.0421 < found[0, 0] - 140.0 < 0.0423
+
+
+def test_curvature_tells_its_largest_shift_and_needs_heights() -> None:
+    image = np.array([[140.0, 0.0], [10.0, 0.0]])
+    settings = ImageCorrectionSettings(earth_radius=6370000.0, flying_height=4590.0, ground_height=0.0)
+    assert refine(image, PLAIN, settings).largest_um == {"earth curvature": pytest.approx(42.2, abs=0.1)}
+    with pytest.raises(InputError, match="earth_curvature: flying height and height of the ground are not known"):
+        refine(image, PLAIN, ImageCorrectionSettings(earth_radius=6370000.0))
+    with pytest.raises(InputError, match="earth_curvature: the flying height 4590 m is not above the ground, 5000 m"):
+        refine(image, PLAIN, replace(settings, ground_height=5000.0))
+
+
+# ------------------------------------------------------------------------------------------- tables of photos
+
+
+def test_each_photo_gets_its_camera() -> None:
+    first = replace(PLAIN, name="first", principal_point=(1.0, 0.0))
+    second = replace(PLAIN, name="second", distortion=brown(FORWARD, (1e-7, 0.0, 0.0)))
+    image = np.array([[30.0, 40.0], [60.0, 80.0]])
+    used = {"a": first, "b": second, "c": PLAIN, "d": first}
+    found = corrections.refine(observed(image, tuple(used)), used, ImageCorrectionSettings())
+    expected = np.vstack([corrections.undistort(image, camera) for camera in used.values()])
+    assert np.array_equal(found.observations.xy, expected)
+    assert np.array_equal(found.observations.xy[4:6], image)
+    assert found.largest_um == {"principal point": pytest.approx(1000.0), "distortion": pytest.approx(100.0)}
+    assert np.array_equal(found.observations.sigma, np.full((8, 2), 0.005))
+
+
+def test_every_fault_of_every_camera_is_told_at_once() -> None:
+    folding = replace(PLAIN, name="folding", distortion=brown(FORWARD, (-1e-4, 0.0, 0.0)))
+    short = replace(PLAIN, name="short", distortion=table(FORWARD, (0.0, 50.0)))
+    with pytest.raises(InputError) as caught:
+        corrections.refine(
+            observed(np.full((1, 2), 60.0), ("a", "b")), {"a": folding, "b": short}, ImageCorrectionSettings()
+        )
+    assert [fault.code for fault in caught.value.faults] == ["distortion-folds", "beyond-distortion-table"]
+
+
+def test_nothing_to_do_costs_nothing_and_a_big_strip_little() -> None:
+    photos = tuple(f"{i}" for i in range(1000))
+    measured = observed(np.random.default_rng(1).uniform(-110, 110, (30, 2)), photos)
+    assert (
+        corrections.refine(measured, dict.fromkeys(photos, PLAIN), ImageCorrectionSettings()).observations is measured
+    )
+    zeros = replace(PLAIN, distortion=brown(FORWARD, (0.0, 0.0, 0.0)))
+    nothing = corrections.refine(measured, dict.fromkeys(photos, zeros), ImageCorrectionSettings())
+    assert nothing.largest_um == {"distortion": 0.0}
+    assert np.array_equal(nothing.observations.xy, measured.xy)
+    full = replace(PLAIN, principal_point=(0.01, 0.02), distortion=brown(BACKWARD, (1e-7, 0.0, 0.0), (1e-6, 1e-6)))
+    start = time.perf_counter()
+    corrections.refine(measured, dict.fromkeys(photos, full), ImageCorrectionSettings())
+    assert time.perf_counter() - start < 2.0  # 0.03 s measured
+
+
+@pytest.mark.parametrize(("off", "effect"), [("principal_point", "principal point"), ("distortion", "distortion")])
+def test_each_correction_has_its_switch(off: str, effect: str) -> None:
+    camera = replace(PLAIN, principal_point=(0.012, -0.004), distortion=brown(FORWARD, (1.2e-8, 0.0, 0.0)))
+    points = observed(np.array([[80.0, -60.0], [-90.0, 10.0]]), ("1",))
+    both = corrections.refine(points, {"1": camera}, ImageCorrectionSettings())
+    one = corrections.refine(points, {"1": camera}, replace(ImageCorrectionSettings(), **{off: False}))
+    assert set(both.largest_um) - set(one.largest_um) == {effect}
+    without = (
+        replace(camera, principal_point=(0.0, 0.0)) if off == "principal_point" else replace(camera, distortion=None)
+    )
+    expected = corrections.refine(points, {"1": without}, ImageCorrectionSettings())
+    assert np.array_equal(one.observations.xy, expected.observations.xy)
+    assert both.largest_um[effect] == pytest.approx(12.6 if off == "principal_point" else 12.0, rel=0.03)

@@ -1,0 +1,525 @@
+"""Interior orientation: a published example, known film deformations, and every way to mix up marks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from photostrip.camera import Camera
+from photostrip.errors import InputError
+from photostrip.points import PhotoPoints
+from photostrip.strip.image_coordinates import interior
+from photostrip.strip.image_coordinates.fiducial_marks import WRONG_PATTERN, right_pattern
+from photostrip.strip.image_coordinates.fiducial_marks import Marks as MarksOfPhotos
+from photostrip.strip.image_coordinates.mark_fit import InteriorOrientation, linear_shape
+from photostrip.strip.image_coordinates.settings import InteriorSettings
+from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Marks = Mapping[str, Floats]
+
+DATA = Path(__file__).parents[2] / "data" / "interior"
+MICROMETRE = 1e-3  # mm
+NANOMETRE = 1e-6
+PICOMETRE = 1e-9
+CORNERS = Camera(
+    "RC30",
+    153.0,
+    fiducials={"F1": (106.0, -106.0), "F2": (-106.0, -106.0), "F3": (-106.0, 106.0), "F4": (106.0, 106.0)},
+)
+SIDES = Camera(
+    "RMK", 153.0, fiducials={"L": (-113.0, 0.02), "B": (0.01, -113.0), "R": (113.0, -0.01), "T": (-0.03, 113.0)}
+)
+EIGHT = Camera("RMK TOP", 153.0, fiducials=CORNERS.fiducials | SIDES.fiducials)
+OBLONG = Camera(
+    "MKF", 125.0, fiducials={"1": (110.0, -80.0), "2": (-110.0, -80.0), "3": (-110.0, 80.0), "4": (110.0, 80.0)}
+)
+DIGITAL = Camera("DMC", 120.0, pixel_size=0.012)
+CAMERAS = [pytest.param(camera, id=camera.name) for camera in (CORNERS, SIDES, EIGHT, OBLONG)]
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def calibrated(camera: Camera) -> dict[str, Floats]:
+    return {name: np.array(xy) for name, xy in camera.fiducials.items()}
+
+
+def table(photos: Mapping[str, Marks], sigma: float | Mapping[str, float] = 0.005) -> PhotoPoints:
+    """Marks of photos as a table; sigma for all, or by mark."""
+    names = list(dict.fromkeys(name for marks in photos.values() for name in marks))
+    rows = [(i, names.index(name), *xy) for i, marks in enumerate(photos.values()) for name, xy in marks.items()]
+    columns = np.array(rows).reshape(-1, 4)
+    point = columns[:, 1].astype(int)
+    deviations = np.array([sigma if isinstance(sigma, float | int) else sigma[name] for name in names])[point]
+    return PhotoPoints(
+        tuple(photos),
+        tuple(names),
+        columns[:, 0].astype(int),
+        point,
+        columns[:, 2:],
+        np.repeat(deviations[:, None], 2, 1),
+    )
+
+
+def points(photos: tuple[str, ...], xy: Floats, sigma: tuple[float, float] = (0.005, 0.005)) -> PhotoPoints:
+    """Points P0, P1, ... at the same places `xy` of every photo."""
+    n = len(xy)
+    return PhotoPoints(
+        photos,
+        tuple(f"P{i}" for i in range(n)),
+        np.repeat(np.arange(len(photos)), n),
+        np.tile(np.arange(n), len(photos)),
+        np.tile(xy, (len(photos), 1)),
+        np.tile(sigma, (n * len(photos), 1)),
+    )
+
+
+def orient(
+    photos: Mapping[str, Marks], camera: Camera = CORNERS, transform: str = "auto", **more: Camera
+) -> InteriorOrientation:
+    return interior.orient(table(photos), dict.fromkeys(photos, camera) | more, InteriorSettings(transform))
+
+
+def messages(photos: Mapping[str, Marks], camera: Camera = CORNERS, transform: str = "auto") -> list[str]:
+    with pytest.raises(InputError) as caught:
+        orient(photos, camera, transform)
+    assert all(fault.key == "fiducial_measurements" for fault in nonempty(caught.value.faults))
+    return [fault.message for fault in caught.value.faults]
+
+
+def codes(found: InteriorOrientation) -> list[str]:
+    return [note.code for note in found.notes]
+
+
+def moved(marks: Marks, matrix: Floats, shift: tuple[float, float] = (0.0, 0.0)) -> dict[str, Floats]:
+    return {name: matrix @ xy + np.array(shift) for name, xy in marks.items()}
+
+
+def quarter_turns(times: int, *, mirrored: bool = False) -> Floats:
+    turn = np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), times)
+    return np.asarray(turn @ np.diag([1.0, -1.0 if mirrored else 1.0]))
+
+
+def film(camera: Camera, rng: np.random.Generator, deformation: float = 2e-3, noise: float = 0.01) -> dict[str, Floats]:
+    """Marks of one photo on film: any small turn, shift, differential shrinkage of 0.2 %, 10 micrometres of noise."""
+    angle = rng.uniform(-0.05, 0.05)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    matrix = turn @ (np.eye(2) + rng.uniform(-deformation, deformation, (2, 2)))
+    shift = rng.uniform(-200, 200, 2)
+    return {name: matrix @ xy + shift + rng.normal(0, noise, 2) for name, xy in calibrated(camera).items()}
+
+
+def exchanged(marks: Marks, a: str, b: str) -> dict[str, Floats]:
+    return {**marks, a: marks[b], b: marks[a]}
+
+
+# ------------------------------------------------------------------------------------------- published
+
+
+def test_the_published_affine_transformation() -> None:
+    rows = np.loadtxt(DATA / "fiducials.csv", delimiter=",", skiprows=1)
+    camera = Camera("Noobeed", 152.058, fiducials={f"{int(row[0])}": (row[1], row[2]) for row in rows})
+    found = orient({"95": {f"{int(row[0])}": row[3:] for row in rows}}, camera, "affine")
+    published = np.loadtxt(DATA / "published_affine.csv", delimiter=",", skiprows=1, usecols=(1, 2, 3))
+    coefficients = found.photo_from_measured.coefficients[0]
+    assert coefficients[:2, :2] == pytest.approx(published[:, :2], abs=5e-16)  # all 15 printed decimals
+    assert coefficients[:2, 3] == pytest.approx(published[:, 2], abs=5e-4)
+    # one redundant mark for each axis: the four residuals of an axis have one size, 12.8 and 15.0 micrometres
+    assert np.abs(found.residuals[0]) == pytest.approx(np.tile([0.0128, 0.0150], (4, 1)), abs=5e-5)
+    assert found.redundancy.tolist() == [2]
+    assert found.sigma0[0] == pytest.approx(np.sqrt((4 * 0.012778**2 + 4 * 0.014975**2) / 2), abs=1e-5)
+    assert found.scale_x[0] == pytest.approx(0.0599885, abs=1e-7)
+    assert codes(found) == ["measured-scale"]
+
+
+# -------------------------------------------------------------------------------------- known deformation
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@given(seed=SEEDS)
+def test_film_deformation_is_taken_out(camera: Camera, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    angle, shift = rng.uniform(-0.7, 0.7), rng.uniform(-500, 500, 2)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    measured_from_photo = turn @ (np.eye(2) + rng.uniform(-2e-3, 2e-3, (2, 2)))
+    found = orient({"1": moved(calibrated(camera), measured_from_photo, tuple(shift))}, camera)
+    truth = rng.uniform(-110, 110, (30, 2))
+    image = interior.transform(points(("1",), truth @ measured_from_photo.T + shift), found)
+    assert np.abs(image.xy - truth).max() < PICOMETRE
+    assert found.sigma0[0] < PICOMETRE
+    assert found.transforms == ("affine",)
+    assert not found.notes
+
+
+@given(
+    st.floats(0.5, 2),
+    st.floats(0.5, 2),
+    st.floats(-3, 3),
+    st.floats(-0.3, 0.3),
+    st.booleans(),
+)
+def test_scales_rotation_and_shear_are_those_that_were_put_in(
+    scale_x: float, scale_y: float, rotation: float, shear: float, mirrored: bool
+) -> None:
+    x_axis = np.array([np.cos(rotation), np.sin(rotation)]) * scale_x
+    # seen along the x axis, the y axis stands at a right angle plus the shear; mirrored, on the other side
+    direction = rotation + (np.pi / 2 + shear) * (-1 if mirrored else 1)
+    y_axis = np.array([np.cos(direction), np.sin(direction)]) * scale_y
+    found = linear_shape(np.stack([x_axis, y_axis], 1))
+    assert np.allclose(found, (scale_x, scale_y, rotation, shear), rtol=0, atol=1e-12)
+
+
+def test_sigma0_is_the_precision_of_the_marks() -> None:
+    rng = np.random.default_rng(7)
+    photos = {f"{i}": film(EIGHT, rng) for i in range(400)}
+    found = orient(photos, EIGHT)
+    assert found.redundancy.tolist() == [10] * 400
+    # 4000 redundant coordinates of 10 micrometres: sigma0 known to 1.1 %; film shrinks, so the scale counts little
+    assert np.sqrt((found.sigma0**2).mean()) == pytest.approx(0.010, rel=0.04)
+    assert not found.notes
+
+
+def test_weights_follow_the_standard_deviations() -> None:
+    rng = np.random.default_rng(8)
+    marks = film(EIGHT, rng, noise=0.0)
+    marks["F1"] = marks["F1"] + [0.3, -0.2]
+    sigma = dict.fromkeys(EIGHT.fiducials, 0.005) | {"F1": 0.5}
+    found = interior.orient(table({"1": marks}, sigma), {"1": EIGHT}, InteriorSettings())
+    row = found.marks[0].index("F1")
+    assert np.linalg.norm(np.delete(found.residuals[0], row, 0), axis=1).max() < 0.05 * MICROMETRE
+    assert np.linalg.norm(found.residuals[0][row]) == pytest.approx(np.hypot(0.3, 0.2), rel=3e-3)
+    # residual 0.36 mm with weight 1e-4, where the other seven have 1 and the mean is 1
+    expected = np.sqrt(1e-4 / ((7 + 1e-4) / 8) * (0.3**2 + 0.2**2) / 10)
+    assert found.sigma0[0] == pytest.approx(expected, rel=0.01)
+
+
+def trapezoid(xy: Floats) -> Floats:
+    """A photo copied from a tilted print: 30 micrometres at the corners."""
+    return np.asarray(xy * (1 + 2.7e-6 * xy[..., :1]))
+
+
+def twist(xy: Floats) -> Floats:
+    """Film stretched in y, on the right side 30 micrometres more than in the middle."""
+    return np.asarray(xy * np.stack([np.ones(xy.shape[:-1]), 1 + 2.7e-6 * xy[..., 0]], -1))
+
+
+@pytest.mark.parametrize(("transform", "bent"), [("projective", trapezoid), ("bilinear", twist)])
+def test_what_an_affine_transformation_leaves_the_higher_ones_take(
+    transform: str, bent: Callable[[Floats], Floats]
+) -> None:
+    truth = np.random.default_rng(3).uniform(-100, 100, (50, 2))
+    marks = {"1": {name: bent(xy) for name, xy in calibrated(CORNERS).items()}}
+    affine, higher = orient(marks), orient(marks, transform=transform)
+    measured = points(("1",), bent(truth))
+    left = [np.abs(interior.transform(measured, found).xy - truth).max() for found in (affine, higher)]
+    assert left[0] > 20 * MICROMETRE
+    assert left[1] < 0.1 * MICROMETRE
+    assert (affine.redundancy[0], higher.redundancy[0]) == (2, 0)
+    assert affine.sigma0[0] > 10 * MICROMETRE
+    assert np.isnan(higher.sigma0[0])
+
+
+def test_standard_deviations_go_through_scale_and_turn() -> None:
+    found = orient({"1": moved(calibrated(CORNERS), 20 * quarter_turns(1))})  # pixels of 0.05 mm, turned
+    image = interior.transform(points(("1",), np.array([[100.0, 200.0]]), sigma=(0.4, 0.2)), found)
+    assert image.sigma == pytest.approx(np.array([[0.2 / 20, 0.4 / 20]]))
+
+
+# --------------------------------------------------------------------------------------- how many marks
+
+
+def test_the_number_of_marks_decides() -> None:
+    marks = calibrated(CORNERS)
+    photos = {
+        "1": marks,
+        "2": {name: marks[name] for name in ("F1", "F3", "F4")},
+        "3": {n: marks[n] for n in ("F2", "F4")},
+    }
+    found = orient(photos)
+    assert found.transforms == ("affine", "conformal", "conformal")
+    assert found.marks == (("F1", "F2", "F3", "F4"), ("F1", "F3", "F4"), ("F2", "F4"))
+    assert found.redundancy.tolist() == [2, 2, 0]
+    assert [(note.code, note.photos) for note in found.notes] == [("marks-unchecked", ("3",)), ("fewer-marks", ("2",))]
+
+
+@pytest.mark.parametrize(
+    ("transform", "names", "message"),
+    [
+        ("auto", "F1", r"photo 1: an interior orientation needs 2 fiducial marks, measured: 1 \(F1\)"),
+        ("affine", "F1 F2", r"photo 1: the affine transformation needs 3 fiducial marks, measured: 2 \(F1, F2\)"),
+        ("bilinear", "F1 F2 F3", "photo 1: the bilinear transformation needs 4 .* measured: 3"),
+        ("projective", "F1 F2 F3", "photo 1: the projective transformation needs 4 .* measured: 3"),
+        ("conformal", "", "photo 1: the conformal transformation needs 2 .* measured: none"),
+    ],
+)
+def test_too_few_marks_are_refused(transform: str, names: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        orient({"1": {name: calibrated(CORNERS)[name] for name in names.split()}}, transform=transform)
+
+
+def test_marks_on_one_line_are_refused_by_name() -> None:
+    line = Camera("line", 100.0, fiducials={"A": (-100.0, 0.0), "B": (0.0, 0.3), "C": (100.0, 0.0)})
+    assert messages({"1": calibrated(line)}, line, "affine") == [
+        "photo 1: marks A, B, C lie on one line: no affine transformation"
+    ]
+    assert orient({"1": calibrated(line)}, line).transforms == ("conformal",)
+
+
+def test_marks_in_the_middle_of_the_sides_do_not_give_a_bilinear_term() -> None:
+    (message,) = messages({"1": calibrated(SIDES)}, SIDES, "bilinear")
+    assert "L, B, R, T lie so that not all of its coefficients can be told: no bilinear" in message
+    assert orient({"1": calibrated(SIDES)}, SIDES, "projective").transforms == ("projective",)
+
+
+def test_every_fault_of_every_photo_is_told_at_once() -> None:
+    marks = calibrated(CORNERS)
+    photos: dict[str, Marks] = {
+        "1": marks,
+        "2": {"F1": marks["F1"], "F2": marks["F1"]},
+        "3": {},
+        "4": {**marks, "F9": marks["F1"]},
+        "5": exchanged(marks, "F1", "F2"),
+        "6": {"F1": marks["F1"]},
+    }
+    found = messages(photos)
+    assert [message.partition(":")[0] for message in found] == [f"photo {i}" for i in (4, 3, 6, 2, 5)]
+    assert found[0] == "photo 4: camera RC30 has no mark F9"
+    assert "all fiducial marks have the same coordinates" in found[3]
+
+
+def test_a_mark_measured_twice_is_refused() -> None:
+    once = table({"1": calibrated(CORNERS)})
+    rows = [0, 1, 2, 3, 0]
+    twice = PhotoPoints(("1",), once.point_ids, once.photo[rows], once.point[rows], once.xy[rows], once.sigma[rows])
+    with pytest.raises(InputError, match="photo 1: mark F1 is measured 2 times"):
+        interior.orient(twice, {"1": CORNERS}, InteriorSettings())
+
+
+# ------------------------------------------------------------------------------------- turned and mirrored
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize(
+    ("turns", "name"), [(1, "90 degrees counter-clockwise"), (2, "180 degrees"), (3, "90 degrees clockwise")]
+)
+def test_photos_that_were_scanned_turned_are_turned_back_and_named(camera: Camera, turns: int, name: str) -> None:
+    marks = calibrated(camera)
+    photos = {"1": marks, "2": moved(marks, quarter_turns(turns), (300.0, 10.0)), "3": marks}
+    found = orient(photos, camera)
+    (note,) = found.notes
+    assert (note.code, note.photos, note.severity) == ("photos-turned", ("2",), "warning")
+    assert f"measured turned by {name} against the marks" in note.message
+    truth = np.array([[50.0, 20.0], [-30.0, 80.0]])
+    measured = points(("2",), truth @ quarter_turns(turns).T + [300.0, 10.0])
+    assert np.abs(interior.transform(measured, found).xy - truth).max() < PICOMETRE
+    everyone = orient(dict.fromkeys("123", photos["2"]), camera)
+    assert [(each.code, each.photos, each.severity) for each in everyone.notes] == [
+        ("photos-turned", ("1", "2", "3"), "note")
+    ]
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("transform", ["auto", "conformal", "projective"])
+def test_a_strip_measured_mirrored_is_mirrored_back_and_named(camera: Camera, transform: str) -> None:
+    flip = quarter_turns(0, mirrored=True)
+    marks = moved(calibrated(camera), flip, (0.0, 4000.0))
+    two = {name: marks[name] for name in list(marks)[:2]}
+    found = orient({"1": marks, "2": marks} | ({} if transform == "projective" else {"3": two}), camera, transform)
+    assert found.mirrored.all()
+    assert "photos-mirrored" in codes(found)
+    truth = np.array([[50.0, 20.0], [-30.0, 80.0]])
+    measured = points(found.photo_ids, truth @ flip.T + [0.0, 4000.0])
+    # two marks show no hand: they follow the other photos of their camera
+    assert np.abs(interior.transform(measured, found).xy - np.tile(truth, (len(found.photo_ids), 1))).max() < PICOMETRE
+
+
+@pytest.mark.parametrize("majority", [False, True])
+def test_one_photo_mirrored_against_the_others_is_refused(majority: bool) -> None:
+    marks = film(EIGHT, np.random.default_rng(1))
+    usual, other = (moved(marks, quarter_turns(0, mirrored=mirrored)) for mirrored in (majority, not majority))
+    assert messages({"1": usual, "2": other, "3": usual}, EIGHT) == [
+        "photo 2: the fiducial marks are mirrored against the other photos of camera RMK TOP"
+    ]
+
+
+# ------------------------------------------------------------------------------------------- wrong numbers
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("mirrored", [False, True])
+@given(seed=SEEDS)
+def test_two_exchanged_marks_are_found_and_named(camera: Camera, mirrored: bool, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scan = quarter_turns(int(rng.integers(4)), mirrored=mirrored)
+    photos = {f"{i}": moved(film(camera, rng), scan) for i in range(3)}
+    a, b = rng.choice(list(camera.fiducials), 2, replace=False)
+    photos["1"] = exchanged(photos["1"], a, b)
+    (message,) = messages(photos, camera)
+    named = [f"with {x} and {y} exchanged" in message for x, y in ((a, b), (b, a))]
+    assert message.startswith("photo 1: ")
+    assert any(named), message
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_exchanged_marks_of_one_single_photo_are_found_where_the_pattern_shows_them(camera: Camera) -> None:
+    marks = calibrated(camera)
+    # opposite marks of a square: the mirror image fits exactly; without other photos it can only be told, not decided
+    silent = {"RC30": ["F1 F3", "F2 F4"], "RMK": ["L R", "B T"]}.get(camera.name, [])
+    for a, b in nonempty(combinations(marks, 2)):
+        photo = {"1": exchanged(marks, a, b)}
+        if f"{a} {b}" in silent:
+            assert "photos-mirrored" in codes(orient(photo, camera))
+        else:
+            (message,) = messages(photo, camera)
+            assert f"with {a} and {b} exchanged" in message
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("camera", CAMERAS)
+@given(seed=SEEDS)
+def test_a_mark_with_the_number_of_one_not_measured_is_found(camera: Camera, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    photos = {f"{i}": film(camera, rng) for i in range(3)}
+    wrong, missing = rng.choice(list(camera.fiducials), 2, replace=False)
+    photos["1"][wrong] = photos["1"].pop(missing)
+    (message,) = messages(photos, camera)
+    assert f"with {wrong} called {missing}" in message
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("camera", CAMERAS)
+@given(seed=SEEDS)
+def test_a_point_taken_for_a_mark_is_found(camera: Camera, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    photos = {f"{i}": film(camera, rng) for i in range(3)}
+    wrong = rng.choice(list(camera.fiducials))
+    photos["1"][wrong] = photos["1"][wrong] + rng.choice([-1, 1], 2) * rng.uniform(25, 45, 2)
+    (message,) = messages(photos, camera)
+    assert f"without {wrong} the largest residual is 0." in message
+
+
+def test_a_photo_of_another_camera_is_refused_without_a_guess() -> None:
+    rng = np.random.default_rng(5)
+    photos = {"1": film(EIGHT, rng), "2": {name: rng.uniform(-100, 100, 2) for name in EIGHT.fiducials}}
+    (message,) = messages(photos, EIGHT)
+    assert message.startswith("photo 2: the fiducial marks do not form the pattern of camera RMK TOP: up to")
+    assert "exchanged" not in message
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_no_false_alarm_on_old_film_and_paper(camera: Camera) -> None:
+    """1000 photos with 1 % of differential shrinkage, ten times that of film, and marks of 50 micrometres."""
+    rng = np.random.default_rng(11)
+    photos = {f"{i}": film(camera, rng, deformation=5e-3, noise=0.05) for i in range(1000)}
+    found = orient(photos, camera)
+    assert len(found.photo_ids) == 1000
+    assert not {"photos-turned", "photos-mirrored"} & set(codes(found))
+
+
+def test_the_limit_of_the_pattern_stands_between_film_and_wrong_numbers() -> None:
+    """The least that two exchanged marks can do, over what 1 % of shrinkage does."""
+    marks = np.array(list(EIGHT.fiducials.values()))
+    radius = np.sqrt((marks**2).sum(1).mean())
+    nearest = min(np.linalg.norm(a - b) for a, b in combinations(marks, 2))
+    assert 0.005 * np.hypot(*marks.T).max() / radius < WRONG_PATTERN / 5
+    assert nearest / 2 / radius > 5 * WRONG_PATTERN
+
+
+# ------------------------------------------------------------------------------------------- other remarks
+
+
+def test_a_poor_fit_names_photo_and_mark() -> None:
+    rng = np.random.default_rng(2)
+    photos = {f"{i}": film(EIGHT, rng) for i in range(10)}
+    photos["4"]["T"] = photos["4"]["T"] + [0.6, 0.0]
+    photos["7"]["B"] = photos["7"]["B"] + [0.0, 0.9]
+    (note,) = orient(photos, EIGHT).notes
+    assert (note.code, note.photos) == ("marks-fit-poorly", ("4", "7"))
+    assert "worst photo 7, sigma0" in note.message
+    assert "at mark B" in note.message
+    (alike,) = orient({"1": {**calibrated(CORNERS), "F2": np.array([-106.0, -105.0])}}).notes
+    assert alike.message.endswith("with so few marks it cannot be told which is wrong")
+
+
+def test_an_odd_affinity_is_told() -> None:
+    found = orient({"1": moved(calibrated(CORNERS), np.diag([1.0, 1.015]))})
+    assert codes(found) == ["strong-affinity"]
+    assert "scales that differ by 1.5 % and a shear of 0.00 degrees (photo 1)" in found.notes[0].message
+
+
+def test_photos_of_several_cameras_keep_the_order_of_the_project() -> None:
+    rng = np.random.default_rng(4)
+    cameras = {"a": CORNERS, "b": DIGITAL, "c": EIGHT, "d": CORNERS, "e": SIDES}
+    photos = {photo: film(cameras[photo], rng) for photo in "edca"}
+    found = interior.orient(table(photos), cameras, InteriorSettings())
+    assert found.photo_ids == ("a", "c", "d", "e")
+    assert found.without_marks == ("b",)
+    for row, photo in nonempty(enumerate(found.photo_ids)):
+        alone = orient({photo: photos[photo]}, cameras[photo])
+        assert np.array_equal(found.residuals[row], alone.residuals[0])
+        assert np.array_equal(found.photo_from_measured.coefficients[row], alone.photo_from_measured.coefficients[0])
+        assert (found.sigma0[row], found.rotation[row]) == (alone.sigma0[0], alone.rotation[0])
+
+
+def test_digital_photos_pass_as_they_are() -> None:
+    found = interior.orient(table({"a": calibrated(CORNERS)}), {"a": CORNERS, "b": DIGITAL}, InteriorSettings())
+    measured = points(("a", "b"), np.array([[1.0, 2.0], [30.0, -40.0]]))
+    image = interior.transform(measured, found)
+    assert np.array_equal(image.xy[2:], measured.xy[2:])
+    assert np.array_equal(image.sigma[2:], measured.sigma[2:])
+    nothing = interior.orient(table({}), {"b": DIGITAL}, InteriorSettings())
+    only = points(("b",), np.array([[1.0, 2.0]]))
+    assert interior.transform(only, nothing) is only
+
+
+def test_marks_on_a_photo_of_a_camera_without_marks_are_refused() -> None:
+    with pytest.raises(InputError, match="photo b: fiducial marks are measured, but camera DMC has none"):
+        interior.orient(table({"b": calibrated(CORNERS)}), {"b": DIGITAL}, InteriorSettings())
+
+
+def test_marks_of_photos_in_no_strip_are_left_aside() -> None:
+    found = interior.orient(
+        table({"a": calibrated(CORNERS), "x": {}, "y": {"F1": np.zeros(2)}}), {"a": CORNERS}, InteriorSettings()
+    )
+    assert found.photo_ids == ("a",)
+    assert found.notes[0].photos == ("x", "y")
+    assert found.notes[0].message == "fiducial marks of photos x, y are not used: not in any strip"
+
+
+def test_points_of_a_photo_without_orientation_are_refused() -> None:
+    found = orient({"a": calibrated(CORNERS)})
+    with pytest.raises(InputError, match="photo z: no fiducial marks measured"):
+        interior.transform(points(("a", "z"), np.zeros((1, 2))), found)
+
+
+def test_results_cannot_be_changed() -> None:
+    found = orient({"a": calibrated(CORNERS)})
+    with pytest.raises(ValueError, match="read-only"):
+        found.residuals[0][0] = 1
+    with pytest.raises(ValueError, match="read-only"):
+        found.photo_from_measured.coefficients[0, 0, 0] = 1
+    assert replace(found, notes=()).photo_ids == ("a",)
+
+
+@pytest.mark.parametrize(("percent", "right"), [(4.5, True), (5.5, False)])
+def test_a_pattern_may_be_wrong_by_a_twentieth_of_its_radius(percent: float, *, right: bool) -> None:
+    """A corner off its place by d towards the middle leaves d / 2 to a similarity of four: lever 1/4 + 1/4."""
+    truth = np.array(list(CORNERS.fiducials.values()))
+    measured = np.repeat(truth[None], 3, axis=0)
+    measured[1, 0] *= 1.0 - 2.0 * percent / 100.0
+    marks = MarksOfPhotos(CORNERS, ("1", "2", "3"), tuple(CORNERS.fiducials), truth, measured, np.ones((3, 4)))
+    kept, faults = right_pattern(marks)
+    assert kept.photos == (("1", "2", "3") if right else ("1", "3"))
+    assert len(faults) == (not right)

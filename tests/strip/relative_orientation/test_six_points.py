@@ -1,0 +1,220 @@
+"""Six standard points: printed examples, the rigorous solution beside the linear one, the dependent pair both ways."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from photostrip.frozen import dataclass
+from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
+from photostrip.strip.relative_orientation import six_points
+from photostrip.strip.relative_orientation.solution import solve_elements
+from tests.loops import nonempty
+from tests.strips import attitude, batch
+from tests.vectors import cases, section
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tests.vectors import Vector
+
+    Floats = NDArray[np.float64]
+
+LENGTHS = st.floats(40.0, 300.0)
+SMALL = st.floats(-0.02, 0.02)
+TILTS = st.floats(-0.6, 0.6)
+KAPPAS = st.floats(-np.pi, np.pi)
+
+
+SHARES = np.array([2.0, -2.0, -1.0, 1.0, -1.0, 1.0])  # of the six parallaxes in the closing error
+
+
+@dataclass(frozen=True, eq=False)
+class SixPoints:
+    """First-order orientation of six standard points."""
+
+    elements: Floats  # (5,): elements in radians
+    closing_error: float  # W, the one check that six points give, mm
+    sigma: float  # standard deviation of a y parallax from the closing error, mm
+    residuals: Floats  # (6,): y parallaxes that remain, mm
+
+
+def orient_six_points(parallax: ArrayLike, focal: float, width: float, base: float) -> SixPoints:
+    """Elements from the y parallaxes q of the six standard points, least squares linearised at zero.
+
+    `focal` is the principal distance f, `width` the distance a of the side points from the middle ones, `base` b.
+    """
+    q1, q2, q3, q4, q5, q6 = q = np.asarray(parallax, float)
+    omega2 = focal * (q3 + q4 + q5 + q6 - 2 * q1 - 2 * q2) / (4 * width**2)
+    tilted = omega2 * (focal + 2 * width**2 / (3 * focal))
+    alpha1, alpha2 = (focal * dq / (2 * width * base) for dq in (q6 - q4, q5 - q3))
+    kappa1, kappa2 = ((tilted - total / 3) / base for total in (q2 + q4 + q6, q1 + q3 + q5))
+    closing = float(SHARES @ q)
+    elements = np.array([alpha1, kappa1, alpha2, omega2, kappa2])
+    return SixPoints(
+        elements=elements, closing_error=closing, sigma=abs(closing) / np.sqrt(12.0), residuals=SHARES * closing / 12
+    )
+
+
+def standard_points(width: float, base: float) -> Floats:
+    return np.array([[0, 0], [base, 0], [0, width], [base, width], [0, -width], [base, -width]])
+
+
+def design(left: Floats, focal: float, base: float) -> Floats:
+    """Derivatives of the y parallaxes at zero elements, written down from the condition."""
+    (x1, y), x2 = left.T, left[:, 0] - base
+    return np.column_stack([x1 * y / focal, x1, -x2 * y / focal, -(focal + y**2 / focal), -x2])
+
+
+def dependent_pair(elements: ArrayLike) -> tuple[Floats, Floats]:
+    """Direction of the base and rotation of the right photo in the left photo's frame, from base-frame elements; exact.
+
+    by/bx and bz/bx are ratios of the components of the direction; dalpha, domega, dkappa are angles of the rotation.
+    """
+    al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
+    left = from_alpha_omega_kappa(al1, 0.0, ka1)
+    return left[..., 0, :], np.swapaxes(left, -1, -2) @ from_alpha_omega_kappa(al2, om2, ka2)
+
+
+def base_elements(direction: ArrayLike, rotation: ArrayLike) -> Floats:
+    """Base-frame elements, shape (..., 5), radians, of a dependent pair; the inverse of ``dependent_pair``.
+
+    The base `direction`, shape (..., 3), may have any length; it must not be parallel to the left principal ray.
+    """
+    x, y, z = np.moveaxis(np.asarray(direction, float), -1, 0)
+    al1, ka1 = -np.arctan2(z, np.hypot(x, y)), -np.arctan2(y, x)
+    right = from_alpha_omega_kappa(al1, 0.0, ka1) @ np.asarray(rotation, float)
+    return np.stack([al1, ka1, *np.moveaxis(alpha_omega_kappa(right), -1, 0)], axis=-1)
+
+
+@pytest.mark.parametrize("example", cases("gruber_six_points"))
+def test_the_examples_of_the_formula_book(example: Vector) -> None:
+    f, a, b = (example.input[name] for name in "fab")
+    expected, rel = example.expected, example.tol["rel"]
+    found = orient_six_points(example.input["q"], f, a, b)
+    assert np.allclose(found.elements, expected["elements_rad"], rtol=rel, atol=0)
+    assert found.closing_error == pytest.approx(expected["closing_W"], rel=rel)
+    assert found.sigma == pytest.approx(expected["m_q"], rel=rel)
+    assert np.allclose(found.residuals, expected["residuals"], rtol=rel, atol=0)
+    q = six_points.cofactors(f, a, b)
+    assert np.allclose(q, expected["cofactor"], rtol=rel, atol=1e-18)
+    t = six_points.dependent_from_base(b)
+    dependent = t @ q @ t.T
+    formulas = expected["cofactor_formulas"]
+    values = {
+        "alpha": q[0, 0],
+        "omega": q[3, 3],
+        "kappa": q[1, 1],
+        "kappa2_minus_kappa1": dependent[2, 2],
+        "bz": dependent[1, 1],
+        "dependent_alpha": dependent[3, 3],
+        "dependent_by": dependent[0, 0],
+        "cov_bz_dependent_alpha": dependent[1, 3],
+    }
+    assert values.keys() == formulas.keys()
+    for name, value in nonempty(values.items()):
+        assert value == pytest.approx(formulas[name], rel=rel), name
+
+
+@pytest.mark.parametrize("example", cases("base_chain"))
+def test_the_dependent_pair_of_the_formula_book(example: Vector) -> None:
+    names = ("alpha1p", "kappa1p", "alpha2p", "omega2p", "kappa2p")
+    elements = np.radians([example.input[f"{name}_deg"] for name in names])
+    direction, rotation = dependent_pair(elements)
+    expected, tol = example.expected["dependent_pair"], example.tol["abs"]
+    assert direction[1] / direction[0] == pytest.approx(expected["by_over_bx"], abs=tol)
+    assert direction[2] / direction[0] == pytest.approx(expected["bz_over_bx"], abs=tol)
+    degrees = np.degrees(alpha_omega_kappa(rotation))
+    assert np.allclose(degrees, expected["alpha_omega_kappa_right_deg"], rtol=0, atol=tol)
+    ratios = [1.0, expected["by_over_bx"], expected["bz_over_bx"]]
+    given_rotation = attitude(expected["alpha_omega_kappa_right_deg"])[0]
+    assert np.allclose(base_elements(ratios, given_rotation), elements, rtol=0, atol=tol)
+
+
+def test_all_examples_are_here() -> None:
+    assert [len(section(name)) for name in ("gruber_six_points", "base_chain")] == [2, 2]
+
+
+@given(LENGTHS, LENGTHS, LENGTHS, st.lists(st.floats(-1, 1), min_size=6, max_size=6))
+def test_the_closed_forms_are_the_linear_least_squares(f: float, a: float, b: float, q: list[float]) -> None:
+    jacobian = design(standard_points(a, b), f, b)
+    found = orient_six_points(q, f, a, b)
+    solution, *_ = np.linalg.lstsq(jacobian, -np.array(q), rcond=None)
+    size = np.abs(solution).max() + 1e-12
+    assert np.allclose(found.elements, solution, rtol=0, atol=1e-9 * size)
+    assert np.allclose(found.residuals, np.array(q) + jacobian @ solution, rtol=0, atol=1e-9)
+    assert found.sigma == pytest.approx(np.linalg.norm(found.residuals), abs=1e-9)
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    assert np.allclose(six_points.cofactors(f, a, b), inverse, rtol=0, atol=1e-9 * np.abs(inverse).max())
+
+
+@given(LENGTHS, LENGTHS)
+def test_the_weight_numbers_of_hallert(a: float, b: float) -> None:
+    f = 153.0
+    t = six_points.dependent_from_base(b)
+    found = t @ six_points.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
+    expected = np.zeros((5, 5))
+    np.fill_diagonal(
+        expected,
+        [
+            2 / 3 + f**2 / a**2 + 3 * f**4 / (4 * a**4),
+            f**2 / (2 * a**2),
+            2 / (3 * b**2),
+            f**2 / (a**2 * b**2),
+            3 * f**2 / (4 * a**4),
+        ],
+    )
+    expected[1, 3] = expected[3, 1] = f**2 / (2 * a**2 * b)
+    expected[0, 2] = expected[2, 0] = 1 / (3 * b)
+    expected[0, 4] = expected[4, 0] = -f * (2 * a**2 + 3 * f**2) / (4 * a**4)
+    scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
+    assert np.allclose(found / scale, expected / scale, rtol=0, atol=1e-9)
+
+
+@given(st.tuples(SMALL, SMALL, SMALL, SMALL, SMALL))
+def test_the_rigorous_solution_is_close(elements: tuple[float, ...]) -> None:
+    f, a, b = 150.0, 90.0, 90.0
+    left = standard_points(a, b)
+    right = left - [b, 0]
+    q = -design(left, f, b) @ np.array(elements)
+    pairs = batch(left[None], (right - np.column_stack([np.zeros(6), q]))[None], f)
+    rigorous, converged, _ = solve_elements(pairs)
+    assert converged.all()
+    linear = orient_six_points(q, f, a, b).elements
+    assert np.allclose(linear, elements, rtol=0, atol=1e-12)
+    assert (
+        np.abs(rigorous[0] - linear).max() < 10 * np.abs(elements).max() ** 2 + 1e-9
+    )  # what is left is of second order
+
+
+@given(st.tuples(TILTS, KAPPAS, TILTS, TILTS, KAPPAS))
+def test_the_dependent_pair_leads_back(elements: tuple[float, ...]) -> None:
+    direction, rotation = dependent_pair(elements)
+    again = base_elements(direction * 7.0, rotation)
+    difference = (again - elements + np.pi) % (2 * np.pi) - np.pi
+    assert np.abs(difference).max() < 1e-13
+    assert np.linalg.norm(direction) == pytest.approx(1, abs=1e-15)
+
+
+def test_to_the_first_order_the_dependent_pair_is_linear() -> None:
+    b, step = 92.0, 1e-5
+    t = six_points.dependent_from_base(b)
+    for number in range(5):
+        elements = np.zeros(5)
+        elements[number] = step
+        direction, rotation = dependent_pair(elements)
+        dalpha, domega, dkappa = alpha_omega_kappa(rotation)
+        found = [b * direction[1] / direction[0], b * direction[2] / direction[0], dkappa, dalpha, domega]
+        assert np.allclose(found, t[:, number] * step, rtol=0, atol=1e-7 * step * b)
+
+
+def test_many_pairs_at_once() -> None:
+    elements = np.random.default_rng(1).uniform(-0.3, 0.3, (4, 3, 5))
+    direction, rotation = dependent_pair(elements)
+    assert direction.shape == (4, 3, 3)
+    assert rotation.shape == (4, 3, 3, 3)
+    assert np.allclose(base_elements(direction, rotation), elements, rtol=0, atol=1e-14)

@@ -1,0 +1,56 @@
+"""Standard zones, whatever way the photos are turned, and what may be taken from them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.strip.relative_orientation.zones import Support, zones
+from tests.strips import true_pairs
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+
+def zone_of(counts: Sequence[int]) -> NDArray[np.int64]:
+    return np.repeat(np.arange(1, 7), counts)
+
+
+@pytest.mark.parametrize("counts", [(1,) * 6, (2, 2, 3, 3, 3, 3), (5,) * 6])
+def test_points_around_the_standard_positions_have_their_zones(counts: Sequence[int]) -> None:
+    # 50 pairs with tilts up to 5 degrees, any azimuth: the zones are those of the base frame, not of the photo
+    flown = true_pairs(np.random.default_rng(1), 50, counts=counts)
+    oriented = flown.orient()
+    found = zones(oriented.elements, oriented.pairs).reshape(50, -1)
+    assert (found == zone_of(counts)).mean() > 0.995
+
+
+def test_a_rejected_point_has_a_zone_and_moves_no_other() -> None:
+    flown = true_pairs(np.random.default_rng(2), counts=(2,) * 6)
+    oriented = flown.orient()
+    weight = oriented.pairs.weight.copy()
+    weight[0] = 0.0
+    without = replace(oriented.pairs, weight=weight)
+    assert zones(oriented.elements, without).tolist() == zone_of((2,) * 6).tolist()
+
+
+@pytest.mark.parametrize(
+    ("counts", "spare"),
+    [
+        ((1,) * 6, [False] * 6),  # six points: none can go
+        ((2, 1, 1, 1, 1, 1), [True] * 6),  # one zone may become empty
+        ((3, 3, 0, 1, 2, 1), [True, True, False, True, False]),  # a second one may not
+        ((3, 3, 0, 0, 1, 1), [True, True, False, False]),
+    ],
+)
+def test_neither_a_pair_nor_a_second_zone_is_left_without_support(counts: Sequence[int], spare: list[bool]) -> None:
+    number = zone_of(counts)
+    support = Support(number, np.array([counts]))
+    flags = support.spare(np.zeros(len(number), int))
+    by_zone = [bool(flags[number == zone].all()) for zone in np.unique(number)]
+    assert by_zone == spare
