@@ -12,7 +12,7 @@ unexport PYTHONDONTWRITEBYTECODE # or each of the hundreds of processes that the
 
 KATEX := .venv-site/node_modules/katex/dist
 
-.PHONY: demo test check lint types lowest bench mutations docs site golden regress man clean
+.PHONY: demo test check lint types lowest bench docs site golden regress man clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/photostrip.installed ## run the main job on every sample project and print its accuracy report
@@ -43,11 +43,8 @@ lowest: ## all tests on exactly the lower bounds of pyproject.toml, in a venv of
 	.venv-lowest/bin/python -m pip install --quiet --only-binary :all: --constraint .venv-lowest/constraints.txt ".[test]"
 	.venv-lowest/bin/python -m pytest -n $(WORKERS) --dist worksteal
 
-bench: $(VENV)/dev.installed ## tables of seconds, memory and accuracy (by hand: mutations.py and gate_constants.py take hours, oracle.py compares)
-	@for program in $(filter-out benchmarks/mutations.py benchmarks/gate_constants.py benchmarks/oracle%,$(wildcard benchmarks/*.py)); do printf '\n==> %s\n' "$$program"; $(BIN)/python "$$program" || exit $$?; done
-
-mutations: $(VENV)/dev.installed ## change the program in 120 places, one at a time: which changes does no test notice? (hours)
-	$(BIN)/python benchmarks/mutations.py --count 120 --jobs $(WORKERS)
+bench: $(VENV)/dev.installed ## tables of seconds, memory and accuracy (by hand: oracle.py compares)
+	@for program in $(filter-out benchmarks/oracle%,$(wildcard benchmarks/*.py)); do printf '\n==> %s\n' "$$program"; $(BIN)/python "$$program" || exit $$?; done
 
 docs: $(VENV)/dev.installed ## rewrite the printed output in README.md and docs/ by running the commands there
 	$(BIN)/python -m tests.renew_docs

@@ -56,14 +56,6 @@ def test_strip_prints_seconds_memory_parts_and_growth() -> None:
 
 
 @pytest.mark.slow
-def test_dense_prints_what_a_constant_costs_and_what_it_loses() -> None:
-    out = printed("dense.py", "1", "--only", "AGAIN")
-    assert "RAYS_TO_DECIDE_AGAIN, 1 projects, 0 with a value refused" in out
-    assert re.search(r"^ +100 +\d+\.\d s +rms 1\.000 1\.000, worst 1\.000 +\d+ left in, \d+ lost$", out, re.MULTILINE)
-    assert re.search(r"^ +never +\d+\.\d s +rms \d\.\d{3} ", out, re.MULTILINE)
-
-
-@pytest.mark.slow
 def test_methods_prints_errors_and_ratios() -> None:
     out = printed("methods.py", "--seeds", "1", "--models", "6", "--bands", "3")
     (row,) = re.findall(r"^\| 6 \| 3 \|((?: \d+\.\d \|){4}) (\d\.\d\d) / (\d\.\d\d) \|", out, re.MULTILINE)
@@ -121,22 +113,6 @@ def test_independent_models_prints_three_tables() -> None:
 
 
 @pytest.mark.slow
-def test_mutations_prints_changes_and_who_notices_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HYPOTHESIS_PROFILE", "quick")
-    place = r"^\| `geometry/\w+\.py:\d+` \| `.+` to `.+` in `.+` \|"
-    listed = printed("mutations.py", "--count", "5", "--room", "geometry", "--list", python=PYTHON)
-    assert len(re.findall(rf"{place} \|$", listed, re.MULTILINE)) == 5
-    out = printed("mutations.py", "--count", "4", "--seed", "1", "--room", "geometry", "--near", python=PYTHON)
-    tests = re.findall(rf"{place} (.+) \|$", out, re.MULTILINE)
-    assert len(tests) == 4
-    noticed = [test for test in tests if test.startswith("`geometry/test_")]  # which are drawn changes with the code
-    assert noticed
-    assert tests.count("NOT noticed") == 4 - len(noticed)
-    counts = f"{len(tests)} | {len(noticed)} |"
-    assert f"\n| geometry | {counts}\n| all | {counts}\n" in out
-
-
-@pytest.mark.slow
 def test_gross_errors_prints_two_tables_for_one_project() -> None:
     out = printed("gross_errors.py", "1", "--kind", "models", "--workers", "1", "--first-seed", "2")
     assert len(re.findall(r"^models +(?:without errors|errors, \w+)(?: +\d+\.\d{3}){5} +[01]$", out, re.MULTILINE)) == 4
@@ -180,63 +156,6 @@ def test_screening_prints_how_the_time_grows() -> None:
         ("0.0", "40"),
         ("3.0", "20"),
         ("3.0", "40"),
-    ]
-
-
-@pytest.mark.slow
-def test_ablation_changes_constants_where_they_are_imported_and_everything_it_switches_off_exists() -> None:
-    program = """
-import sys
-from benchmarks import ablation
-from photostrip import rejection
-from photostrip.network import reliability
-from photostrip.strip.gross_errors.pairs import deletion, global_test, pair_search
-from photostrip.network.gross_errors import point_decisions
-from photostrip.network.settings import BundleSettings
-names = [f"{module.rpartition('.')[2]}.{name}" for module, name, _ in ablation.constants()]
-assert {"settings:BundleSettings.level", "strip_network.STRIP_LEVEL", "point_decisions.LIKELIER"} < set(names)
-ablation.put(rejection.__name__, "UNCONTROLLED", 0.25)
-assert point_decisions.UNCONTROLLED == reliability.UNCONTROLLED == 0.25
-ablation.put(global_test.__name__, "FIFTH_WRONG", 2.5)  # the default of a class method, and of a named argument
-assert global_test.ParallaxScatter.of.__defaults__ == (2.5,)
-assert pair_search.search.__kwdefaults__ == {"start": True, "sets": True, "spoiled": 2.5}
-ablation.put(deletion.__name__, "LARGEST_SET", 5)  # of a method of another module
-assert pair_search._Log.without_sets.__defaults__ == (5,) and point_decisions.LARGEST_SET == 5
-for make in list(ablation.changes().values()):
-    make()
-assert BundleSettings.level == BundleSettings().level == 0.005
-assert ablation.scaled(0.999, 2.0) == 0.998 and ablation.scaled(3, 0.5) == 2 and ablation.scaled(0.2, 2.0) == 0.4
-"""
-    subprocess.run([sys.executable, "-c", program], check=True, cwd=ROOT)
-
-
-@pytest.mark.slow
-def test_ablation_prints_a_line_for_every_change() -> None:
-    out = printed("ablation.py", "1", "--only", "as it is", "re-admission", "--workers", "1")
-    assert re.findall(r"^(\w[\w -]+\w)  +\d\.\d{3}/", out, re.MULTILINE) == ["as it is", "without re-admission"]
-
-
-@pytest.mark.slow
-def test_gate_constants_prints_what_each_change_does() -> None:
-    kinds = ("--of", "principal distance off by 10", "corners")
-    out = printed("gate_constants.py", "1", "--workers", "1", "--only", "units.REACH ", *kinds)
-    assert out.startswith("1 mistakes, 1 found by run; 1 sound projects\n")
-    lines = re.findall(r"^units\.REACH (\S+) -> (\S+) +(.*)$", out, re.MULTILINE)
-    assert [line[:2] for line in lines] == [("1.2", "0.6")]  # points of sound photos reach farther
-    assert lines[0][2].startswith("- sound: corners, centre, random (run); - sound: corners, centre, random (check)")
-    assert "no difference: units.REACH 0.12 -> 0.24; units.REACH 0.12 -> 0.06; units.REACH 1.2 -> 2.4" in out
-
-
-@pytest.mark.slow
-def test_run_constants_prints_what_each_value_does() -> None:
-    out = printed("run_constants.py", "1", "--only", "GROWN", "FAR_FROM_RAY")
-    told = re.findall(r"^GROWN = (\S+): .*plan and camera heights: 1 ([a-z ]+); two", out, re.MULTILINE)
-    assert told == [("4.0", "told"), ("2.0", "told"), ("8.0", "told"), ("0.0", "told"), ("inf", "not told")]
-    assert re.findall(r"^FAR_FROM_RAY = (\S+): half of a pair wrong: 1 \w+; ", out, re.MULTILINE) == [
-        "5.0",
-        "2.5",
-        "10.0",
-        "inf",
     ]
 
 
