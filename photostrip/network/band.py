@@ -14,15 +14,18 @@ from numpy.lib.stride_tricks import as_strided
 from scipy.linalg import cho_solve_banded, cholesky_banded, solve_triangular
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.network.rays import PHOTO
 
 COLUMNS_AT_A_TIME = 48  # columns of the inverse that are found at a time
 
 
 class Band:
-    """A symmetric positive definite matrix with ``width`` elements below the diagonal, and its Cholesky factor."""
+    """A symmetric positive definite matrix with ``width`` elements below the diagonal, and its Cholesky factor.
 
-    def __init__(self, size: int, width: int) -> None:
+    ``block`` rows and columns belong to each photo or model.
+    """
+
+    def __init__(self, size: int, width: int, block: int) -> None:
+        self.block = block
         self.size, self.width = size, min(width, size - 1)
         # The last few rows of views reach beyond the end.
         self.flat = np.zeros((size + self.width + COLUMNS_AT_A_TIME) * (self.width + 1))
@@ -38,20 +41,21 @@ class Band:
 
     def holds(self, row: Numbers, column: Numbers) -> Flags:
         """Whether the blocks of pairs of photos lie within the band."""
-        return np.asarray(np.abs(row - column) <= self.width // PHOTO)
+        return np.asarray(np.abs(row - column) <= self.width // self.block)
 
     def blocks(self, row: Numbers, column: Numbers) -> Floats:
-        """Give blocks within the band, shape (..., 6, 6)."""
-        table, middle = self._table, self.width // PHOTO
-        return table.reshape(-1, PHOTO, PHOTO)[row * table.shape[1] + column - row + middle]
+        """Give blocks within the band, shape (..., u, u)."""
+        table, middle = self._table, self.width // self.block
+        return table.reshape(-1, self.block, self.block)[row * table.shape[1] + column - row + middle]
 
     @cached_property
     def _table(self) -> Floats:
         """All blocks, of both halves: in row i those of photo i with the photos from i - w to i + w."""
-        photos, width, stride = self.size // PHOTO, self.width // PHOTO, self.flat.itemsize
-        strides = (PHOTO * (1 + self.width) * stride, PHOTO * stride, stride, self.width * stride)
-        lower = as_strided(self.flat, (photos, width + 1, PHOTO, PHOTO), strides)  # by column, from the diagonal down
-        table = np.empty((photos, 2 * width + 1, PHOTO, PHOTO))
+        u = self.block
+        photos, width, stride = self.size // u, self.width // u, self.flat.itemsize
+        strides = (u * (1 + self.width) * stride, u * stride, stride, self.width * stride)
+        lower = as_strided(self.flat, (photos, width + 1, u, u), strides)  # by column, from the diagonal down
+        table = np.empty((photos, 2 * width + 1, u, u))
         table[:, width] = np.tril(lower[:, 0]) + np.tril(lower[:, 0], -1).swapaxes(1, 2)
         for lag in range(1, width + 1):
             table[lag:, width - lag] = lower[:-lag, lag]
@@ -81,7 +85,7 @@ class Band:
         With columns i and the rows J below them, and L the factor: Z_Ji = -Z_JJ L_Ji L_ii^-1 and
         Z_ii = (L_ii L_ii')^-1 - (L_Ji L_ii^-1)' Z_Ji, from the last columns to the first. Source: [Takahashi 1973].
         """
-        inverse = Band(self.size, self.width)
+        inverse = Band(self.size, self.width, self.block)
         window = np.zeros((self.width, self.width))
         for first in range((self.size - 1) // COLUMNS_AT_A_TIME * COLUMNS_AT_A_TIME, -1, -COLUMNS_AT_A_TIME):
             count = min(COLUMNS_AT_A_TIME, self.size - first)

@@ -19,7 +19,7 @@ from photostrip.frozen import dataclass
 from photostrip.network import datum
 from photostrip.network.given_orientations import LinearisedOrientations
 from photostrip.network.normal_equations import FactoredEquations
-from photostrip.network.rays import PHOTO
+from photostrip.network.rays import whitening
 from photostrip.network.solution import BundleSolution, Cofactors
 
 
@@ -30,63 +30,70 @@ def cofactors_of(solution: BundleSolution, *, rough: bool = False) -> Cofactors:
     """
     prepared, found = solution.prepared, solution.factored
     problem, at, p = prepared.problem, found.equations.linearised, len(solution.common)
-    m, q = problem.photos, problem.points
+    m, q, u = problem.photos, problem.points, problem.unknowns
     inverse, rank = found.inverse, prepared.rank
     photos = inverse.blocks(rank, rank)
     points, cross = _of_points(solution)
 
     # what common parameters do to everything else
-    to_photos = -found.cross.reshape(m, PHOTO, p)
+    to_photos = -found.cross.reshape(m, u, p)
     back = found.equations.common_points.toarray() - found.equations.carried.T @ found.cross
     to_points = -(found.equations.root.swapaxes(1, 2) @ back.reshape(q, 3, p))
     by_photo, by_point, image = at.rays.by_photo, at.rays.by_point, problem.images
     to_rays = by_photo @ to_photos[image.photo] + by_point @ to_points[image.point]
-    to_rays[..., : len(prepared.calibrated)] += at.rays.by_common.toarray().reshape(len(image), 2, -1)
+    to_rays[..., : len(prepared.calibrated)] += at.rays.by_common.toarray().reshape(*at.rays.misfit.shape, -1)
     half = by_photo @ cross @ by_point.swapaxes(1, 2)
-    of_rays = np.eye(2) - by_photo @ photos[image.photo] @ by_photo.swapaxes(1, 2) - half - half.swapaxes(1, 2)
+    of_rays = (
+        np.eye(at.rays.misfit.shape[1])
+        - by_photo @ photos[image.photo] @ by_photo.swapaxes(1, 2)
+        - half
+        - half.swapaxes(1, 2)
+    )
     of_rays -= by_point @ points[image.point] @ by_point.swapaxes(1, 2)
     of_rays -= to_rays @ found.common @ to_rays.swapaxes(1, 2)
     points = points + to_points @ found.common @ to_points.swapaxes(1, 2)
-    of_photos = np.empty((m, PHOTO + p, PHOTO + p))
-    of_photos[:, :PHOTO, :PHOTO] = photos + to_photos @ found.common @ to_photos.swapaxes(1, 2)
-    of_photos[:, :PHOTO, PHOTO:] = to_photos @ found.common
-    of_photos[:, PHOTO:, :PHOTO] = of_photos[:, :PHOTO, PHOTO:].swapaxes(1, 2)
-    of_photos[:, PHOTO:, PHOTO:] = found.common
+    of_photos = np.empty((m, u + p, u + p))
+    of_photos[:, :u, :u] = photos + to_photos @ found.common @ to_photos.swapaxes(1, 2)
+    of_photos[:, :u, u:] = to_photos @ found.common
+    of_photos[:, u:, :u] = of_photos[:, :u, u:].swapaxes(1, 2)
+    of_photos[:, u:, u:] = found.common
     positions, attitudes = (_given(each, of_photos) for each in (at.positions, at.attitudes))
     if solution.free and not rough:
         points, of_photos = _inner(solution, points, of_photos)
     points[~prepared.measured] = np.nan
-    turn = _turns(solution.rotations)
+    turn = _turns(solution.rotations, u)
+    unwhite = np.linalg.inv(whitening(image))
     weights = prepared.prior**-2.0
     return Cofactors(
         points=points,
-        photos=turn @ of_photos[:, :PHOTO, :PHOTO] @ turn.swapaxes(1, 2),
+        photos=turn @ of_photos[:, :u, :u] @ turn.swapaxes(1, 2),
         common=found.common,
-        image_residuals=of_rays * (image.sigma[:, :, None] * image.sigma[:, None, :]),
+        image_residuals=unwhite @ of_rays @ unwhite.swapaxes(1, 2),
         control_residuals=_control(solution, points),
         position_residuals=positions,
         attitude_residuals=attitudes,
         common_residuals=np.where(weights > 0.0, prepared.prior**2 - np.diag(found.common), 0.0),
-        photo_common=turn @ of_photos[:, :PHOTO, PHOTO:],
+        photo_common=turn @ of_photos[:, :u, u:],
     )
 
 
 def _of_points(solution: BundleSolution) -> tuple[Floats, Floats]:
-    """Cofactors of points (q, 3, 3) and between the photo of each ray and its point (n, 6, 3), common ones held."""
+    """Cofactors of points (q, 3, 3) and between the photo of each ray and its point (n, u, 3), common ones held."""
     found, prepared = solution.factored, solution.prepared
+    u = prepared.problem.unknowns
     rays, inverse = found.equations.linearised.rays, found.inverse
     inner = found.equations.root.swapaxes(1, 2) @ found.equations.root
-    share = rays.by_photo.swapaxes(1, 2) @ (rays.by_point @ inner[prepared.problem.images.point])  # (n, 6, 3): M'
+    share = rays.by_photo.swapaxes(1, 2) @ (rays.by_point @ inner[prepared.problem.images.point])  # (n, u, 3): M'
     points, cross = inner.copy(), np.empty_like(share)
     for near in prepared.near:
-        u, s = len(near.photos), len(near.points)
+        photos, s = len(near.photos), len(near.points)
         row, column = near.photos[:, None], near.photos[None, :]
         held = inverse.holds(row, column)  # others share no point
         blocks = np.where(held[..., None, None], inverse.blocks(row, np.where(held, column, row)), 0.0)
-        pull = np.zeros((u, PHOTO, s, 3))
+        pull = np.zeros((photos, u, s, 3))
         pull[near.photo, :, near.point] = share[near.ray]
-        carried = blocks.swapaxes(1, 2).reshape(PHOTO * u, -1) @ pull.reshape(PHOTO * u, -1)
-        carried = carried.reshape(u, PHOTO, s, 3)
+        carried = blocks.swapaxes(1, 2).reshape(u * photos, -1) @ pull.reshape(u * photos, -1)
+        carried = carried.reshape(photos, u, s, 3)
         cross[near.ray] = -carried[near.photo, :, near.point]
         points[near.points] += np.einsum("upsi,upsj->sij", pull, carried)
     return points, cross
@@ -102,6 +109,8 @@ def _control(solution: BundleSolution, points: Floats) -> Floats:
 
 def _given(linear: LinearisedOrientations, of_photos: Floats) -> Floats:
     """Cofactors of the residuals of camera positions or attitudes."""
+    if not len(linear.photo):
+        return np.zeros((0, 3, 3))
     partials = np.concatenate([linear.by_photo, linear.by_common], axis=2)
     found: Floats = -partials @ of_photos[linear.photo] @ partials.swapaxes(1, 2)
     with np.errstate(divide="ignore"):
@@ -109,10 +118,10 @@ def _given(linear: LinearisedOrientations, of_photos: Floats) -> Floats:
     return found
 
 
-def _turns(rotations: Floats) -> Floats:
-    """Turn steps of photos in their own axes into the Cartesian frame: matrices (m, 6, 6)."""
-    turn = np.zeros((len(rotations), PHOTO, PHOTO))
-    turn[:, :3, :3] = turn[:, 3:, 3:] = rotations
+def _turns(rotations: Floats, unknowns: int) -> Floats:
+    """Turn steps of photos or models in their own axes into the Cartesian frame: matrices (m, u, u)."""
+    turn = np.tile(np.eye(unknowns), (len(rotations), 1, 1))
+    turn[:, :3, :3] = turn[:, 3:6, 3:6] = rotations
     return turn
 
 
@@ -122,17 +131,17 @@ def _inner(solution: BundleSolution, points: Floats, of_photos: Floats) -> tuple
     With G the generators of the similarity, E the choice of the points, H = (G'EG)^-1 and P = Q E G H: the cofactors
     are Q - G P' - P G' + G (H G'E P) G'.
     """
-    state, m, p = solution.state, len(of_photos), len(solution.common)
+    state, m, p, u = solution.state, len(of_photos), len(solution.common), solution.prepared.problem.unknowns
     origin, moves = datum.point_generators(solution.prepared, state)
     flat = moves.reshape(-1, datum.DEFECT)
     inverse = np.asarray(np.linalg.inv(flat.T @ flat), float)
     swept = solution.factored.solved_for_points(flat)
     middle = inverse @ (flat.T @ swept.points) @ inverse
     found = points + _carried_over(moves, (swept.points @ inverse).reshape(moves.shape), middle)
-    turned = np.zeros((m, PHOTO + p, datum.DEFECT))
-    turned[:, :PHOTO] = datum.photo_generators(state, origin)
+    turned = np.zeros((m, u + p, datum.DEFECT))
+    turned[:, :u] = datum.photo_generators(state, origin, u)
     shared = np.broadcast_to(swept.common, (m, p, datum.DEFECT))
-    own = np.concatenate([swept.photos.reshape(m, PHOTO, -1), shared], axis=1) @ inverse
+    own = np.concatenate([swept.photos.reshape(m, u, -1), shared], axis=1) @ inverse
     return found, of_photos + _carried_over(turned, own, middle)
 
 
@@ -178,28 +187,30 @@ class JointCofactors:
     def of(self, photos: Numbers, partials: Floats) -> Floats:
         """Joint cofactors (g, k c, k c) of c functions of each of k photos, in g sets of photos (g, k).
 
-        partials: (g, k, c, 6): by shift (m) and rotation vector (rad) of the photo in the Cartesian frame.
+        partials: (g, k, c, u): by shift (m) and rotation vector (rad) of the unit in the Cartesian frame, and the
+            logarithm of the scale of a model.
         """
-        (g, k, c, _), found = partials.shape, self.factored
-        inner = partials @ _turns(self.rotations)[photos]
-        half = inner @ self._blocks(found.equations.prepared.rank[photos]).swapaxes(2, 3).reshape(g, k, PHOTO, -1)
-        whole = half.reshape(g, k * c, k, PHOTO).swapaxes(1, 2) @ inner.swapaxes(2, 3)
+        (g, k, c, u), found = partials.shape, self.factored
+        inner = partials @ _turns(self.rotations, u)[photos]
+        half = inner @ self._blocks(found.equations.prepared.rank[photos]).swapaxes(2, 3).reshape(g, k, u, -1)
+        whole = half.reshape(g, k * c, k, u).swapaxes(1, 2) @ inner.swapaxes(2, 3)
         joint = whole.swapaxes(1, 2).reshape(g, k * c, -1)
-        cross = (inner @ found.cross.reshape(len(self.rotations), PHOTO, -1)[photos]).reshape(g, k * c, -1)
+        cross = (inner @ found.cross.reshape(len(self.rotations), u, -1)[photos]).reshape(g, k * c, -1)
         return np.asarray(joint + cross @ found.common @ cross.swapaxes(1, 2), float)
 
     def _blocks(self, sets: Numbers) -> Floats:
-        """Blocks (g, k, k, 6, 6) of Z between the photos of sets (g, k) of places in the band."""
+        """Blocks (g, k, k, u, u) of Z between the photos of sets (g, k) of places in the band."""
         inverse, factor = self.factored.inverse, self.factored.band
         row, column = np.broadcast_arrays(sets[:, :, None], sets[:, None, :])
         near = inverse.holds(row, column)
         if near.all():
             return inverse.blocks(row, column)
-        found = np.empty((*row.shape, PHOTO, PHOTO))
+        u = factor.block
+        found = np.empty((*row.shape, u, u))
         found[near] = inverse.blocks(row[near], column[near])
-        far, m = distinct(column[~near]), factor.size // PHOTO
-        unit = np.zeros((m, PHOTO, len(far), PHOTO))
-        unit[far, :, np.arange(len(far))] = np.eye(PHOTO)
-        solved = factor.solve(unit.reshape(m * PHOTO, -1)).reshape(unit.shape)
+        far, m = distinct(column[~near]), factor.size // u
+        unit = np.zeros((m, u, len(far), u))
+        unit[far, :, np.arange(len(far))] = np.eye(u)
+        solved = factor.solve(unit.reshape(m * u, -1)).reshape(unit.shape)
         found[~near] = solved[row[~near], :, np.searchsorted(far, column[~near])]
         return found

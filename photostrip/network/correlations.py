@@ -8,7 +8,6 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.frozen import dataclass
-from photostrip.network.rays import PHOTO
 from photostrip.network.solution import BundleSolution, Cofactors
 
 LIMIT = 0.95
@@ -19,8 +18,9 @@ ELEMENTS = (
     "rotation about x",
     "rotation about y",
     "rotation about z",
+    "scale",
 )
-"""Elements of a photo, along and about its own axes, where shift and rotation that replace each other show."""
+"""Elements of a photo or model, along and about its own axes, where shift and rotation that replace each other show."""
 
 
 @dataclass(frozen=True)
@@ -40,14 +40,14 @@ def correlations(solution: BundleSolution, precision: Cofactors) -> tuple[Correl
     """
     problem = solution.prepared.problem
     names = problem.common_names()
-    turn = np.zeros((len(solution.centers), PHOTO, PHOTO))
-    turn[:, :3, :3] = turn[:, 3:, 3:] = np.swapaxes(solution.rotations, 1, 2)
+    turn = np.tile(np.eye(problem.unknowns), (problem.photos, 1, 1))
+    turn[:, :3, :3] = turn[:, 3:6, 3:6] = np.swapaxes(solution.rotations, 1, 2)
     photos = turn @ precision.photos @ turn.swapaxes(1, 2)
     cross = turn @ precision.photo_common
     sigma = np.sqrt(np.einsum("nii->ni", photos))
 
     def element(photo: int, number: int) -> str:
-        return f"photo {problem.photo_name(photo)}: {ELEMENTS[number]}"
+        return f"{problem.unit} {problem.photo_name(photo)}: {ELEMENTS[number]}"
 
     shared = np.sqrt(np.diag(precision.common))
     found = _named(precision.common[None] / np.outer(shared, shared), lambda _, i, j: (names[i], names[j]))

@@ -11,9 +11,8 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
-from photostrip.network.parameters import Parameters, PreparedProblem
-from photostrip.network.problem import BundleProblem
-from photostrip.network.rays import PHOTO
+from photostrip.network.parameters import PreparedProblem
+from photostrip.network.problem import BundleProblem, Parameters
 
 DEFECT = SIMILARITY_PARAMETERS
 
@@ -25,27 +24,30 @@ def is_free(problem: BundleProblem) -> bool:
 
 
 def anchor(blocks: Floats, rank: Numbers, state: Parameters) -> Floats:
-    """Conditions that hold seven parameters: all of a photo, and its distance from the photo farthest away.
+    """Conditions that hold seven parameters: all of a model; all of a photo, and its distance from the farthest one.
 
-    Returns what is added to the photos' blocks (m, 6, 6); the conditions are made as strong as the rays, whose blocks
+    Returns what is added to the units' blocks (m, u, u); the conditions are made as strong as the rays, whose blocks
     are ``blocks``; the photo is that in the middle of the order ``rank``.
     """
     middle = int(np.argsort(rank)[len(rank) // 2])
-    base = state.centers - state.centers[middle]
-    far = int(np.argmax((base**2).sum(axis=1)))
     add = np.zeros_like(blocks)
     add[middle] = np.diag(np.diag(blocks[middle]))
+    if len(add[middle]) == DEFECT:
+        return add
+    base = state.centers - state.centers[middle]
+    far = int(np.argmax((base**2).sum(axis=1)))
     direction = state.rotations[far].T @ base[far] / np.linalg.norm(base[far])
     add[far, :3, :3] += np.trace(blocks[far, :3, :3]) / 3.0 * np.outer(direction, direction)
     return add
 
 
-def photo_generators(state: Parameters, origin: Floats) -> Floats:
-    """Move the photos by a small similarity about an origin: (m, 6, 7) in their own axes."""
+def photo_generators(state: Parameters, origin: Floats, unknowns: int) -> Floats:
+    """Move photos or models by a small similarity about an origin: (m, u, 7) in their own axes."""
     back = np.swapaxes(state.rotations, 1, 2)
-    moves = np.zeros((len(back), PHOTO, DEFECT))
+    moves = np.zeros((len(back), unknowns, DEFECT))
     moves[:, :3] = back @ similarity_derivatives(state.centers, origin)
-    moves[:, 3:, 3:6] = back
+    moves[:, 3:6, 3:6] = back
+    moves[:, 6:, 6:] = 1.0
     return moves
 
 

@@ -19,9 +19,8 @@ from photostrip.network.given_orientations import (
     positions_at,
 )
 from photostrip.network.normal_equations import NormalEquations, factored, linearise
-from photostrip.network.parameters import Parameters, PreparedProblem
-from photostrip.network.problem import BundleProblem
-from photostrip.network.rays import PHOTO
+from photostrip.network.parameters import PreparedProblem
+from photostrip.network.problem import BundleProblem, Parameters
 from photostrip.notes import counted, named
 
 SQUARED_SINE = 1e-10  # square of the sine of the angle between rays
@@ -39,7 +38,15 @@ MOST_FAILED = 8  # adjustments of a search that may fail: each takes six times a
 SHARE = 0.5  # of the largest element of a null vector: what is named with it
 UNMOVED = 1e-9
 OPEN = {"bundle-rank", "bundle-rays"}  # codes of what is not determined: the datum, photos, points
-MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll about x", "turn about y", "turn about z")
+MOVES = (
+    "shift along its x",
+    "shift along its y",
+    "shift along its z",
+    "roll about x",
+    "turn about y",
+    "turn about z",
+    "scale",
+)
 
 
 def refuse_repeated(problem: BundleProblem) -> None:
@@ -51,7 +58,8 @@ def refuse_repeated(problem: BundleProblem) -> None:
         raise InputError(
             [
                 Fault(
-                    f"point {problem.point_name(point)} is measured twice on photo {problem.photo_name(photo)}",
+                    f"point {problem.point_name(point)} is measured twice on "
+                    f"{problem.unit} {problem.photo_name(photo)}",
                     code="bundle-repeated",
                     fix="leave one of the measurements out",
                 )
@@ -109,7 +117,7 @@ def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
         if loose.shape[1]:
             names = [prepared.problem.photo_name(number) for number in photos.tolist()]
             reason = _reason(held, unknown_errors=bool(prepared.problem.positions.offset_sigma.any()))
-            whole = "" if len(parts) == 1 else f" of {named('photo', names)}"
+            whole = "" if len(parts) == 1 else f" of {named(prepared.problem.unit, names)}"
             message = f"what is given does not determine {_moves(state, held, loose)}{whole}: {reason}"
             raise GeometryError(message, photos=() if len(parts) == 1 else names, code="bundle-rank")
 
@@ -158,7 +166,7 @@ def refuse_endless(problem: BundleProblem, rejected: Sequence[int], adjustments:
     message = f"the search for gross errors ended after {counted(adjustments, 'adjustment')} and "
     message += f"{counted(len(rejected), 'rejected ray')}: without what contradicts the rest, it does not converge"
     if worst:
-        message += f"; most were rejected on {named('photo', worst)}: were points there named wrongly?"
+        message += f"; most were rejected on {named(problem.unit, worst)}: were points there named wrongly?"
     raise GeometryError(message, photos=worst, code="search-ended")
 
 
@@ -188,14 +196,16 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     places = np.concatenate([control.xyz[given], problem.positions.xyz[at]])
     around = state.centers[photos]
     origin = places.mean(axis=0) if len(places) else around.mean(axis=0)
-    everything = np.concatenate([around, problem.start.points[with_rays]])
+    everything = problem.start.points[with_rays]
+    if not problem.of_models:
+        everything = np.concatenate([around, everything])
     radius = float(np.linalg.norm(everything - everything.mean(axis=0), axis=1).max())
     units = np.array([radius, radius, radius, 1.0, 1.0, 1.0, 1.0])
     rows = np.einsum("nij,njd->nid", control.axes[given], similarity_derivatives(control.xyz[given], origin)) * units
     rows /= control.sigma[given][:, :, None]
     normal = np.einsum("nad,nae->de", rows, rows)
-    of_photos = datum.photo_generators(state, origin) * units
-    for linear in (positions, attitudes):
+    of_photos = datum.photo_generators(state, origin, problem.unknowns) * units
+    for linear in (each for each in (positions, attitudes) if len(each.photo)):  # of photos only
         normal += _information(linear, of_photos, inside, prepared)
     motions = similarity_derivatives(everything, origin).reshape(-1, datum.DEFECT) * units
     sigmas = np.concatenate([control.sigma[given].ravel(), problem.positions.sigma[at].ravel()])
@@ -281,14 +291,14 @@ def refuse_singular(equations: NormalEquations, extra: Floats | None) -> NoRetur
     """Refuse normal equations that cannot be factored (``bundle-rank``), naming the photos that are not determined.
 
     They are those with large elements in the null vector, found by inverse iteration on the matrix made regular with a
-    trifle of its diagonal. ``extra`` (m, 6, 6) is what was added to them as a datum.
+    trifle of its diagonal. ``extra`` (m, u, u) is what was added to them as a datum.
     """
     problem = equations.prepared.problem
     blocks = equations.own + (0.0 if extra is None else extra)
     diagonal = np.maximum(np.einsum("nii->ni", blocks), 0.0)
     least = UNMOVED * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1.0))
     add = np.zeros_like(blocks)
-    add[:, range(PHOTO), range(PHOTO)] = least
+    add[:, range(problem.unknowns), range(problem.unknowns)] = least
     found = factored(equations, add if extra is None else add + extra)
     photos, names = [], []
     if found is not None:
@@ -296,14 +306,14 @@ def refuse_singular(equations: NormalEquations, extra: Floats | None) -> NoRetur
         for _ in range(ITERATIONS):
             vector = found.by_photos(vector * np.maximum(diagonal, least).reshape(-1, 1))
             vector /= np.abs(vector).max()
-        size = np.abs(vector.reshape(-1, PHOTO)) * np.sqrt(np.maximum(diagonal, least))
+        size = np.abs(vector.reshape(-1, problem.unknowns)) * np.sqrt(np.maximum(diagonal, least))
         worst = size.max(axis=1)
         numbers = np.flatnonzero(worst > SHARE * worst.max())
         photos = [problem.photo_name(number) for number in numbers.tolist()]
         names = [MOVES[int(np.argmax(size[int(np.argmax(worst))]))]]
     what = f"; least of all the {names[0]}" if names else ""
     message = (
-        f"the observations do not determine {named('photo', photos) or 'the photos'}{what}: "
+        f"the observations do not determine {named(problem.unit, photos) or f'the {problem.unit}s'}{what}: "
         "they need more points in common with the others, or control"
     )
     raise GeometryError(message, photos=photos, code="bundle-rank")

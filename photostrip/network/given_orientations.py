@@ -8,7 +8,6 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import cross_matrix, to_vector
 from photostrip.network.problem import AttitudeObservations, PositionObservations
-from photostrip.network.rays import PHOTO
 
 LITTLE = 1e-4  # radians: below it the series of the rotation's derivative is exact
 
@@ -69,7 +68,7 @@ def positions_at(
 def attitudes_at(attitudes: AttitudeObservations, rotations: Floats, common: int) -> LinearisedOrientations:
     """Linearise given attitudes: the rotation vector of R_given^T R. They do not depend on common parameters."""
     turn = to_vector(np.swapaxes(attitudes.rotations, 1, 2) @ rotations[attitudes.photo])
-    by_photo = np.zeros((len(attitudes), 3, PHOTO))
+    by_photo = np.zeros((len(attitudes), 3, 6))
     by_photo[:, :, 3:] = _vector_by_turn(turn)
     return LinearisedOrientations(
         photo=attitudes.photo,

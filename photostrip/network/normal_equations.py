@@ -20,9 +20,9 @@ from photostrip.network.given_orientations import (
     attitudes_at,
     positions_at,
 )
-from photostrip.network.parameters import Parameters, PreparedProblem
-from photostrip.network.problem import ImageObservations
-from photostrip.network.rays import PHOTO, Rays, view
+from photostrip.network.parameters import PreparedProblem
+from photostrip.network.problem import ImageObservations, ModelObservations, Parameters
+from photostrip.network.rays import Rays, view
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Linearised:
 
 def linearise(prepared: PreparedProblem, state: Parameters) -> Linearised:
     problem, calibrated = prepared.problem, len(prepared.calibrated)
-    rays = view(problem, prepared.calibrated, state.centers, state.rotations, state.points, state.common[:calibrated])
+    rays = view(problem, prepared.calibrated, state)
     control = problem.control
     counts = (1.0 / control.sigma) * prepared.measured[control.point][:, None]
     by_controlled = control.axes * counts[:, :, None]
@@ -70,19 +70,19 @@ class NormalEquations:
     # (q,): least information on a direction as part of all on the point: about the square of the sine of the angle
     # between rays. NaN where the matrix is not positive definite
     strength: Floats
-    carried: bsr_array  # (6 m, 3 q): T
-    blocks: Floats  # (b, 6, 6): A'A - T T' for each pair of photos, with what positions and attitudes add
-    border: Floats  # (6 m, p): A'C - T R
+    carried: bsr_array  # (u m, 3 q): T
+    blocks: Floats  # (b, u, u): A'A - T T' for each pair of photos, with what positions and attitudes add
+    border: Floats  # (u m, p): A'C - T R
     common_points: csr_array  # (3 q, p): R
     corner: Floats  # (p, p): C'C - R'R, with the a-priori weights
     # right-hand sides: of photos and common parameters with the points eliminated, and L^-1 times those of the points
-    right_photos: Floats  # (6 m,)
+    right_photos: Floats  # (u m,)
     right_points: Floats  # (3 q,)
     right_common: Floats  # (p,)
 
     @property
     def own(self) -> Floats:
-        """Blocks of each photo with itself, (m, 6, 6)."""
+        """Blocks of each photo with itself, (m, u, u)."""
         return self.blocks[self.prepared.own]
 
     @property
@@ -102,6 +102,7 @@ def equations_at(prepared: PreparedProblem, state: Parameters, damping: float = 
     """
     problem, at = prepared.problem, linearise(prepared, state)
     control, rays, m, q, p = problem.control, at.rays, problem.photos, problem.points, len(state.common)
+    u = problem.unknowns
     A = _blocks(rays.by_photo, problem.images.photo, m)
     B = _blocks(rays.by_point, problem.images.point, q)
     by_photo, by_point, misfit = A.T, B.T, rays.misfit.ravel()
@@ -117,17 +118,17 @@ def equations_at(prepared: PreparedProblem, state: Parameters, damping: float = 
     carried = _by_photo(pull, problem.images, m, q)
     right_points = roots @ right.ravel()
 
-    own, right_photos = _own_blocks(by_photo @ A, m), (by_photo @ misfit).reshape(m, PHOTO)
-    border, corner, right_common = np.zeros((PHOTO * m, p)), np.diag(prepared.prior**-2.0), np.zeros(p)
-    for given in (at.positions, at.attitudes):
+    own, right_photos = _own_blocks(by_photo @ A, m), (by_photo @ misfit).reshape(m, u)
+    border, corner, right_common = np.zeros((u * m, p)), np.diag(prepared.prior**-2.0), np.zeros(p)
+    for given in (each for each in (at.positions, at.attitudes) if len(each.photo)):  # of photos only
         by_given, by_common, off = given.scaled()
         np.add.at(own, given.photo, by_given.swapaxes(1, 2) @ by_given)
         np.add.at(right_photos, given.photo, np.einsum("nip,ni->np", by_given, off))
-        np.add.at(border.reshape(m, PHOTO, p), given.photo, by_given.swapaxes(1, 2) @ by_common)
+        np.add.at(border.reshape(m, u, p), given.photo, by_given.swapaxes(1, 2) @ by_common)
         corner += np.einsum("nia,nib->ab", by_common, by_common)
         right_common += np.einsum("nia,ni->a", by_common, off)
     right_common -= prepared.prior**-2.0 * state.common
-    C = csr_array((rays.by_common.data, rays.by_common.indices, rays.by_common.indptr), shape=(2 * len(rays.misfit), p))
+    C = csr_array((rays.by_common.data, rays.by_common.indices, rays.by_common.indptr), shape=(rays.misfit.size, p))
     common_points = csr_array((3 * q, p))
     if len(prepared.calibrated):
         common_points = csr_array(roots @ (by_point @ C))
@@ -158,22 +159,23 @@ def _blocks(blocks: Floats, column: Numbers, columns: int) -> bsr_array:
     return bsr_array((blocks, column, np.arange(n + 1)), shape=(n * a, columns * b))
 
 
-def _by_photo(blocks: Floats, images: ImageObservations, photos: int, points: int) -> bsr_array:
-    """Sparse matrix (6 m, 3 q) of blocks (n, 6, 3), one for each ray."""
+def _by_photo(blocks: Floats, images: ImageObservations | ModelObservations, photos: int, points: int) -> bsr_array:
+    """Sparse matrix (u m, 3 q) of blocks (n, u, 3), one for each ray."""
     order = np.argsort(images.photo, kind="stable")
     edges = np.searchsorted(images.photo[order], np.arange(photos + 1))
-    return bsr_array((blocks[order], images.point[order], edges), shape=(PHOTO * photos, 3 * points))
+    return bsr_array((blocks[order], images.point[order], edges), shape=(blocks.shape[1] * photos, 3 * points))
 
 
 def _squares(prepared: PreparedProblem, pull: Floats) -> Floats:
-    """T T' at the pairs of photos, (b, 6, 6), from the blocks (n, 6, 3) of T: dense products of near points."""
-    found = np.zeros((len(prepared.row), PHOTO, PHOTO))
+    """T T' at the pairs of photos, (b, u, u), from the blocks (n, u, 3) of T: dense products of near points."""
+    u = prepared.problem.unknowns
+    found = np.zeros((len(prepared.row), u, u))
     for near in prepared.near:
-        u = len(near.photos)
-        rows = np.zeros((u, PHOTO, len(near.points), 3))
+        photos = len(near.photos)
+        rows = np.zeros((photos, u, len(near.points), 3))
         rows[near.photo, :, near.point] = pull[near.ray]
-        flat = rows.reshape(PHOTO * u, -1)
-        product = (flat @ flat.T).reshape(u, PHOTO, u, PHOTO).swapaxes(1, 2)
+        flat = rows.reshape(u * photos, -1)
+        product = (flat @ flat.T).reshape(photos, u, photos, u).swapaxes(1, 2)
         pair = prepared.pair(near.photos[:, None], near.photos)
         found[pair[pair >= 0]] += product[pair >= 0]
     return found
@@ -210,7 +212,7 @@ def _roots(normal: Floats) -> tuple[Floats, Floats]:
 class Solved(NamedTuple):
     """N^-1 times right-hand sides of k columns."""
 
-    photos: Floats  # (6 m, k)
+    photos: Floats  # (u m, k)
     points: Floats  # (3 q, k)
     common: Floats  # (p, k)
 
@@ -225,8 +227,9 @@ class FactoredEquations:
 
     @cached_property
     def places(self) -> Numbers:
-        """Row within the band of each parameter of the photos, (6 m,)."""
-        return (PHOTO * self.equations.prepared.rank[:, None] + np.arange(PHOTO)).ravel()
+        """Row within the band of each parameter of the photos, (u m,)."""
+        u = self.band.block
+        return (u * self.equations.prepared.rank[:, None] + np.arange(u)).ravel()
 
     @cached_property
     def inverse(self) -> Band:
@@ -235,7 +238,7 @@ class FactoredEquations:
 
     @cached_property
     def cross(self) -> Floats:
-        """Photos' part of the inverse times the border, (6 m, p)."""
+        """Photos' part of the inverse times the border, (u m, p)."""
         return self.by_photos(self.equations.border)
 
     @cached_property
@@ -251,13 +254,13 @@ class FactoredEquations:
         return np.asarray(0.5 * (inverse + inverse.T))
 
     def by_photos(self, right: Floats) -> Floats:
-        """Solve for right-hand sides (6 m, k) of the photos alone."""
+        """Solve for right-hand sides (u m, k) of the photos alone."""
         ordered = np.empty_like(right)
         ordered[self.places] = right
         return self.band.solve(ordered)[self.places] if right.size else right
 
     def solved(self, photos: Floats, points: Floats, common: Floats) -> Solved:
-        """Solve for right-hand sides of photos (6 m, k) and common parameters (p, k), points (3 q, k) eliminated.
+        """Solve for right-hand sides of photos (u m, k) and common parameters (p, k), points (3 q, k) eliminated.
 
         Those of the points are multiplied with L^-1 already, and subtracted from the others as in ``equations_at``.
         """
@@ -267,7 +270,7 @@ class FactoredEquations:
         return Solved(by_photos, equations.roots.T @ rest, by_common)
 
     def shared(self, photos: Floats, common: Floats) -> tuple[Floats, Floats]:
-        """Solve for right-hand sides of photos (6 m, k) and common parameters (p, k) with the points eliminated."""
+        """Solve for right-hand sides of photos (u m, k) and common parameters (p, k) with the points eliminated."""
         alone = self.by_photos(photos)
         by_common = self.common @ (common - self.equations.border.T @ alone)
         return alone - self.cross @ by_common, by_common
@@ -280,15 +283,16 @@ class FactoredEquations:
 
 
 def factored(equations: NormalEquations, added: Floats | None = None, damping: float = 0.0) -> FactoredEquations | None:
-    """Factor the photos' part, with ``added`` (m, 6, 6) to the photos' own blocks; None when not positive definite."""
+    """Factor the photos' part, with ``added`` (m, u, u) to the photos' own blocks; None when not positive definite."""
     prepared, blocks = equations.prepared, equations.blocks
     m, row, column, own = prepared.problem.photos, prepared.row, prepared.column, prepared.own
     if added is not None:
         blocks = blocks.copy()
         blocks[own] += added
-    band = Band(PHOTO * m, PHOTO * (int((row - column).max()) + 1) - 1)
-    element = np.arange(PHOTO)
-    places = band.place((PHOTO * row)[:, None, None] + element[:, None], (PHOTO * column)[:, None, None] + element)
+    u = prepared.problem.unknowns
+    band = Band(u * m, u * (int((row - column).max()) + 1) - 1, u)
+    element = np.arange(u)
+    places = band.place((u * row)[:, None, None] + element[:, None], (u * column)[:, None, None] + element)
     upper = np.zeros(places.shape, bool)
     upper[own] = element[:, None] < element
     places[upper] = len(band.flat) - 1  # of the diagonal blocks only the lower half belongs into the band

@@ -1,4 +1,4 @@
-"""A problem made ready: what does not change during the adjustment, and the values of all parameters."""
+"""A problem made ready: what does not change during the adjustment."""
 
 from __future__ import annotations
 
@@ -10,18 +10,10 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.frozen import NamedTuple, dataclass
 from photostrip.network import calibration
 from photostrip.network.calibration import Calibrated
-from photostrip.network.problem import BundleProblem, ImageObservations
+from photostrip.network.problem import BundleProblem, ImageObservations, ModelObservations, Parameters
 
 TOGETHER = 64  # points that are worked on together: twice and half as many take as long
 COMPARED = 8  # first photos by which points are put beside others on the same ones
-
-
-@dataclass(frozen=True, eq=False)
-class Parameters:
-    centers: Floats  # (m, 3): perspective centres, metres
-    rotations: Floats  # (m, 3, 3): rotations, photo to Cartesian frame
-    points: Floats  # (q, 3): points, metres
-    common: Floats  # (p,): calibration parameters, offsets, drifts
 
 
 class NearPoints(NamedTuple):
@@ -58,6 +50,7 @@ class PreparedProblem:
         return Parameters(
             centers=start.centers,
             rotations=start.rotations,
+            scales=np.ones(len(start.centers)) if start.scales is None else start.scales,
             points=start.points,
             common=np.zeros(len(self.prior)),
         )
@@ -105,7 +98,7 @@ def _order(joined: csr_array) -> Numbers:
     return rank if narrower else np.arange(len(rank))
 
 
-def _near_points(images: ImageObservations, rank: Numbers, points: int) -> list[NearPoints]:
+def _near_points(images: ImageObservations | ModelObservations, rank: Numbers, points: int) -> list[NearPoints]:
     """Cut the points with rays into pieces on nearly the same photos."""
     photo = rank[images.photo]
     rays = np.lexsort((photo, images.point))

@@ -50,6 +50,33 @@ class ImageObservations:
 
 
 @dataclass(frozen=True, eq=False)
+class ModelObservations:
+    """Measured coordinates of points of independent models: ``R' (X - T) / k`` with T, R, k those of the model.
+
+    They stand where a network of photos has its rays; ``photo`` is the model.
+    """
+
+    # photo, point: (n,): model and point of each row. A point is measured at most once in a model
+    photo: Numbers
+    point: Numbers
+    xy: Floats  # (n, 3): model coordinates in mm, right-handed
+    sigma: Floats  # (n, 3): their standard deviations in mm
+    correlation: Floats | None = None  # (n, 3, 3): correlations of the three coordinates; None: there are none
+
+    def __len__(self) -> int:
+        return len(self.photo)
+
+    def take(self, rows: Flags) -> ModelObservations:
+        return ModelObservations(
+            photo=self.photo[rows],
+            point=self.point[rows],
+            xy=self.xy[rows],
+            sigma=self.sigma[rows],
+            correlation=None if self.correlation is None else self.correlation[rows],
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class ControlObservations:
     """Given coordinates of points. What is observed are ``axes @ (X - xyz)``, each with its own sigma."""
 
@@ -149,13 +176,29 @@ class StartValues:
     centers: Floats  # (m, 3): perspective centres, Cartesian, metres
     rotations: Floats  # (m, 3, 3): rotations, photo to Cartesian frame
     points: Floats  # (q, 3): points, Cartesian, metres
+    scales: Floats | None = None  # (m,): of models: metres per millimetre; None: photos
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """Values of all unknowns."""
+
+    centers: Floats  # (m, 3): perspective centres, or origins of models, metres
+    rotations: Floats  # (m, 3, 3): rotations, photo or model to Cartesian frame
+    scales: Floats  # (m,): scales of models, metres per millimetre; 1 for photos
+    points: Floats  # (q, 3): points, metres
+    common: Floats  # (p,): calibration parameters, offsets, drifts
 
 
 @dataclass(frozen=True, eq=False)
 class BundleProblem:
-    """All observations and all start values of one bundle adjustment."""
+    """All observations and all start values of one network.
 
-    images: ImageObservations
+    Its units are photos or independent models, its points are those of the ground; the perspective centres that models
+    measure are points, too.
+    """
+
+    images: ImageObservations | ModelObservations
     cameras: BundleCameras
     start: StartValues  # start values; they say how many photos (m) and points (q) there are
     control: ControlObservations = field(default_factory=ControlObservations)
@@ -175,6 +218,25 @@ class BundleProblem:
     @property
     def points(self) -> int:
         return len(self.start.points)
+
+    @property
+    def of_models(self) -> bool:
+        """Whether the units are independent models."""
+        return isinstance(self.images, ModelObservations)
+
+    @property
+    def unit(self) -> str:
+        return "model" if self.of_models else "photo"
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of a unit: shift and rotation in its own axes, of a model the logarithm of its scale."""
+        return 7 if self.of_models else 6
+
+    @property
+    def least(self) -> int:
+        """Measurements that place a point: rays of two photos, or coordinates in one model."""
+        return 1 if self.of_models else 2
 
     def photo_name(self, number: int) -> str:
         return self.photo_ids[number] if self.photo_ids else f"number {number}"

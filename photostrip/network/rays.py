@@ -1,8 +1,10 @@
-"""Collinearity: misfits of the rays of a bundle at one state, and their derivatives.
+"""Misfits of rays, or of model coordinates, at one state, and their derivatives.
 
 With the arm a = R^T (X - S) in photo axes, (u, v) = -(a_x, a_y) / a_z and the principal distance f, the image point is
 f (u, v). A photo's six parameters are the shift of its perspective centre along its own axes and its rotation about
 them: d(u, v) = 1/a_z (dx + u dz, dy + v dz) by the shift, (-u v, 1 + u^2, v) and (-1 - v^2, u v, -u) by the rotation.
+
+A point of a model is a / k with its scale k; da = -dx - w x a by shift and rotation w, -a by the logarithm of k.
 Source: derived.
 """
 
@@ -11,8 +13,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from photostrip.arrays import Floats, distinct
-from photostrip.frozen import dataclass
+from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.frozen import NamedTuple, dataclass
+from photostrip.geometry.rotation import cross_matrix
 from photostrip.network.calibration import (
     PRINCIPAL_DISTANCE,
     Calibrated,
@@ -20,37 +23,40 @@ from photostrip.network.calibration import (
     partials,
     values_of,
 )
-from photostrip.network.problem import BundleProblem
-
-PHOTO = 6  # parameters of a photo
+from photostrip.network.problem import BundleProblem, ImageObservations, ModelObservations, Parameters
 
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays at one state, everything in units of sigma; derivatives are those of the computed image coordinates."""
+    """Rays at one state, everything in units of sigma; derivatives are those of the computed coordinates.
 
-    misfit: Floats  # (n, 2): measured minus computed
-    by_photo: Floats  # (n, 2, 6): by shift (m) and rotation (rad) of the photo, in its own axes
-    by_point: Floats  # (n, 2, 3): by the point, 1/m
-    by_common: csr_array  # (2 n, c): by the calibration parameters
+    Of image coordinates c = 2 stand for each ray and u = 6 unknowns for each photo, of model coordinates 3 and 7.
+    """
+
+    misfit: Floats  # (n, c): measured minus computed
+    by_photo: (
+        Floats  # (n, c, u): by shift (m) and rotation (rad) of the unit, in its own axes, and logarithm of a scale
+    )
+    by_point: Floats  # (n, c, 3): by the point, 1/m
+    by_common: csr_array  # (c n, p): by the calibration parameters
 
 
-def view(
-    problem: BundleProblem, calibrated: Calibrated, centers: Floats, rotations: Floats, points: Floats, common: Floats
-) -> Rays:
-    """Project the points of all rays; ``common`` (c,) are the values of the calibration parameters."""
-    images, cameras = problem.images, problem.cameras
+def view(problem: BundleProblem, calibrated: Calibrated, state: Parameters) -> Rays:
+    """Compute what all rays, or all model coordinates, should have measured."""
+    if isinstance(problem.images, ModelObservations):
+        return _models(problem.images, state)
+    images, cameras, common = problem.images, problem.cameras, state.common[: len(calibrated)]
     photo, weight = images.photo, 1.0 / images.sigma
     distance = calibrated.kind == PRINCIPAL_DISTANCE
     focal = cameras.focal.astype(float)
     np.add.at(focal, calibrated.camera[distance], common[distance])
     pull = focal[cameras.of_photo[photo]][:, None] * weight
-    back = np.ascontiguousarray(np.swapaxes(rotations, 1, 2))[photo]
-    arm = np.einsum("nij,nj->ni", back, points[images.point] - centers[photo])
+    back = np.ascontiguousarray(np.swapaxes(state.rotations, 1, 2))[photo]
+    arm = np.einsum("nij,nj->ni", back, state.points[images.point] - state.centers[photo])
     depth = 1.0 / arm[:, 2:]
     ratio = -arm[:, :2] * depth
     u, v = ratio.T
-    by_photo = np.zeros((len(arm), 2, PHOTO))
+    by_photo = np.zeros((len(arm), 2, problem.unknowns))
     by_photo[:, range(2), range(2)] = depth
     by_photo[:, :, 2] = ratio * depth
     by_photo[:, 0, 3], by_photo[:, 0, 4], by_photo[:, 0, 5] = -u * v, 1.0 + u * u, v
@@ -64,6 +70,48 @@ def view(
         by_point=-by_photo[:, :, :3] @ back,
         by_common=_by_calibration(problem, calibrated, values, ratio, weight),
     )
+
+
+class InModels(NamedTuple):
+    """Model coordinates in units of their standard deviations."""
+
+    misfit: Floats  # (n, 3): measured minus computed
+    by_model: Floats  # (n, 3, 7): by shift and rotation of the model, and the logarithm of its scale
+    by_point: Floats  # (n, 3, 3)
+
+
+def in_models(measured: ModelObservations, rows: Numbers, state: Parameters, xyz: Floats) -> InModels:
+    """Compare some rows (n,) of model coordinates with points that lie at ``xyz`` (n, 3).
+
+    Shift and rotation count in the Cartesian frame.
+    """
+    model = measured.photo[rows]
+    scale, turn = state.scales[model][:, None, None], np.swapaxes(state.rotations, 1, 2)[model]
+    back = turn / scale
+    computed = np.einsum("nij,nj->ni", back, xyz - state.centers[model])
+    white = whitening(measured)[rows]
+    by_model = np.concatenate([-back, cross_matrix(computed) @ turn, -computed[:, :, None]], axis=2)
+    misfit = np.einsum("nij,nj->ni", white, measured.xy[rows] - computed)
+    return InModels(misfit, white @ by_model, white @ back)
+
+
+def _models(measured: ModelObservations, state: Parameters) -> Rays:
+    """Compute all model coordinates."""
+    found = in_models(measured, np.arange(len(measured)), state, state.points[measured.point])
+    turn = state.rotations[measured.photo]
+    by_model = found.by_model
+    by_model[:, :, :3], by_model[:, :, 3:6] = by_model[:, :, :3] @ turn, by_model[:, :, 3:6] @ turn
+    return Rays(
+        misfit=found.misfit, by_photo=by_model, by_point=found.by_point, by_common=csr_array((found.misfit.size, 0))
+    )
+
+
+def whitening(measured: ImageObservations | ModelObservations) -> Floats:
+    """Matrices W (n, c, c) with W' W the weights of the coordinates of a row."""
+    white: Floats = np.eye(measured.sigma.shape[1]) / measured.sigma[:, None, :]
+    if isinstance(measured, ModelObservations) and measured.correlation is not None:
+        white = np.linalg.inv(np.linalg.cholesky(measured.correlation)) @ white
+    return white
 
 
 def _by_calibration(

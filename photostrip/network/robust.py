@@ -6,6 +6,7 @@ The weights are those of ``strip.robust``: many gross errors at once, also large
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import chdtri
 
 from photostrip.arrays import Floats, median
 from photostrip.frozen import replace
@@ -16,7 +17,6 @@ from photostrip.network.solve import solve
 from photostrip.strip.robust import falling_weights
 
 REWEIGHTINGS = 6
-NORMAL_MEDIAN = 1.1774  # median of the length of two standard normal residuals
 NO_WEIGHT = 1e-3  # weight below which a ray is out
 
 
@@ -27,11 +27,12 @@ def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
     """
     weight = np.ones(len(problem.images))
     sigma = problem.images.sigma
+    normal = float(np.sqrt(chdtri(sigma.shape[1], 0.5)))  # median of the length of standard normal residuals
     for _ in range(REWEIGHTINGS):
         spread = sigma / np.sqrt(weight)[:, None]
         solution = solve(replace(problem, images=replace(problem.images, sigma=spread)))
         problem = restarted(problem, solution)
         size = np.linalg.norm(solution.image_residuals / sigma, axis=1)
-        unit = max(median(size) / NORMAL_MEDIAN, 1e-12)
+        unit = max(median(size) / normal, 1e-12)
         weight = falling_weights(size / unit)
     return solution, weight

@@ -9,7 +9,6 @@ from photostrip.frozen import dataclass, replace
 from photostrip.network.problem import BundleProblem, StartValues
 from photostrip.network.solution import BundleSolution
 
-LEAST_RAYS = 2
 FIELDS = {"image": "images", "control": "control", "position": "positions", "attitude": "attitudes"}
 
 
@@ -57,7 +56,7 @@ def supported(problem: BundleProblem, selection: Selection) -> Selection:
     control = selection.control & np.isfinite(problem.control.sigma)
     fixed = np.zeros(problem.points, bool)
     fixed[problem.control.point[control.all(axis=1)]] = True
-    images = selection.images & ((rays >= LEAST_RAYS) | fixed)[point]
+    images = selection.images & ((rays >= problem.least) | fixed)[point]
     images &= np.isfinite(problem.start.points[point]).all(axis=1)
     shown = np.zeros(problem.points, bool)
     shown[point[images]] = True
@@ -81,4 +80,5 @@ def restarted(problem: BundleProblem, solution: BundleSolution) -> BundleProblem
     """Start where a solution of the problem, or of a selection, ended; a point that took no part keeps its start."""
     known = np.asarray(np.isfinite(problem.start.points).all(axis=1), bool)
     points = np.where(known[:, None], solution.points, problem.start.points)
-    return replace(problem, start=StartValues(solution.centers, solution.rotations, points))
+    scales = None if problem.start.scales is None else solution.scales
+    return replace(problem, start=StartValues(solution.centers, solution.rotations, points, scales))

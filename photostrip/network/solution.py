@@ -14,7 +14,8 @@ from photostrip.network.normal_equations import (
     equations_at,
     factored,
 )
-from photostrip.network.parameters import Parameters, PreparedProblem
+from photostrip.network.parameters import PreparedProblem
+from photostrip.network.problem import Parameters
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,13 @@ class IterationStep:
 class BundleSolution:
     """The least-squares estimate."""
 
-    centers: Floats  # (m, 3): perspective centres, metres, in the frame of the problem
-    rotations: Floats  # (m, 3, 3): rotations, photo to Cartesian frame
+    centers: Floats  # (m, 3): perspective centres, or origins of models, metres, in the frame of the problem
+    rotations: Floats  # (m, 3, 3): rotations, photo or model to Cartesian frame
+    scales: Floats  # (m,): scales of models, metres per millimetre; 1 for photos
     points: Floats  # (q, 3): points, metres. A point without rays keeps its start
     common: Floats  # (p,): calibration, offset and drift parameters, in the order of ``Problem.common_names()``
-    image_residuals: Floats  # (n, 2): measured minus adjusted image coordinates, mm, in the order of ``problem.images``
+    # (n, c): measured minus adjusted image or model coordinates, mm, in the order of ``problem.images``
+    image_residuals: Floats
     # (c, 3): adjusted minus given coordinates along the axes of each row, metres, also where the sigma is infinite
     control_residuals: Floats
     # (g, 3): adjusted minus given camera positions along the axes, metres, offset and drift taken off
@@ -51,7 +54,9 @@ class BundleSolution:
 
     @property
     def state(self) -> Parameters:
-        return Parameters(centers=self.centers, rotations=self.rotations, points=self.points, common=self.common)
+        return Parameters(
+            centers=self.centers, rotations=self.rotations, scales=self.scales, points=self.points, common=self.common
+        )
 
     @cached_property
     def factored(self) -> FactoredEquations:
@@ -74,11 +79,11 @@ class Cofactors:
     """Cofactors: covariances for a sigma0 of 1. Multiply by sigma0 squared where that is wanted."""
 
     points: Floats  # (q, 3, 3): cofactors of the points, m^2, Cartesian; NaN for a point without rays
-    # (m, 6, 6): cofactors of the photos: shift of the perspective centre (m), then rotation vector (rad), both in the
-    # Cartesian frame; the rotation is ``from_vector(v) @ R``
+    # (m, u, u): cofactors of photos or models: shift of the perspective centre (m), then rotation vector (rad), both in
+    # the Cartesian frame; the rotation is ``from_vector(v) @ R``; of models the logarithm of the scale
     photos: Floats
     common: Floats  # (p, p): cofactors of the common parameters
-    # (n, 2, 2): cofactors of the residuals of each ray, mm^2: with sigma of a coordinate, its redundancy number is
+    # (n, c, c): cofactors of the residuals of each ray, mm^2: with sigma of a coordinate, its redundancy number is
     # ``diagonal / sigma**2``
     image_residuals: Floats
     # (c, 3, 3): the same for control, along its axes, m^2; of rows and columns that are not given: minus the cofactor
@@ -88,4 +93,4 @@ class Cofactors:
     attitude_residuals: Floats  # (a, 3, 3): the same for attitudes, rad^2
     # (p,): the same for the a-priori values of weighted common parameters; 0 where a parameter is free
     common_residuals: Floats
-    photo_common: Floats  # (m, 6, p): cofactors between photos and common parameters
+    photo_common: Floats  # (m, u, p): cofactors between photos and common parameters

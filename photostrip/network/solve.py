@@ -18,9 +18,9 @@ from photostrip.network.normal_equations import (
     factored,
     linearise,
 )
-from photostrip.network.parameters import Parameters, PreparedProblem, prepare
-from photostrip.network.problem import BundleProblem
-from photostrip.network.rays import PHOTO
+from photostrip.network.parameters import PreparedProblem, prepare
+from photostrip.network.problem import BundleProblem, Parameters
+from photostrip.network.rays import whitening
 from photostrip.network.solution import BundleSolution, IterationStep
 
 FIRST_DAMPING = 1e-4
@@ -122,7 +122,7 @@ def _still_to_come(steps: list[IterationStep]) -> float:
 class _Move(NamedTuple):
     """A step of all parameters."""
 
-    photos: Floats  # (m, 6): of the photos, in their own axes
+    photos: Floats  # (m, u): of photos or models, in their own axes
     points: Floats  # (q, 3): metres
     common: Floats  # (p,)
     length: float  # in standard deviations: the root of dx' N dx
@@ -134,7 +134,7 @@ def _move(state: Parameters, equations: NormalEquations, damping: float, *, free
     anchor = datum.anchor(equations.own, prepared.rank, state) if free else None
     added = anchor
     if damping:
-        added = np.eye(PHOTO) * (damping * equations.own) + (0.0 if anchor is None else anchor)
+        added = np.eye(prepared.problem.unknowns) * (damping * equations.own) + (0.0 if anchor is None else anchor)
     found = factored(equations, added, damping)
     if found is None:
         defects.refuse_weak_points(equations)
@@ -143,12 +143,12 @@ def _move(state: Parameters, equations: NormalEquations, damping: float, *, free
     right = equations.right_photos, equations.right_points, equations.right_common
     by_photos, by_points, common = (each[:, 0] for each in found.solved(*(side[:, None] for side in right)))
     square = float(right[1] @ right[1] + right[0] @ by_photos + right[2] @ common)
-    photos, points = by_photos.reshape(-1, PHOTO), by_points.reshape(-1, 3)
+    photos, points = by_photos.reshape(-1, prepared.problem.unknowns), by_points.reshape(-1, 3)
     if free:
         origin, moves = datum.point_generators(prepared, state)
         flat = moves.reshape(-1, datum.DEFECT)
         similarity = np.linalg.solve(flat.T @ flat, flat.T @ by_points)
-        photos = photos - datum.photo_generators(state, origin) @ similarity
+        photos = photos - datum.photo_generators(state, origin, prepared.problem.unknowns) @ similarity
         points = points - moves @ similarity
     return _Move(photos=photos, points=points, common=common, length=float(np.sqrt(max(square, 0.0))))
 
@@ -156,7 +156,8 @@ def _move(state: Parameters, equations: NormalEquations, damping: float, *, free
 def _moved(state: Parameters, move: _Move) -> Parameters:
     return Parameters(
         centers=state.centers + np.einsum("nij,nj->ni", state.rotations, move.photos[:, :3]),
-        rotations=state.rotations @ from_vector(move.photos[:, 3:]),
+        rotations=state.rotations @ from_vector(move.photos[:, 3:6]),
+        scales=state.scales * np.exp(move.photos[:, 6:].sum(axis=1)),
         points=state.points + move.points,
         common=state.common + move.common,
     )
@@ -164,7 +165,7 @@ def _moved(state: Parameters, move: _Move) -> Parameters:
 
 def _recorded(equations: NormalEquations, move: _Move, damping: float) -> IterationStep:
     shift = max(float(np.abs(part).max(initial=0.0)) for part in (move.photos[:, :3], move.points))
-    turn = float(np.abs(move.photos[:, 3:]).max(initial=0.0))
+    turn = float(np.abs(move.photos[:, 3:6]).max(initial=0.0))
     return IterationStep(chi_square=equations.chi_square, length=move.length, damping=damping, shift=shift, turn=turn)
 
 
@@ -176,9 +177,10 @@ def _solution(prepared: PreparedProblem, ended: _Ended, *, free: bool) -> Bundle
     return BundleSolution(
         centers=state.centers,
         rotations=state.rotations,
+        scales=state.scales,
         points=state.points,
         common=state.common,
-        image_residuals=at.rays.misfit * problem.images.sigma,
+        image_residuals=_residuals(problem, at.rays.misfit),
         control_residuals=np.einsum("nij,nj->ni", control.axes, state.points[control.point] - control.xyz),
         position_residuals=at.positions.residual,
         attitude_residuals=at.attitudes.residual,
@@ -191,8 +193,15 @@ def _solution(prepared: PreparedProblem, ended: _Ended, *, free: bool) -> Bundle
     )
 
 
+def _residuals(problem: BundleProblem, misfit: Floats) -> Floats:
+    """Residuals of rays or model coordinates in mm, out of those in units of sigma."""
+    if not problem.of_models:
+        return np.asarray(misfit * problem.images.sigma)
+    return np.asarray(np.linalg.solve(whitening(problem.images), misfit[:, :, None])[:, :, 0], float)
+
+
 def _redundancy(prepared: PreparedProblem, *, free: bool) -> int:
-    """Observations, priors among them, minus unknowns: six of a photo, three of a point with rays, and those in common.
+    """Observations, priors among them, minus unknowns: of the units, three of a point with rays, and those in common.
 
     A free network has seven unknowns less, those of its datum.
     """
@@ -207,5 +216,5 @@ def _redundancy(prepared: PreparedProblem, *, free: bool) -> int:
             prepared.prior,
         )
     )
-    unknowns = PHOTO * problem.photos + 3 * int(prepared.measured.sum()) + len(prepared.prior)
+    unknowns = problem.unknowns * problem.photos + 3 * int(prepared.measured.sum()) + len(prepared.prior)
     return observations - unknowns + (datum.DEFECT if free else 0)

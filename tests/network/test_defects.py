@@ -14,7 +14,7 @@ from photostrip.network import defects
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.network.parameters import Parameters
+    from photostrip.network.problem import Parameters
 
 
 def state(centers: NDArray[np.float64], heading: float = 0.0) -> Parameters:

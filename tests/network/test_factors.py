@@ -33,7 +33,7 @@ def test_a_band_is_factored_solved_and_inverted(photos: int, near: int, seed: in
     row, column = np.tril_indices(size)
     within = row - column <= width
     row, column = row[within], column[within]
-    band = Band(size, width)
+    band = Band(size, width, 6)
     band.flat[band.place(row, column)] = matrix[row, column]
     assert band.factor()
     right = np.random.default_rng(seed).normal(size=(size, 3))
@@ -46,6 +46,6 @@ def test_a_band_is_factored_solved_and_inverted(photos: int, near: int, seed: in
 
 
 def test_what_is_not_positive_definite_is_told() -> None:
-    band = Band(3, 1)
+    band = Band(3, 1, 1)
     band.flat[band.place(np.arange(3), np.arange(3))] = [1.0, -1.0, 1.0]
     assert not band.factor()

@@ -30,9 +30,13 @@ REGULARISATION = 1e-9  # keeps a point that holds its photos alone from stopping
 
 @dataclass(frozen=True, eq=False)
 class PointRays:
-    """Points and r rays of each, linearised, in units of their standard deviations; control of them as more rows."""
+    """Points and r rays of each, linearised, in units of their standard deviations; control of them as more rows.
 
-    rays: int  # the first 2 r rows are theirs, x and y of one ray after the other
+    A ray is what one photo says of a point in c = 2 coordinates, or one model in 3.
+    """
+
+    rays: int  # the first c r rows are theirs, the coordinates of one ray after the other
+    coordinates: int  # c
     misfit: Floats  # (m, n): measured minus computed
     by_point: Floats  # (m, n, 3): derivatives by the point
     of_photos: Floats  # (m, n, n): covariances that their photos bring into the rows; 0 for control
@@ -50,7 +54,7 @@ class Decisions:
     out: Flags  # (m, r): rays that must not be used
     cause: Numbers  # (m,): places in ``CAUSES``
     value: Floats  # (m,): largest standardised residual of a coordinate of the point
-    size: Floats  # (m, r, 2): estimated errors of the coordinates in standard deviations; NaN where nothing can be said
+    size: Floats  # (m, r, c): estimated errors of the coordinates in standard deviations; NaN where nothing can be said
 
 
 def without_place(decided: Decisions, nowhere: Flags) -> Decisions:
@@ -77,27 +81,28 @@ def decide(points: PointRays, limit: Limit) -> Decisions:
     """Test points, and find the wrong rays of those with a coordinate beyond the limit."""
     gap, weight, basis = _misclosures(points)
     (m, freedom), r, unit = gap.shape, points.rays, limit.unit**2
+    c = points.coordinates
     carried = basis @ weight
     pulled, normal = (carried @ gap[:, :, None])[:, :, 0], carried @ basis.swapaxes(1, 2)
-    share = np.einsum("mii->mi", normal)[:, : 2 * r]
-    tests = np.abs(pulled[:, : 2 * r]) / np.sqrt(np.maximum(share, UNCONTROLLED))
+    share = np.einsum("mii->mi", normal)[:, : c * r]
+    tests = np.abs(pulled[:, : c * r]) / np.sqrt(np.maximum(share, UNCONTROLLED))
     value = np.where(share > UNCONTROLLED, tests, 0.0).max(axis=1)
     total = np.einsum("mi,mij,mj->m", gap, weight, gap)
     out = np.repeat((value > limit.of(r) * limit.unit)[:, None], r, axis=1)
-    size, told, left_over = np.full((m, r, 2), np.nan), np.zeros(m, bool), np.flatnonzero(out[:, 0])
+    size, told, left_over = np.full((m, r, c), np.nan), np.zeros(m, bool), np.flatnonzero(out[:, 0])
     for count in range(1, min(r, LARGEST_SET) + 1):
-        if not len(left_over) or (count > 1 and freedom - 2 * count < 1):
+        if not len(left_over) or (count > 1 and freedom - c * count < 1):
             break
         sets = ray_sets(r, count)
-        left, errors = _without(total[left_over], pulled[left_over], normal[left_over], sets.rays)
+        left, errors = _without(total[left_over], pulled[left_over], normal[left_over], sets.rays, c)
         rows = np.arange(len(left))
         likeliest = left[:, sets.of_ray].argmin(axis=2)  # of the sets with each ray: says its error
         ray = np.arange(r)
         size[left_over] = errors[rows[:, None], sets.of_ray[ray, likeliest], sets.place[ray, likeliest]]
-        if freedom - 2 * count < 1:
+        if freedom - c * count < 1:
             break  # nothing would check the rays that are left
         best = left.argmin(axis=1)
-        least, bound = left[rows, best], chi2_quantile(1 - limit.alpha, freedom - 2 * count) * unit
+        least, bound = left[rows, best], chi2_quantile(1 - limit.alpha, freedom - c * count) * unit
         rivals = (left <= np.minimum(bound, least + LIKELIER * unit)[:, None]).sum(axis=1)
         only = (least <= bound) & (rivals == 1)
         sure, wrong = left_over[only], (sets.of_ray == best[only, None, None]).any(axis=2)
@@ -158,16 +163,16 @@ def _misclosures(point: PointRays) -> _Misclosures:
 
 class _Deleted(NamedTuple):
     left: Floats  # (m, s): sums of squares without each set
-    errors: Floats  # (m, s, k, 2): errors of its coordinates
+    errors: Floats  # (m, s, k, c): errors of its coordinates
 
 
-def _without(total: Floats, pulled: Floats, normal: Floats, sets: Numbers) -> _Deleted:
+def _without(total: Floats, pulled: Floats, normal: Floats, sets: Numbers, c: int) -> _Deleted:
     """Take sets (s, k) of as many rays each out.
 
     Their normal equations, of up to 6 errors, are eliminated element by element, together for all points and sets: 64
     points of 17 rays have 43 520 of them.
     """
-    (m, n), rows = pulled.shape, (2 * sets[:, :, None] + np.arange(2)).reshape(len(sets), -1).T
+    (m, n), rows = pulled.shape, (c * sets[:, :, None] + np.arange(c)).reshape(len(sets), -1).T
     of_rows, of_pairs = np.ascontiguousarray(pulled.T), np.ascontiguousarray(normal.reshape(m, -1).T)
     pull, size = of_rows[rows], len(rows)
     left = [[of_pairs[rows[i] * n + rows[j]] for j in range(i + 1)] for i in range(size)]
@@ -185,4 +190,4 @@ def _without(total: Floats, pulled: Floats, normal: Floats, sets: Numbers) -> _D
         for i in range(j + 1, size):
             error[j] -= factor[i][j] * error[i]
     sums = total[:, None] - np.einsum("ism,ism->ms", pull, error)
-    return _Deleted(sums, np.ascontiguousarray(error.transpose(2, 1, 0)).reshape(m, len(sets), -1, 2))
+    return _Deleted(sums, np.ascontiguousarray(error.transpose(2, 1, 0)).reshape(m, len(sets), -1, c))

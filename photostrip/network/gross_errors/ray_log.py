@@ -24,7 +24,7 @@ class WrongRays:
     # value, limit: (n,): test value of the point and what it is tested against
     value: Floats
     limit: Floats
-    size: Floats  # (n, 2): estimated errors of the coordinates, mm
+    size: Floats  # (n, c): estimated errors of the coordinates, mm
     cause: Numbers  # (n,): places in ``CAUSES``
 
     def __len__(self) -> int:
@@ -43,12 +43,12 @@ class WrongRays:
 class RayLog:
     """What was last said of each ray of a problem, and by which test it went."""
 
-    def __init__(self, begin: Flags) -> None:
-        """Begin with some of the rays (n,); points with others meet somehow."""
+    def __init__(self, begin: Flags, coordinates: int) -> None:
+        """Begin with some of the rays (n,), of so many coordinates each; points with others meet somehow."""
         rays = len(begin)
         self.test, self.said = np.full(rays, START, "U8"), np.zeros(rays, bool)
         self.value, self.limit = np.full(rays, np.nan), np.full(rays, np.nan)
-        self.size, self.cause = np.full((rays, 2), np.nan), np.where(begin, AGREE, SEVERAL)
+        self.size, self.cause = np.full((rays, coordinates), np.nan), np.where(begin, AGREE, SEVERAL)
 
     def say(self, wrong: WrongRays) -> None:
         for column in ("value", "limit", "size", "cause"):

@@ -32,7 +32,7 @@ from photostrip.network.gross_errors.ray_decisions import Adjusted, RayDecisions
 from photostrip.network.gross_errors.ray_log import ROBUST, START, RayLog, WrongRays
 from photostrip.network.problem import BundleProblem
 from photostrip.network.reliability import CONTROL, IMAGE, Limit
-from photostrip.network.selection import LEAST_RAYS, Selection, restarted, selected, supported
+from photostrip.network.selection import Selection, restarted, selected, supported
 from photostrip.network.settings import BundleSettings
 from photostrip.network.solution import BundleSolution, Cofactors
 from photostrip.network.solve import solve
@@ -133,7 +133,7 @@ class _Search:
         nothing = partial(Rejection, kind=CONTROL, test=START, value=float("nan"), limit=float("nan"))
         self.began: dict[tuple[str, int, int], Rejection | None] = {(IMAGE, row, 0): None for row in rays}
         self.began |= {(CONTROL, row, axis): nothing(row=row, axes=(axis,)) for row, axis in given}
-        self.rays = RayLog(begin.images)
+        self.rays = RayLog(begin.images, images.xy.shape[1])
         self.back = np.zeros(problem.points, bool)  # points that came back; what must go again stays out
         self.decided = Selection.everything(problem)  # what took part when rays outside were decided on
         self.beyond = np.full(problem.points, np.inf)  # test values of points with a ray outside, when decided on
@@ -419,9 +419,9 @@ class _Search:
         rays = np.bincount(point, minlength=len(xyz))
         asked = (self.beyond <= limit.of(rays)) | np.isinf(self.beyond)  # the limit rises where less is established
         numbers = distinct(point[~images & (changed[photo] | asked[point])])
-        placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] > 1
+        placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] >= self.problem.least
         place = np.where(placed, done.solution.points[numbers], np.nan)
-        place = np.where(rays[numbers, None] < LEAST_RAYS, xyz[numbers], place)
+        place = np.where(rays[numbers, None] < self.problem.least, xyz[numbers], place)
         decided = self._decided(done, self.rays_of(numbers), place)
         self.rays.say(self._rejected(decided, limit))
         row, number = decided.row, numbers[decided.place]

@@ -15,7 +15,7 @@ from photostrip.network.common_errors import taken_up
 from photostrip.network.correlations import Correlation, correlations
 from photostrip.network.gross_errors import snooping
 from photostrip.network.gross_errors.snooping import ScreenedBundle
-from photostrip.network.selection import LEAST_RAYS, Selection, restarted, selected, supported
+from photostrip.network.selection import Selection, restarted, selected, supported
 from photostrip.network.solution import BundleSolution, Cofactors
 from photostrip.network.solve import solve
 from photostrip.pipeline.block import block_result
@@ -84,7 +84,7 @@ def adjust_block(
 def _start_from(before: Bundle, observations: PhotoPoints, control: ControlPoints) -> BlockStart:
     """Start where an adjustment with more control ended; a point on one photo that has lost its control is nowhere."""
     solution, origin = before.screened.solution, before.block.origin
-    nowhere = np.bincount(observations.point, minlength=len(observations.point_ids)) < LEAST_RAYS
+    nowhere = np.bincount(observations.point, minlength=len(observations.point_ids)) < before.block.problem.least
     nowhere[locate(control.ids, observations.point_ids)] = False
     points = np.where(nowhere[:, None] | np.isnan(before.start.points), np.nan, solution.points + origin)
     return replace(before.start, centers=solution.centers + origin, rotations=solution.rotations, points=points)

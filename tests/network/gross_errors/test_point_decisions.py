@@ -49,6 +49,7 @@ def a_point(seed: int, rays: int = 3) -> PointRays:
     _, by_point = derivatives(place, KnownPhotos(centers, rotations, np.full(rays, 153.0)), np.arange(rays))
     return PointRays(
         rays=rays,
+        coordinates=2,
         misfit=rng.normal(0, 1, 2 * rays),
         by_point=(by_point / SIGMA).reshape(-1, 3),
         of_photos=np.zeros((2 * rays, 2 * rays)),
@@ -79,6 +80,7 @@ def decide(point: PointRays, limit: Limit) -> Decision:
 def together(*points: PointRays) -> PointRays:
     return PointRays(
         rays=points[0].rays,
+        coordinates=2,
         misfit=np.array([each.misfit for each in points]),
         by_point=np.array([each.by_point for each in points]),
         of_photos=np.array([each.of_photos for each in points]),
@@ -89,7 +91,9 @@ def together(*points: PointRays) -> PointRays:
 def without(gap: Floats, weight: Floats, basis: Floats, sets: Numbers) -> tuple[Floats, Floats]:
     """Take sets of rays of one point out: sums of squares (s,) and errors (s, k, 2)."""
     normal = basis @ weight @ basis.T
-    found = point_decisions._without(np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets)
+    found = point_decisions._without(
+        np.array([gap @ weight @ gap]), (basis @ weight @ gap)[None], normal[None], sets, 2
+    )
     return found.left[0], found.errors[0]
 
 
@@ -98,7 +102,7 @@ def test_sets_of_many_points_are_taken_out_as_one_by_one(count: int) -> None:
     random = np.random.default_rng(count)
     root, pulled, total = random.normal(size=(5, 12, 15)), random.normal(size=(5, 12)), random.normal(size=5)
     normal, sets = root @ root.swapaxes(1, 2), point_decisions.ray_sets(6, count).rays
-    left, errors = point_decisions._without(total, pulled, normal, sets)
+    left, errors = point_decisions._without(total, pulled, normal, sets, 2)
     for point, (row, rays) in nonempty(itertools.product(range(5), enumerate(sets))):
         at = (2 * rays[:, None] + np.arange(2)).ravel()
         error = np.linalg.solve(normal[point][np.ix_(at, at)], pulled[point, at])
