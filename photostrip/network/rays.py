@@ -8,11 +8,12 @@ Source: derived.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from photostrip.arrays import Floats, distinct
-from photostrip.frozen import dataclass
 from photostrip.network.calibration import (
     PRINCIPAL_DISTANCE,
     Calibrated,
