@@ -20,9 +20,11 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))  # run from anywhere, installed or not
 
+from dataclasses import replace  # noqa: E402
+from typing import NamedTuple  # noqa: E402
+
 from benchmarks.strip import UNIT  # noqa: E402
 from photostrip.formats.output.simulation import project_files  # noqa: E402
-from photostrip.frozen import NamedTuple, replace  # noqa: E402
 from photostrip.simulation import Control, Flight, Gnss, Ground, Points, Spec, Terrain, simulate  # noqa: E402
 
 if TYPE_CHECKING:

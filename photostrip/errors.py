@@ -12,9 +12,8 @@ Readers collect faults and raise one ``InputError`` for all of them; mathematics
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
-
-from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from photostrip.notes import Finding

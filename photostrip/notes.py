@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
-
-from photostrip.frozen import dataclass
 
 Document = dict[str, Any]  # of a result, a plan, a comparison: plain values, as JSON has them
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from itertools import chain, count, repeat
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import dataclass, names_of, replace
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -149,12 +148,12 @@ class ControlPoints:
 
     def take(self, rows: Sequence[int] | Numbers | Flags) -> ControlPoints:
         """Points of some rows, by number or by flag, in their order."""
-        return take_rows(self, rows, names_of(ControlPoints))
+        return take_rows(self, rows, (each.name for each in fields(self)))
 
 
 def concatenated(tables: Sequence[ControlPoints]) -> ControlPoints:
     """Points of several tables, one after the other."""
-    columns = {name: [getattr(table, name) for table in tables] for name in names_of(ControlPoints)}
+    columns = {each.name: [getattr(table, each.name) for table in tables] for each in fields(ControlPoints)}
     ids = tuple(chain.from_iterable(columns.pop("ids")))
     return ControlPoints(ids=ids, **{name: np.concatenate(parts) for name, parts in columns.items()})
 

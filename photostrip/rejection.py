@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import fabs, nan
-
-from photostrip.frozen import dataclass
 
 UNCONTROLLED = 0.01  # redundancy number below which an observation cannot be tested
 WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"

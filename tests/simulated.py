@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from photostrip.formats.output.simulation import model_strips
-from photostrip.frozen import replace
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Bottom to top. A room is a module or a folder directly below photostrip/.
 LAYERS = (
-    {"arrays", "errors", "frozen", "notes", "number_columns", "statistics", "threads", "units", "visible"},
+    {"arrays", "errors", "notes", "number_columns", "statistics", "threads", "units", "visible"},
     {"points", "camera", "geometry", "geodesy", "rejection"},
     {"strip", "terrestrial"},
     {"network"},
@@ -34,7 +34,7 @@ LAYERS = (
     {"__main__"},
 )
 # Rooms that may not use each other although their layers would allow it: (who, not whom).
-TAUGHT = {"errors", "frozen", "notes", "visible"}  # all that a report may know of the program
+TAUGHT = {"errors", "notes", "visible"}  # all that a report may know of the program
 LEAVES = {"report"}
 APART = {
     ("terrestrial", "strip"),

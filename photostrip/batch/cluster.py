@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -28,7 +29,6 @@ from photostrip.batch.result_folder import program
 from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.batch.worker_process import WORK
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import replace
 
 LOCAL = "local"
 CONNECT_SECONDS = 5.0  # seconds for a scheduler to answer

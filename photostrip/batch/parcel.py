@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from photostrip.errors import InputError
@@ -10,7 +11,6 @@ from photostrip.formats.text.files import LARGEST_FILE, from_disk, read_bytes
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.source import Source, reading_from
 from photostrip.formats.text.table_text import LARGEST_TABLE
-from photostrip.frozen import dataclass
 from photostrip.geodesy.crs import grid_names
 from photostrip.project.yaml.merging import override, path_of, read_tree
 from photostrip.project.yaml.tree import Node

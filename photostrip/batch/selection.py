@@ -7,11 +7,11 @@ import os
 import sys
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes
-from photostrip.frozen import dataclass
 
 PROJECT = "project.yaml"
 ENDINGS = {".yaml", ".yml"}

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from photostrip.frozen import dataclass
 from photostrip.notes import Document
 
 if TYPE_CHECKING:

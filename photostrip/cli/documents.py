@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from photostrip.cli.declared import typer
 from photostrip.cli.stdout import Document, print_json, print_sections
-from photostrip.frozen import dataclass
 from photostrip.visible import visible
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from inspect import Parameter, signature
 from pathlib import Path
@@ -16,7 +17,6 @@ from types import NoneType
 from typing import Any, get_args, get_origin, get_type_hints
 
 from photostrip.cli.declared import Declared
-from photostrip.frozen import dataclass
 
 TEXTS = {"metavar", "help", "envvar", "autocompletion", "show_default"}  # told to typer, of no effect on a value
 

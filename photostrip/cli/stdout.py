@@ -6,10 +6,9 @@ import sys
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from photostrip.cli.declared import typer
-from photostrip.frozen import NamedTuple
 
 if TYPE_CHECKING:
     from photostrip.report.page.parts import Section

@@ -7,6 +7,7 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from photostrip.comparison.members import members_of, missing_and_new
 from photostrip.comparison.quantities import ComparedNumber, quantities_of
 from photostrip.comparison.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
 from photostrip.result.statement.edited import OF_VALUES, faults_of_edited
 

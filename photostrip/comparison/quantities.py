@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TypeGuard
+from typing import NamedTuple, TypeGuard
 
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
 from photostrip.result.description import quantity_at
 

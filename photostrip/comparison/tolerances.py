@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photostrip.frozen import dataclass
+from dataclasses import dataclass
 
 # Kinds of quantities and the unit of their absolute tolerances. Statistics have two: metres, micrometres.
 UNITS = {

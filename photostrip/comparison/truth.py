@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.comparison.ground import east_north_up, level, plan_and_height
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import replace
 from photostrip.notes import Document
 from photostrip.result.description import Quantity, Table
 from photostrip.result.reading import MOST_FAULTS, faults_of

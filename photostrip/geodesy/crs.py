@@ -6,12 +6,12 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.errors import PhotostripError
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geodesy.curvature import Ellipsoid
 from photostrip.geodesy.frame_spec import FrameSpec, Kind, Refusal
 from photostrip.geodesy.ground_frame import WGS84

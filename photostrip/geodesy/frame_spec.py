@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Literal
 
 from photostrip.errors import Fault
-from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import Ellipsoid
 
 Kind = Literal["projected", "geographic", "geocentric", "local"]

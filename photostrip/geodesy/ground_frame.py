@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats, pieces
 from photostrip.errors import GeometryError, PhotostripError
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import Ellipsoid, curvature_correction, meridian_radius, prime_vertical_radius
 from photostrip.geodesy.domain import finite_rows, named_rows, require_reached, require_rows
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind

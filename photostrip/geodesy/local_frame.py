@@ -10,6 +10,7 @@ the matrix is not orthogonal).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -17,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import Ellipsoid, eccentricity_squared, prime_vertical_radius
 
 _ITERATIONS = 10  # the Earth stops after 2 or 3, a body as flat as Saturn after a few more

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import EARTH_RADIUS
 
 if TYPE_CHECKING:

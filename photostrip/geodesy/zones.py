@@ -9,11 +9,12 @@ Source: derived.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.arrays import Floats
-from photostrip.frozen import dataclass
 
 HIGHEST_POWER = 3  # power
 FEWEST_COMMON = 2  # points in both zones

@@ -15,13 +15,14 @@ products would cost half of the digits.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.points import frozen
 
 SINGULAR = 1e-9  # smallest over largest singular value: below, rounding decides

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Self
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.points import frozen
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,6 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import LARGEST_FILE, from_disk
 from photostrip.formats.text.source import Source, current, digest
 from photostrip.formats.text.source import reading_from as accounted
-from photostrip.frozen import replace
 from photostrip.library.result import Result
 from photostrip.notes import counted
 

@@ -8,6 +8,7 @@ Rotations take image axes, or those of a model, to the axes named beside them.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,7 +17,6 @@ from numpy.typing import ArrayLike
 from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import dataclass
 from photostrip.geometry import plane
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.library.step_arguments import rows, same, sigma0_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import compress
 from typing import Literal
 
@@ -11,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.library.step_arguments import Rays, of_rays, rows, same, sigma0_of
 from photostrip.network.cofactors import cofactors_of

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.camera import Distortion
-from photostrip.frozen import dataclass
 from photostrip.network.problem import BundleCameras
 from photostrip.network.settings import CALIBRATION
 from photostrip.strip.image_coordinates import lens_distortion

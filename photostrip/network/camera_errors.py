@@ -8,11 +8,13 @@ elsewhere are a rival. Source: derived, see docs/sources.md.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 from scipy.special import gammaincc, gammaln, log_ndtr
 
 from photostrip.arrays import Numbers, distinct
-from photostrip.frozen import NamedTuple, replace
 from photostrip.network import datum
 from photostrip.network.calibration import values_of
 from photostrip.network.common_errors import (

@@ -9,13 +9,13 @@ cofactors of a point are V^-1 + sum M_i Z_ij M_j', those between its photos and 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.frozen import dataclass
 from photostrip.network import datum
 from photostrip.network.given_orientations import LinearisedOrientations
 from photostrip.network.normal_equations import FactoredEquations

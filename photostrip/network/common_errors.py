@@ -12,13 +12,14 @@ Source: derived, see docs/sources.md.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from photostrip.arrays import Floats, distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.network.calibration import PRINCIPAL_DISTANCE, values_of
 from photostrip.network.cofactors import coordinates_of, joint_cofactors
 from photostrip.network.problem import BundleCameras, BundleProblem

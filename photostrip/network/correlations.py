@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import dataclass
 from photostrip.network.solution import BundleSolution, Cofactors
 
 LIMIT = 0.95

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
@@ -10,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct, median
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.network import datum
 from photostrip.network.given_orientations import (

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import cross_matrix, to_vector
 from photostrip.network.problem import AttitudeObservations, PositionObservations
 

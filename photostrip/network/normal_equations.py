@@ -7,13 +7,14 @@ A'C - T R with R = L^-1 B'C, and the corner C'C - R'R. Source: [Granshaw 1980] f
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.network.band import Band
 from photostrip.network.given_orientations import (
     LinearisedOrientations,

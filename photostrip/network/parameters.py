@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.network import calibration
 from photostrip.network.calibration import Calibrated
 from photostrip.network.problem import BundleProblem, ImageObservations, ModelObservations, Parameters

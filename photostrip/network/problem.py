@@ -10,13 +10,12 @@ A sigma that is infinite switches an observation off; a sigma of zero is refused
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.camera import Distortion
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.network.settings import CALIBRATION
 

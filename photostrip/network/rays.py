@@ -10,11 +10,13 @@ Source: derived.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.network.calibration import (
     PRINCIPAL_DISTANCE,

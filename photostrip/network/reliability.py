@@ -6,14 +6,14 @@ number: the share of an error of the observation that shows in its own residual.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import EllipsisType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.network.settings import BundleSettings
 from photostrip.rejection import UNCONTROLLED
 from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile

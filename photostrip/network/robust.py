@@ -5,11 +5,12 @@ The weights are those of ``strip.robust``: many gross errors at once, also large
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.special import chdtri
 
 from photostrip.arrays import Floats, median
-from photostrip.frozen import replace
 from photostrip.network.problem import BundleProblem
 from photostrip.network.selection import restarted
 from photostrip.network.solution import BundleSolution

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from photostrip.arrays import Flags
-from photostrip.frozen import dataclass, replace
 from photostrip.network.problem import BundleProblem, StartValues
 from photostrip.network.solution import BundleSolution
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.network.calibration import PRINCIPAL_DISTANCE, corrected, values_of
 from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import CALIBRATION

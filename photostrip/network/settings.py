@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import field
-
-from photostrip.frozen import NamedTuple, dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 SCREENINGS = ("snooping", "robust", "none")
 TESTS = ("tau", "baarda")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
 from photostrip.network import datum
 from photostrip.network.normal_equations import (
     FactoredEquations,

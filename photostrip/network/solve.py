@@ -5,11 +5,12 @@ Source: step control after [Marquardt 1963]; the step that may lead up: derived.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple
 from photostrip.geometry.rotation import from_vector
 from photostrip.network import datum, defects
 from photostrip.network.normal_equations import (

@@ -7,11 +7,11 @@ share of the redundancy, until the ratios are one.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats
-from photostrip.frozen import dataclass, replace
 from photostrip.network import reliability
 from photostrip.network.problem import BundleProblem
 from photostrip.network.solution import BundleSolution, Cofactors

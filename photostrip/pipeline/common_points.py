@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import NamedTuple
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings

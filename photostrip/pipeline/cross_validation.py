@@ -7,12 +7,12 @@ bundle adjustment, and precision.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from photostrip.arrays import Numbers
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import replace
 from photostrip.pipeline.given_points import rejected_control
 from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.results import Fold, Result

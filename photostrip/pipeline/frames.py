@@ -6,14 +6,14 @@ Source: [001] eq. 153 for Earth curvature in the frames; see docs/frames.md.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import median
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.curvature import curvature_correction
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame

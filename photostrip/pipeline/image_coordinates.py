@@ -5,12 +5,12 @@ Source: [001] for interior orientation and corrections, see docs/image-coordinat
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import Inputs, Settings

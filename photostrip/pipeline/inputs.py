@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.camera import Camera
-from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.network.settings import BundleSettings
 from photostrip.points import ControlPoints, ModelPoints, PhotoPoints

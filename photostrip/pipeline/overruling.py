@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import replace
 from photostrip.notes import Note
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.strip.independent_models.settings import LinkSettings

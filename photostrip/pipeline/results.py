@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, pieces
-from photostrip.frozen import dataclass
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -10,7 +11,6 @@ from typing import Any, cast
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import replace
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.common_points import join_strips
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames

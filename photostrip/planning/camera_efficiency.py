@@ -9,11 +9,12 @@ Source: [004b] eq. 1-8, with the corrections that ``photostrip sources`` lists.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.camera import Distortion
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.strip.image_coordinates.lens_distortion import ideal_from_image
 from photostrip.units import MILLIMETRES
 

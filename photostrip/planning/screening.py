@@ -8,12 +8,13 @@ by itself follows from the elements' derivatives.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import from_angles
 from photostrip.strip.gross_errors.pairs.screening import ScreenedPairs, screen_pairs
 from photostrip.strip.relative_orientation.orientation import RelativeSettings, orient_unchecked, unusable_pairs

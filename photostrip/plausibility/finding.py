@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
-from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Finding
 
 Evidence = dict[str, float | int | str]  # the numbers behind a finding; names end with the unit

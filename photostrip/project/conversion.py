@@ -6,6 +6,7 @@ Here the user's units, axes and directions end: inside there are millimetres wit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
@@ -14,7 +15,6 @@ from photostrip import camera
 from photostrip.arrays import Floats, Numbers
 from photostrip.formats.measured.control import ControlTable
 from photostrip.formats.measured.measurements import Measurements
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import mean_radius, radius_in_azimuth
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import WGS84

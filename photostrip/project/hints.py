@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +14,6 @@ from photostrip.formats.measured.exterior import OrientationTable, PositionTable
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.findings import meant
 from photostrip.formats.text.tables import Table
-from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import AUTO, BUNDLE
 from photostrip.points import locate

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from math import isnan
 from os import fspath
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -14,7 +15,6 @@ import numpy as np
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.text.source import Source, reading_from
-from photostrip.frozen import replace
 
 if TYPE_CHECKING:
     from photostrip.notes import Finding, Note

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +16,6 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.source import current, seen_from
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding, Note

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +13,6 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault
 from photostrip.formats.measured.models import ModelTable, read_models
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import counted, listed
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,6 @@ from photostrip.arrays import Floats, median
 from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
 from photostrip.formats.measured.measurements import Measurements
-from photostrip.frozen import replace
 from photostrip.notes import Note, counted
 from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.yaml.tree import Node

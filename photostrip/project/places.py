@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photostrip.arrays import Numbers
 from photostrip.errors import Fault
-from photostrip.frozen import dataclass, replace
 from photostrip.notes import Finding
 from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.project.tables import Tables

@@ -7,13 +7,13 @@ here, values there.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from photostrip import camera, simulation
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.frozen import dataclass, replace
 from photostrip.project.conversion import distortion_of, semi_axes
 from photostrip.project.schema.cameras import Distortion
 from photostrip.project.schema.ground import CRS, UNDULATION, Ellipsoid

@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.text.findings import Findings, meant, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
-from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, counted, listed
 from photostrip.project.conversion import ground_columns

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
-from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Document
 from photostrip.result.description import Quantity, table_at
 from photostrip.result.numbers import RoundedColumn

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, is_dataclass
+
 import numpy as np
 
-from photostrip.frozen import as_dict, names_of
 from photostrip.geodesy.ground_frame import plural
 from photostrip.notes import Document
 from photostrip.pipeline.inputs import BUNDLE, POLYNOMIAL, SIMILARITY
@@ -65,14 +66,13 @@ def settings_of(result: Result) -> Document:
     """Return the block ``settings``: what was asked for, with the keys and units of the project file."""
     settings = result.settings
     found: Document = {"adjustment": settings.adjustment}
-    for name in names_of(type(settings)):
-        value = getattr(settings, name)
+    for name, value in vars(settings).items():
         if name == "bundle" and not settings.together:
             continue
         if name in (OF_PHOTOS if result.model_strips else OF_MODELS):
             continue
-        if names_of(type(value)):
-            found[name] = {key: list(each) if isinstance(each, tuple) else each for key, each in as_dict(value).items()}
+        if is_dataclass(value):
+            found[name] = {key: list(each) if isinstance(each, tuple) else each for key, each in asdict(value).items()}
     return found
 
 

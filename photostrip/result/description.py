@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from pathlib import Path
-
-from photostrip.frozen import dataclass, replace
 
 LIST = " list"
 KINDS = {"text", "word", "count", "flag", "any"}

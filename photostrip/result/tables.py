@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
-from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Document
 from photostrip.result import columns
 from photostrip.result.description import Quantity, Table, table_at

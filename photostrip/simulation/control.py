@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import counted
 from photostrip.points import ControlPoints, PointTable

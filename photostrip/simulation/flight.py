@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.ground import World

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass, replace
 from photostrip.points import PhotoPoints
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.spec import GrossError, Spec

@@ -9,10 +9,11 @@ its left; heights, metres, are above the ellipsoid, or above the plane.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import meridian_radius, prime_vertical_radius
 from photostrip.geodesy.local_frame import geocentric_from_geodetic
 from photostrip.simulation.draws import Draws, Purpose

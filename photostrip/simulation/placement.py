@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.flight import CUT_SIGMAS, Photos, position_sigma
 from photostrip.simulation.ground import Surface, World

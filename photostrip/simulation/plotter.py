@@ -6,12 +6,12 @@ brought into the system of the instrument, with errors that do not depend on eac
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from photostrip.arrays import Floats, distinct
-from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_vector
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.simulation.draws import Draws, Purpose

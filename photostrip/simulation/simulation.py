@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames

@@ -8,10 +8,9 @@ millimetres in the image or plain numbers.
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from photostrip.camera import Camera
-from photostrip.frozen import dataclass
 
 FILM = Camera(
     "film",

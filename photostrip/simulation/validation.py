@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from photostrip.errors import Fault
-from photostrip.frozen import replace
 from photostrip.notes import counted
 from photostrip.simulation.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES, Spec
 from photostrip.strip.image_coordinates import lens_distortion

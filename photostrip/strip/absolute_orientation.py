@@ -11,14 +11,14 @@ Source: [001] eq. 142-149; mixed control and its weights are derived.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, column_medians, median
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS

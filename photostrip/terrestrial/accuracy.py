@@ -7,13 +7,13 @@ in mm, reduced to the principal point; ``rotation`` (3, 3) takes the photo to th
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
-from photostrip.frozen import dataclass
 from photostrip.terrestrial.frame import ground_from_photo, partials
 from photostrip.units import ARCSECONDS
 

@@ -7,10 +7,12 @@ fitted to the stable points and tested against zero. A stable point that does no
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile

@@ -5,11 +5,12 @@ A pseudo-parallax is the difference of a coordinate on two photos taken from the
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
-from photostrip.frozen import NamedTuple
 from photostrip.statistics import chi2_quantile
 
 SPACE = 3  # components of a displacement

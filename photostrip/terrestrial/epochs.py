@@ -7,12 +7,12 @@ covariance.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import dataclass, replace
 from photostrip.terrestrial.camera_motion import ANGLES, ImagePair, Motion, find_motion
 from photostrip.terrestrial.displacement import displacements, limit
 from photostrip.terrestrial.frame import small_turn

@@ -7,10 +7,12 @@ distances of the points are known, and what is seen is the displacement across t
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.statistics import noncentrality
 from photostrip.terrestrial.displacement import SPACE
 from photostrip.terrestrial.epochs import monitor

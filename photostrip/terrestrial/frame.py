@@ -15,11 +15,12 @@ Directions (..., 2) are azimuths lambda, clockwise from the ground's Y axis in (
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
-from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 
 GROUND_FROM_HOUSE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

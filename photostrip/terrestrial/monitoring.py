@@ -6,12 +6,12 @@ share (of the reference photos, when pseudo-parallaxes were measured against the
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.notes import Note
 from photostrip.terrestrial.camera_motion import Motion, Turn
 from photostrip.terrestrial.displacement import SPACE, limit, statistic

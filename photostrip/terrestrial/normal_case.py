@@ -7,11 +7,12 @@ quadruple of coordinates: x and z of the left photo, x and z of the right one.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
 from photostrip.terrestrial.frame import GROUND_FROM_HOUSE, TURN_AXES, rays
 
 LEFT, RIGHT = 0, 1

@@ -7,11 +7,12 @@ the ray. Where it is known in both, the displacement is complete. Points that st
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.camera_motion import ImagePair, Turn, fit
 from photostrip.terrestrial.displacement import SPACE

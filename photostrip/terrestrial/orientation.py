@@ -11,13 +11,13 @@ computed from coordinates have no refraction in them, and the photo has: beta of
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.notes import counted, listed
 from photostrip.rejection import Rejection

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 
 import pytest
 
 from photostrip.formats.output.result_files import beside_json
 from photostrip.formats.output.result_json import json_pieces
-from photostrip.frozen import replace
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation.simulation import simulate

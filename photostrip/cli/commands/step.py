@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,7 +13,6 @@ from photostrip.cli.documents import FORMS, Form, Rendering
 from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import Silent, require_target
 from photostrip.cli.stdout import Document
-from photostrip.frozen import dataclass
 
 step = command_group("Single steps of the method, from a table of points: for teaching and checking.")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,7 +18,6 @@ from photostrip.cli.commands.terrestrial_directions import (
 from photostrip.cli.documents import Rendering, say, write_rule
 from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import RuleOfOutput, Silent, require_target
-from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from photostrip.project.terrestrial.survey import Survey

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -11,7 +12,6 @@ import typer
 from photostrip.cli.documents import Form, Rendering, say
 from photostrip.cli.option_groups import command_group, subcommand
 from photostrip.cli.options import Silent
-from photostrip.frozen import dataclass
 
 if TYPE_CHECKING:
     from photostrip.formats.output.terrestrial_directions import Attitude, Grid, Theodolite

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import typer
@@ -12,7 +13,6 @@ from photostrip.comparison import Tolerances, baseline_of, compare_results
 from photostrip.errors import InputError
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.formats.text.writing import write_text
-from photostrip.frozen import replace
 from photostrip.library.comparison import BASELINE, place_of, results_below
 from photostrip.report.commands.compare import headline
 

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from photostrip import __version__
@@ -19,7 +20,6 @@ from photostrip.cli.stdout import BatchFormat, Document, Format, ascii_only, pri
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_files, write_text
-from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
 from photostrip.report.page import messages, text

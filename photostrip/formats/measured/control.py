@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +14,6 @@ from photostrip.formats.measured.columns import AXES, POINT, SIGMAS, numbers, si
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
-from photostrip.frozen import dataclass
 from photostrip.notes import listed
 
 USES = ("xyz", "xy", "z", "off")

@@ -7,6 +7,7 @@ another system, and their standard deviations in ``s_alpha`` and so on; ``photos
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +25,6 @@ from photostrip.formats.measured.control import USE, GivenTable, given_columns, 
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
-from photostrip.frozen import dataclass, replace
 
 FIX = "set `{}` in the project file, or fill the columns"
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from photostrip.arrays import Floats, Numbers
 from photostrip.formats.text.tables import Table
-from photostrip.frozen import dataclass
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ Files of blocks, a model's id, lines ``point x y z`` and -99, are read as well.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from photostrip.formats.measured.columns import AXES, PHOTO, POINT, SIGMAS, numb
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
-from photostrip.frozen import dataclass
 
 MODEL = Column("model", aliases=("model_id", "pair", "stereopair"))
 COORDINATES = (*numbers(*AXES), *sigmas(*AXES))

@@ -6,7 +6,7 @@ Lists of a stereocomparator, a row for each point of a pair, are read as well: s
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column
-from photostrip.frozen import dataclass
 
 MARK = Column("mark", aliases=("mark_id", "fiducial", "fiducial_mark"))
 COORDINATES = (*numbers("x", "y"), *sigmas("x", "y"))

@@ -7,6 +7,7 @@ right photo x - p, y - q: p and q are the parallaxes. Every row becomes one row 
 from __future__ import annotations
 
 from collections.abc import Set as AbstractSet
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from photostrip.formats.measured.columns import POINT, numbers, sigmas
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.tables import Column, Table
-from photostrip.frozen import replace
 from photostrip.notes import counted
 from photostrip.points import locate
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct, median, quantile
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.findings import Findings
-from photostrip.frozen import replace
 from photostrip.notes import Note, counted
 
 POLICIES = ("refuse", "average")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from photostrip.formats.measured.columns import POINT, repeated_rows
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
-from photostrip.frozen import dataclass
 from photostrip.terrestrial.normal_case import SIDES
 
 EPOCH = Column("epoch", aliases=("epoch_id",))

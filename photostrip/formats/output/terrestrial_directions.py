@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.formats.output.csv_text import to_csv
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
 from photostrip.result.numbers import EXACT, rounded, significant
 from photostrip.terrestrial import accuracy

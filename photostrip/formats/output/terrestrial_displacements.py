@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.terrestrial_directions import ARCSEC, IMAGE_UM, RATIO, Attitude, head
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document, Note
 from photostrip.result.numbers import natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import count, islice
 
 import numpy as np
@@ -21,7 +22,6 @@ from photostrip.formats.text.numbers import SMALLEST_LENGTH, NotANumber, number,
 from photostrip.formats.text.rows import Cells, PlainRows, SplitRows
 from photostrip.formats.text.table_text import TableText, content
 from photostrip.formats.text.tables import CONTROL_CHARACTER, Column, Table
-from photostrip.frozen import replace
 from photostrip.notes import Note, counted, listed
 
 CHUNK = 16_384  # rows turned into columns at a time, so that a big table never stands in memory cell by cell

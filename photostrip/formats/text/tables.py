@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault
-from photostrip.frozen import dataclass, replace
 from photostrip.notes import Note
 
 if TYPE_CHECKING:

@@ -12,12 +12,13 @@ Source: [Baarda 1968] for the test; deletion derived, as for pairs; see docs/sou
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.network.reliability import Limit
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY
 from photostrip.statistics import chi2_quantile

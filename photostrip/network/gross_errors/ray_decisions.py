@@ -5,10 +5,12 @@ Source: derived; ``point_decisions`` decides.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.network.cofactors import JointCofactors
 from photostrip.network.gross_errors.point_decisions import (
     AGREE,

@@ -5,10 +5,11 @@ Source: derived; bookkeeping.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.network.gross_errors.point_decisions import AGREE, CAUSES, SEVERAL
 from photostrip.network.reliability import IMAGE
 from photostrip.rejection import Rejection

@@ -11,12 +11,12 @@ Source: derived, see docs/sources.md.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass, replace
 from photostrip.network import datum
 from photostrip.network.gross_errors.strip_network import STRIP_LEVEL, free_network
 from photostrip.network.normal_equations import equations_at, factored

@@ -10,13 +10,13 @@ Source: [Baarda 1968], [Pope 1976].
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass, replace
 from photostrip.network import camera_errors, defects, reliability, robust
 from photostrip.network.cofactors import JointCofactors, cofactors_of
 from photostrip.network.common_errors import (

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import replace
 from photostrip.network.gross_errors.strip_rays import StripRays
 from photostrip.network.problem import (
     BundleCameras,

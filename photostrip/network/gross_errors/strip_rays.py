@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.points import PhotoPoints
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network import defects, reliability, self_calibration, variance_components
 from photostrip.network.cofactors import cofactors_of as precision_of

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from photostrip.arrays import Numbers, median
-from photostrip.frozen import replace
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network import self_calibration
 from photostrip.pipeline.block import block_notes

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.plane import conformal_from_points
 from photostrip.geometry.rotation import cross_matrix, from_angles, from_vector

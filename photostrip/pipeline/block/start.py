@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, replace
 from photostrip.geometry.similarity import collinearity
 from photostrip.pipeline.block.datum import (
     LEAST_TIES,

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding

@@ -8,13 +8,14 @@ it then fits much better, and the pairs no worse, that is reported.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import distinct, median
 from photostrip.camera import Camera
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence

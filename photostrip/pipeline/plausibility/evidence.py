@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,6 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, column_medians, distinct, median, quantile
 from photostrip.camera import Camera
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import dataclass, replace
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.plausibility.control.straightening import Rays, StripPoints

@@ -7,6 +7,7 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +16,6 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers, median
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import replace
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, column_medians, median
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Self
 
 from photostrip.arrays import Numbers
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.crs import areas_of_use
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Finding

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from photostrip.camera import Camera
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import dataclass, replace
 from photostrip.notes import Finding
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.inputs import Inputs, Settings, Strip

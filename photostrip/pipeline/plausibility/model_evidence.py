@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, median, quantile
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
 from photostrip.pipeline.strips.models import form_models

@@ -8,12 +8,12 @@ nothing wrong with the given points of a strip has compared them better than the
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, median
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Finding
 from photostrip.pipeline.given_points import rejected_control, rows_of_given

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.results import StripResult

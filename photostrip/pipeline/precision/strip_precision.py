@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.pipeline.results import Adjusted, Precision, StripResult
 from photostrip.strip.error_propagation.check_errors import CheckErrors
 

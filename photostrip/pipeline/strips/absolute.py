@@ -6,6 +6,7 @@ Source: [001] eq. 142-149.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
@@ -13,7 +14,6 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import dataclass
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.geometry.similarity import Similarity, similarity_derivatives

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Any
 
 from photostrip.errors import GeometryError
-from photostrip.frozen import replace
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.refusals import require_adjustment_of_models

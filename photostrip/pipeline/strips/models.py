@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, median, quantile
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import ModelStrip, Settings
 from photostrip.pipeline.overruling import CENTER

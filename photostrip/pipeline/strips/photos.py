@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct, median, pieces, quantile
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
 from photostrip.network.gross_errors.strip_rays import StripRays
 from photostrip.pipeline import overruling

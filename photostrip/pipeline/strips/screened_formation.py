@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, replace
 from photostrip.network.gross_errors.strip_rays import StripRays
 from photostrip.rejection import SEVERAL_RAYS, Rejection
 from photostrip.strip.relative_orientation.orientation import Orientation, orient_again

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import names_of
 
 T = TypeVar("T")
 Stage = Literal["pairs", "strip", "control", "shifted", "failure"]
@@ -50,8 +50,8 @@ def alike(one: object, other: object) -> bool:
         return False
     if isinstance(one, np.ndarray):
         return np.array_equal(one, np.asarray(other), equal_nan=one.dtype.kind == "f")
-    if names := names_of(type(one)):
-        return all(alike(getattr(one, name), getattr(other, name)) for name in names)
+    if is_dataclass(one):
+        return all(alike(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
     if isinstance(one, tuple) and isinstance(other, tuple) and set(map(type, one)) != {str}:
         return len(one) == len(other) and all(map(alike, one, other))
     return bool(one == other)

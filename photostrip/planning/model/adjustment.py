@@ -9,11 +9,12 @@ Source: [000], where the covariance is meant "for the adjustment of coordinates"
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.planning.model.element_errors import free_influence
 from photostrip.planning.model.single_model import PARAMETERS, ModelControl, parameter_rows
 

@@ -8,11 +8,12 @@ With ``printed`` the functions compute what stands in print.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
-from photostrip.frozen import NamedTuple
 
 ORDER = ("dbz", "dkappa", "dalpha", "domega")
 

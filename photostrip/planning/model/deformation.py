@@ -8,14 +8,15 @@ Source: [003] eq. 10.7-10.12, with results of Lobanov and of Skiridov.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import erfc, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.planning.model.element_errors import influence, measured_covariance
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
 from photostrip.strip.relative_orientation import six_points

@@ -8,11 +8,12 @@ Source: [000] eq. 1, 5-8; [003] eq. 10.8, 10.12.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
-from photostrip.frozen import dataclass
 from photostrip.planning.model.adjustment import AdjustedModel, adjust_model
 from photostrip.planning.model.deformation import base_frame_elements, parallax_error, surface_of_elements
 from photostrip.planning.model.element_errors import influence

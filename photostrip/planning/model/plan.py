@@ -5,12 +5,13 @@ Errors that are given, or misclosures that were found, go to the points of the m
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass
 from photostrip.planning.model import closed_form, deformation
 from photostrip.planning.model.adjustment import adjust_model
 from photostrip.planning.model.element_errors import (

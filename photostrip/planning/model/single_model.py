@@ -16,12 +16,13 @@ Source: [000] eq. 1-8, with the corrections that ``photostrip sources`` lists.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.planning.model.element_errors import free_influence, influence
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass
 from photostrip.notes import counted
 from photostrip.planning.strip.ideal_strip import IdealStrip
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import dataclass, replace
 from photostrip.planning.strip.control_layout import ControlLayout, Spot, spots_of
 from photostrip.planning.strip.ideal_strip import IdealStrip, StripGeometry, ideal_strip
 from photostrip.planning.strip.methods import BUNDLE, METHODS, Accuracy, accuracy

@@ -5,12 +5,13 @@ It is simulated and taken through the operations of the strip method, so that wh
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
 from photostrip.notes import counted
 from photostrip.points import PhotoPoints

@@ -5,11 +5,12 @@ The covariances are those that a run reports for a measured strip: nothing is pr
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, quantile
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geodesy.tying import tie_frames

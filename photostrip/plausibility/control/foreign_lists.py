@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from photostrip.arrays import Flags, median
-from photostrip.frozen import replace
 from photostrip.notes import Finding
 from photostrip.plausibility.control.plan_fit import PlanSimilarity, fit_similarity
 from photostrip.plausibility.control.straightening import (

@@ -9,6 +9,7 @@ Source: least median of squares (Rousseeuw 1984); derived, see docs/sources.md.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from random import Random
 from typing import Any
@@ -17,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
-from photostrip.frozen import dataclass
 from photostrip.statistics import SIGMA_FROM_MEDIAN, t_quantile
 
 Complex = NDArray[np.complex128]

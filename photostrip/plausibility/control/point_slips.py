@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import permutations
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats
-from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Finding

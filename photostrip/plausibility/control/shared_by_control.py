@@ -11,13 +11,12 @@ Source: derived.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, distinct
 from photostrip.errors import PhotostripError
-from photostrip.frozen import NamedTuple
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.statistics import f_p_value
 from photostrip.strip.gross_errors.control.control_deletion import HEIGHT, JointAdjustment, adjust

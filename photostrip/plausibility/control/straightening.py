@@ -6,14 +6,14 @@ In plan the bending is taken out by a conformal polynomial, with as few terms as
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.plausibility.control.plan_fit import (
     LEAST_POINTS,
     TINY,

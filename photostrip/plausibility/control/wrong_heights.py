@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, distinct, median
-from photostrip.frozen import dataclass
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.notes import Finding
 from photostrip.plausibility.control.plan_fit import (

@@ -9,12 +9,13 @@ be seen: the same numbers lie in it as well; those of Gauss-Kruger begin with th
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, column_medians, median
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.crs import Area, AreasOfUse
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Finding

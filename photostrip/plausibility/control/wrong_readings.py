@@ -9,12 +9,13 @@ the others predict, check points too, but no check point ever takes part in a fi
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.arrays import Flags
-from photostrip.frozen import NamedTuple, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Finding
 from photostrip.plausibility.control import foreign_lists, point_slips, wrong_heights

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from photostrip.arrays import Floats, median
-from photostrip.frozen import dataclass, replace
 from photostrip.notes import MOST_NAMED, Finding, listed
 from photostrip.plausibility.finding import found
 from photostrip.plausibility.photos import mosaic

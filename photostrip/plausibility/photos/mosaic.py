@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.arrays import Flags, Floats, Numbers, median
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.points import PhotoPoints
 
 Complex = NDArray[np.complex128]

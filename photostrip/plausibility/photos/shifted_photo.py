@@ -9,12 +9,12 @@ adjustment in which the principal point of the photo is unknown.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.frozen import dataclass
 from photostrip.notes import Finding, counted
 from photostrip.plausibility.finding import found
 from photostrip.points import PhotoPoints

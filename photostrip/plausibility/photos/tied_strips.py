@@ -8,11 +8,12 @@ two rays of it, perhaps an image coordinate that is wrong along the base, which 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, median
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import Finding
 from photostrip.plausibility.control.straightening import LEAST_REDUNDANCY, fit_simplest
 from photostrip.plausibility.finding import found

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct, median, quantile
 from photostrip.camera import Camera
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Finding, counted, listed
 from photostrip.plausibility.finding import found
 from photostrip.points import PhotoPoints

@@ -8,6 +8,7 @@ coordinate gets and from where, and what became of every row of every table.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -17,7 +18,6 @@ from photostrip.arrays import Numbers, distinct
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.control import ControlTable
 from photostrip.formats.text.findings import Findings
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Document, Finding, Note, counted

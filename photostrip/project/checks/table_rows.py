@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from photostrip.formats.measured.control import ControlTable
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.tables import Table
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
 from photostrip.pipeline.inputs import Inputs, MeasuredModels
 from photostrip.project.loading import Project

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from photostrip.errors import InputError
-from photostrip.frozen import NamedTuple, replace
 from photostrip.planning import camera_efficiency
 from photostrip.project.conversion import distortion_of
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Percent, SigmaUm, read_plan

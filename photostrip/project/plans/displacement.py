@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from photostrip.frozen import NamedTuple, replace
 from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
 from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong
 from photostrip.project.schema.values import Fraction, Number, Range, Words, bounded, one_of

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import NamedTuple
 from photostrip.planning.model.plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.planning.screening import ZONES, PairLayout, ScreeningSpec
 from photostrip.project.plans.flown import SCHEMA_NUMBER, SigmaUm, read_plan
 from photostrip.project.schema.sections import After, Length, Rule, Section, key, wrong

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
-from photostrip.frozen import dataclass, replace
 from photostrip.planning.strip.control_layout import LAYOUTS, USES, ControlLayout, Spot
 from photostrip.planning.strip.design import DesignReport, DesignTask, plan_strip
 from photostrip.planning.strip.ideal_strip import LEAST_PHOTOS, StripGeometry

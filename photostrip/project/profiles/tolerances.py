@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from photostrip.comparison import SetTolerance, Tolerance, Tolerances
 from photostrip.formats.text.numbers import NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
-from photostrip.frozen import replace
 from photostrip.project.schema.sections import Read, Section, key, wrong
 from photostrip.project.schema.values import Flag, Words, schema_number
 from photostrip.project.yaml.reading import read_file

@@ -7,11 +7,13 @@ section mean is looked up when a file has it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import (
     Annotated,
     Any,
     ClassVar,
+    NamedTuple,
     Never,
     Self,
     TypeVar,
@@ -23,7 +25,6 @@ from typing import get_type_hints as annotations_of
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import counted
 
 Path = tuple[str | int, ...]  # keys and numbers that lead to a value

@@ -6,13 +6,12 @@ Values arrive as texts (see ``yaml.document``) and get their type here. ``wrong`
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import SMALLEST_LENGTH, NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.tables import CONTROL_CHARACTER
-from photostrip.frozen import NamedTuple
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.project.schema.sections import Read, wrong
 

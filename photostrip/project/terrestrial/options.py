@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +15,6 @@ from photostrip.formats.output.terrestrial_directions import Attitude, Theodolit
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import NotANumber, number, shown
 from photostrip.formats.text.tables import Column, Table
-from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Note
 from photostrip.project.schema.values import Range
 from photostrip.project.terrestrial import ranges

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +12,6 @@ from photostrip.arrays import Flags, Floats
 from photostrip.errors import Fault
 from photostrip.formats.measured import terrestrial
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.notes import Note, counted, listed
 from photostrip.points import locate
 from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLIMETRES, refuse_outside

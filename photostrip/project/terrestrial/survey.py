@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,6 @@ from photostrip.errors import InputError
 from photostrip.formats.output.terrestrial_directions import Theodolite
 from photostrip.formats.output.terrestrial_displacements import ReportFrame
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.frozen import dataclass
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note
 from photostrip.project.terrestrial.cameras import listed_cameras, own_presets

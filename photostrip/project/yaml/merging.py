@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 from photostrip.errors import Fault
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import shown
-from photostrip.frozen import replace
 from photostrip.project.yaml.parsing import parse, read_document
 from photostrip.project.yaml.tree import NO_FILES, OVERRIDE, Node, Path, Place, at_key, fault_at, place_of, steps
 

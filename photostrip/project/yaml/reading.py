@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings
-from photostrip.frozen import replace
 from photostrip.project.schema.sections import Section
 from photostrip.project.yaml.merging import override, path_of, read_tree, where_named
 from photostrip.project.yaml.tree import Node, Path, at_own_key, fault_at

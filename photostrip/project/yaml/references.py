@@ -6,11 +6,11 @@ All checks look at the tree, not at the validated project, so that they also run
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from photostrip.errors import Fault
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.frozen import dataclass
 from photostrip.pipeline.inputs import AUTO, BUNDLE
 from photostrip.project.yaml.tree import NO_FILES, Node, Path, fault_at
 

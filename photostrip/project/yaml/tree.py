@@ -7,11 +7,11 @@ what each of them is.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from photostrip.errors import Fault
 from photostrip.formats.text.numbers import shown
-from photostrip.frozen import NamedTuple, replace
 from photostrip.notes import Note
 
 COMMAND_LINE = "--set"  # the place of values that the command line sets

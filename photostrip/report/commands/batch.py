@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from urllib.parse import quote
 
-from photostrip.frozen import replace
 from photostrip.notes import Document, counted
 from photostrip.report.page.junit import Case, to_junit
 from photostrip.report.page.numbers import metres

@@ -6,7 +6,8 @@ photos.
 
 from __future__ import annotations
 
-from photostrip.frozen import NamedTuple
+from typing import NamedTuple
+
 from photostrip.notes import Document
 from photostrip.report.page.numbers import Number, fixed
 

@@ -6,8 +6,8 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from itertools import pairwise
+from typing import NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
 from photostrip.visible import visible
 

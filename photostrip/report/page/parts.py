@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from photostrip.frozen import NamedTuple, dataclass
+from dataclasses import dataclass
+from typing import NamedTuple
 
 DASH = "–"  # stands where there is no value
 

@@ -7,9 +7,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.report.page.numbers import fixed
 from photostrip.report.page.parts import Column, Table
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.report.pictures import svg
 
 WIDTH = 960.0  # of a picture

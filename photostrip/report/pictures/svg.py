@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
-
-from photostrip.frozen import NamedTuple
 
 Point = tuple[float, float]
 

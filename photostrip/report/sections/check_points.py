@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document, counted, listed
 from photostrip.report.page.numbers import fixed, joined, metres, ratio, signed
 from photostrip.report.page.parts import Part, Section, Table, Words

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, median
-from photostrip.frozen import NamedTuple, as_dict
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.network import reliability
 from photostrip.network.settings import BundleSettings
@@ -90,7 +90,7 @@ def bundle_of(result: Result) -> Document:
         },
         "variance_components": _components(found),
         "calibration": _calibration(found),
-        "correlations": [as_dict(each) for each in found.correlations],
+        "correlations": [asdict(each) for each in found.correlations],
         "given": Records.joined(
             records("bundle.given", _observed(found, group, np.argwhere(known), shift, written[group.kind]))
             for group in found.groups

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.frozen import replace
 from photostrip.notes import Document
 from photostrip.pipeline.common_points import mean_points
 from photostrip.pipeline.given_points import compare_with_given

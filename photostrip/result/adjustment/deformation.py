@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from photostrip.arrays import Numbers
-from photostrip.frozen import dataclass
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result, StripResult

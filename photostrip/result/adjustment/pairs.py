@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.pipeline.results import PhotoStages, Result, StripResult
 from photostrip.result.numbers import order_of

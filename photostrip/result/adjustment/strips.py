@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import as_dict
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.notes import Document
@@ -153,7 +153,7 @@ def _polynomial(strip: str, found: Polynomial) -> Document:
         "condition": _by_axis([axis.condition for axis in axes]),
         "stations": dict(zip(("plan", "height"), found.stations, strict=True)),
         "reach": np.array(found.reach),
-        "evidence": [as_dict(step) for step in found.evidence],
+        "evidence": [asdict(step) for step in found.evidence],
     }
     return record("polynomials", values)
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import replace
 from photostrip.notes import Document
 from photostrip.pipeline.results import Result
 from photostrip.points import take_rows

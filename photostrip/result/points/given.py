@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import erfc, sqrt
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import dataclass, replace
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import angles
 from photostrip.notes import Document
 from photostrip.pipeline.inputs import Strip

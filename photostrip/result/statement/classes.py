@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
-from photostrip.frozen import dataclass
 from photostrip.notes import Document
 
 # What a norm may set a limit to, with the meaning that a statement prints; where it stands in the block `statement`.

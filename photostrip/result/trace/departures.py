@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from photostrip.frozen import NamedTuple
+from typing import NamedTuple
+
 from photostrip.notes import Document
 from photostrip.pipeline.inputs import Settings
 

@@ -6,12 +6,12 @@ step; that they end where the run ended is tested.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.frozen import dataclass, replace
 from photostrip.geometry.similarity import Similarity
 from photostrip.strip import absolute_orientation
 from photostrip.strip.relative_orientation.pairs import Pairs, collect_pairs

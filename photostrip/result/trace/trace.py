@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import compress
 
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import replace
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity, pair_scales
 from photostrip.notes import Document

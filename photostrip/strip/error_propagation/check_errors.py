@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.frozen import dataclass, replace
 from photostrip.statistics import gamma_cdf
 
 

@@ -10,11 +10,11 @@ Source: derived, docs/precision.md, eq. 5; [001] eq. 145-151 for the fit.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.points import ControlPoints
 from photostrip.strip.polynomial.terms import columns

@@ -5,10 +5,12 @@ Source: derived, docs/precision.md, eq. 1; [001] eq. 126-138 for the operations.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, pieces
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import angle_rates, cross_matrix, from_alpha_omega_kappa
 from photostrip.strip.relative_orientation.orientation import Orientation
 from photostrip.strip.relative_orientation.solution import normal_matrices

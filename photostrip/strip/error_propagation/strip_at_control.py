@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import ControlPoints
 from photostrip.strip import absolute_orientation

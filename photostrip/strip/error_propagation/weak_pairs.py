@@ -9,10 +9,11 @@ Source: [001] for the six points; the comparison is derived.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import replace
 from photostrip.points import take_rows
 from photostrip.strip.error_propagation.pair_errors import differentiate_pairs
 from photostrip.strip.relative_orientation.orientation import BY_ROW, Orientation

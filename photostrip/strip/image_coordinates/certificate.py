@@ -8,13 +8,13 @@ the figure is turned as little as possible against the words.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass
 from photostrip.points import frozen
 
 PLACES = {

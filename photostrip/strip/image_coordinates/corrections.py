@@ -13,6 +13,7 @@ Film deformation is corrected before, by the interior orientation. ``distort`` g
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TypeGuard
 
 import numpy as np
@@ -21,7 +22,6 @@ from numpy.typing import ArrayLike
 from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass, replace
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import lens_distortion
 from photostrip.strip.image_coordinates.refraction import curvature_constant, refraction_constant

@@ -7,6 +7,7 @@ transformation in both hands.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -14,7 +15,6 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.camera import Camera
 from photostrip.errors import Fault
-from photostrip.frozen import dataclass, replace
 from photostrip.geometry import plane
 from photostrip.points import PhotoPoints, take_rows
 

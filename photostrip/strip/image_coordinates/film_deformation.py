@@ -8,11 +8,11 @@ there are marks enough to see it, best eight.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import dataclass
 
 LEAST_MARKS = 4  # three carry the plane that every transformation has already
 FLAT = 0.01  # ratio of the extents of the marks below which they stand on one line

@@ -6,12 +6,12 @@ A plane transformation takes the marks of a photo to their calibrated coordinate
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import replace
 from photostrip.notes import Note, named
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates.fiducial_marks import enough, fault, gather, right_pattern

@@ -12,13 +12,14 @@ distortion, tabulated every 20 mm, it is 0.1 um off; a monotone interpolation, w
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.frozen import NamedTuple
 
 CONVERGED = 1e-12  # mm
 ITERATIONS = 30

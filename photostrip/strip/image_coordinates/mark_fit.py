@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry import plane
 from photostrip.notes import Note
 from photostrip.points import frozen

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 from photostrip.camera import Camera
-from photostrip.frozen import dataclass, replace
 
 
 @dataclass(frozen=True)

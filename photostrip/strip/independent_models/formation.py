@@ -10,12 +10,12 @@ Source: [001] for the chain; seven parameters in place of one derived, see docs/
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass, replace
 from photostrip.notes import counted
 from photostrip.strip.independent_models import linking
 from photostrip.strip.independent_models.link_screening import ScreenedLinks

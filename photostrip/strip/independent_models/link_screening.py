@@ -9,12 +9,11 @@ Source: [Baarda 1968]; order and limits derived, see docs/independent-models.md.
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct, median
-from photostrip.frozen import dataclass
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.strip.independent_models import linking

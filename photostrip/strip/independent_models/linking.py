@@ -10,10 +10,12 @@ Source: [001] eq. 145-149 for the similarity; weights and iteration derived, see
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.geometry.rotation import from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 

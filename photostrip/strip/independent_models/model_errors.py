@@ -10,10 +10,11 @@ Source: derived; see docs/independent-models.md.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, median
-from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.strip.independent_models.formation import FormedModels

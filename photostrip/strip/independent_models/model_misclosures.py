@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.frozen import replace
 from photostrip.strip.error_propagation.control_errors import Misclosures
 from photostrip.strip.independent_models import model_errors
 from photostrip.strip.independent_models.model_errors import ModelErrors

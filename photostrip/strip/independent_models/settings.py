@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photostrip.frozen import dataclass
+from dataclasses import dataclass
 
 METHODS = ("auto", "none")
 

@@ -6,12 +6,12 @@ Which degree they get is decided by evidence: an F test of each step and errors 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
-from photostrip.frozen import dataclass
 from photostrip.statistics import f_p_value
 from photostrip.strip.polynomial import terms as polynomial_terms
 from photostrip.strip.polynomial.least_squares import AxisFit, FitProblem, Terms, fit_axes

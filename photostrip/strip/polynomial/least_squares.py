@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats
-from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.strip.absolute_orientation import Targets
 from photostrip.strip.polynomial import terms as polynomial_terms

@@ -7,11 +7,11 @@ needs four different ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.frozen import dataclass
 
 # Powers of X and Y. A term here, in the ladder and in the order of dropping is a term of X, Y and Z alike.
 POWERS = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}

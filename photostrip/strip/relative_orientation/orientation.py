@@ -6,7 +6,7 @@ Source: [001] for the elements; precision and criteria are derived.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from photostrip.arrays import Flags, Floats, Numbers, pieces
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.points import take_rows
 from photostrip.strip.relative_orientation import solution

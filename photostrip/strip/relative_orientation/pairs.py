@@ -7,12 +7,12 @@ thousand pairs cost little more than one.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct, median
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass, replace
 from photostrip.notes import counted
 from photostrip.points import PhotoPoints, frozen_alike, take_rows
 

@@ -7,10 +7,12 @@ of the source knows half of them, and a single far point that turns a pair makes
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.frozen import NamedTuple, replace
 from photostrip.strip.relative_orientation import solution
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.strip.robust import TUNING, falling_weights, medians, scales

@@ -10,11 +10,11 @@ Source: [001] for the elements; condition, derivatives, start values and retries
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import NamedTuple
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.strip.relative_orientation.pairs import Pairs
 

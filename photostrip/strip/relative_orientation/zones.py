@@ -13,10 +13,11 @@ Source: [004a], [001]; base and spread from the points are chosen here.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.strip.relative_orientation.orientation import Orientation
 from photostrip.strip.relative_orientation.pairs import Pairs
 from photostrip.strip.relative_orientation.solution import base_rays

@@ -6,13 +6,13 @@ Source: [Grunert 1841] in the form of [Haralick 1994] for three points.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import counted
 from photostrip.strip.resection.collinearity import KnownPhotos, derivatives

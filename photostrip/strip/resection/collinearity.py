@@ -5,10 +5,11 @@ With (u, v, w) = R^T (X - S): x = -f u / w, y = -f v / w. Source: derived.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, pieces
-from photostrip.frozen import NamedTuple
 
 
 class KnownPhotos(NamedTuple):

@@ -6,10 +6,11 @@ Source: derived.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import dataclass
 from photostrip.strip.resection.collinearity import KnownPhotos, derivatives, project
 from photostrip.strip.strip_formation.non_neighbours import meeting
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct, pieces
-from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import from_vector
 from photostrip.strip.resection.collinearity import KnownPhotos, distances, partials, project
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from photostrip.arrays import Flags, Floats
-from photostrip.frozen import dataclass
 
 LEAST_X_PARALLAX = 1e-6  # of the principal distance: a smaller x parallax intersects nothing
 EXCHANGED = [1, 0, 2]  # X and Y

@@ -9,11 +9,11 @@ Source: derived; see docs/sources.md.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import replace
 from photostrip.points import PhotoPoints
 from photostrip.strip.strip_formation.strip import FormedStrip
 

@@ -10,13 +10,13 @@ Source: [001] eq. 139-141.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass
 from photostrip.statistics import normal_quantile
 from photostrip.strip.relative_orientation.orientation import Orientation
 from photostrip.strip.robust import medians, scales

@@ -9,13 +9,13 @@ Source: [001] eq. 125-141.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, median
 from photostrip.errors import GeometryError
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.strip.relative_orientation.orientation import Orientation
 from photostrip.strip.strip_formation.intersection import Intersection, intersect, lies_across

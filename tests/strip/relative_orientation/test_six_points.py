@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.frozen import dataclass
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 from photostrip.strip.relative_orientation import six_points
 from photostrip.strip.relative_orientation.solution import solve_elements

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +15,6 @@ from photostrip.cli.documents import FORMS, Form, Rendering, write_rule
 from photostrip.cli.options import RuleOfOutput, Silent, require_target
 from photostrip.cli.stdout import Document
 from photostrip.errors import Fault, InputError
-from photostrip.frozen import dataclass, replace
 
 
 @dataclass(frozen=True)

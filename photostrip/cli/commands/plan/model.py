@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -9,7 +10,6 @@ import typer
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import CONTROL_SIGMA, Flight, Options, PlanCamera, PlanFile, PlanOptions, Sets
 from photostrip.cli.stdout import Document
-from photostrip.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from photostrip.planning.model.plan import ModelSpec

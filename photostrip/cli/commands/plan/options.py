@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, get_args, get_type_hints
 
 import typer
 from typer.models import OptionInfo
-
-from photostrip.frozen import dataclass
 
 Options = dict[str, tuple[str, str | None]]  # by the key that it sets: name of an option, and its value
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import PlanFile, PlanOptions, Sets
-from photostrip.frozen import dataclass
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
 from photostrip.cli.commands.plan.delivery import Delivery
 from photostrip.cli.commands.plan.options import CONTROL_SIGMA, Flight, Options, PlanCamera, PlanFile, PlanOptions, Sets
-from photostrip.frozen import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, compare, source_cameras
 from photostrip.planning.model.plan import source_example
 from photostrip.terrestrial.accuracy import EXAMPLES, worked

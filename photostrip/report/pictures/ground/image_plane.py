@@ -5,7 +5,8 @@ For pictures, not for measuring: distortion is left aside.
 
 from __future__ import annotations
 
-from photostrip.frozen import NamedTuple
+from typing import NamedTuple
+
 from photostrip.notes import Document
 from photostrip.report.pictures.ground.plan_view import DrawnGrid, Pair
 

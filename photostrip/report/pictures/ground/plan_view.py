@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
 
 Pair = tuple[float, float]

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document
 from photostrip.report.pictures.ground.image_plane import cameras_of, frame_of
 from photostrip.report.pictures.ground.plan_view import DrawnGrid, Pair, Plan

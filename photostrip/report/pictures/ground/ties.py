@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from itertools import combinations
+from typing import NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import TOP, WIDTH, Entry, legend

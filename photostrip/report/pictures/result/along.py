@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document, counted
 from photostrip.report.page.numbers import short
 from photostrip.report.pictures import svg

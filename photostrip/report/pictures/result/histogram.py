@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from statistics import NormalDist, median
+from typing import NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import WIDTH, Entry, Layout, Panel, framed, legend, steps

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
-from photostrip.frozen import NamedTuple
 from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, WIDTH

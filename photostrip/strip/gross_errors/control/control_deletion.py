@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,6 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
-from photostrip.frozen import dataclass, replace
 from photostrip.statistics import chi2_quantile, f_p_value
 from photostrip.strip.gross_errors.pairs.deletion import gains
 from photostrip.strip.polynomial import terms

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.frozen import NamedTuple, replace
 from photostrip.rejection import Rejection
 from photostrip.statistics import f_quantile, normal_quantile
 from photostrip.strip.error_propagation.strip_at_control import StripAtControl

@@ -10,11 +10,12 @@ Source: derived; data snooping with correlated observations.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.errors import PhotostripError
-from photostrip.frozen import dataclass, replace
 from photostrip.points import ControlPoints
 from photostrip.rejection import Rejection
 from photostrip.strip.error_propagation.strip_at_control import StripAtControl

@@ -6,12 +6,12 @@ Source: derived; [004a] stops at tests of single residuals. See docs/sources.md.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, median
-from photostrip.frozen import dataclass, replace
 from photostrip.rejection import UNCONTROLLED
 from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, normal_quantile
 from photostrip.strip.relative_orientation.orientation import Orientation

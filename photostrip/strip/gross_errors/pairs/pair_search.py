@@ -12,12 +12,12 @@ Source: derived; the order of work is chosen here, see docs/sources.md.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
-from photostrip.frozen import dataclass, replace
 from photostrip.rejection import Rejection
 from photostrip.strip.gross_errors.pairs import deletion
 from photostrip.strip.gross_errors.pairs.global_test import FIFTH_WRONG, GlobalTest, ParallaxScatter

@@ -12,13 +12,14 @@ Source: [004a]; the two-sided form and the order of work are chosen here, see do
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers, distinct
 from photostrip.errors import InputError
-from photostrip.frozen import NamedTuple, dataclass, replace
 from photostrip.rejection import Rejection
 from photostrip.statistics import grubbs_limit, tau_limit
 from photostrip.strip.gross_errors.pairs.global_test import ParallaxScatter, by_number, residual_sigma

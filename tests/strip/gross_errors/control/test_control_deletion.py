@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -15,7 +15,6 @@ from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
 from benchmarks.gross_errors import much_wrong_run
-from photostrip.frozen import dataclass
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
