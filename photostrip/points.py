@@ -176,6 +176,7 @@ class ModelPoints:
     # (n, 3): model coordinates in mm, right-handed; every model has a scale, a rotation and an origin of its own
     xyz: Floats
     sigma: Floats  # (n, 3): their standard deviations in mm
+    correlation: Floats | None = None  # (n, 3, 3): correlations of the three coordinates; None: there are none
 
     def __post_init__(self) -> None:
         for name in ("model", "node"):
@@ -183,6 +184,8 @@ class ModelPoints:
         n = len(self.model)
         for name in ("xyz", "sigma"):
             object.__setattr__(self, name, frozen(getattr(self, name), shape=(n, 3)))
+        if self.correlation is not None:
+            object.__setattr__(self, "correlation", frozen(self.correlation, shape=(n, 3, 3)))
 
     def __len__(self) -> int:
         return len(self.model)

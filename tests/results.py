@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline.frames import TiedFrames
     from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.results import Result
-    from photostrip.pipeline.strips.stages import Stages
 
 Document = dict[str, Any]
 
@@ -99,14 +98,13 @@ def known(
     *,
     directory: Path | None = None,
     tied: TiedFrames | None = None,
-    stages: Stages | None = None,
 ) -> Result:
     """Do as ``triangulate``, or give what the same data with the same settings gave before, far from any grid."""
     if directory is not None and any(path.suffix in GRIDS for path in directory.iterdir()):
-        return triangulate(inputs, settings, directory=directory, tied=tied, stages=stages)
+        return triangulate(inputs, settings, directory=directory, tied=tied)
     asked = pickle.dumps((inputs, settings))
     if asked not in _results:
-        _results[asked] = triangulate(inputs, settings, directory=directory, tied=tied, stages=stages)
+        _results[asked] = triangulate(inputs, settings, directory=directory, tied=tied)
     return _results[asked]
 
 

@@ -19,7 +19,6 @@ from photostrip.notes import counted
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result as Computed
-    from photostrip.pipeline.strips.stages import Stages
     from photostrip.project.checks.check import Checked
     from photostrip.project.loading import Project as Loaded
 
@@ -35,11 +34,10 @@ class Project:
         assignments: Sequence[str] = (),
         source: Source | None = None,
         digests: Mapping[str, str] | None = None,
-        stages: Stages | None = None,
     ) -> None:
         self.loaded = loaded
         """What the pipeline takes: ``inputs`` and ``settings``, with the places of all values in the files."""
-        self._assignments, self._source, self._digests, self._stages = assignments, source, digests or {}, stages
+        self._assignments, self._source, self._digests = assignments, source, digests or {}
 
     @property
     def name(self) -> str:
@@ -73,7 +71,7 @@ class Project:
         from photostrip.result.document import document_of
 
         with reading_from(self._source):
-            computed = self.loaded.result(adjust_project(self.loaded, self._stages))
+            computed = self.loaded.result(adjust_project(self.loaded))
             document = document_of(computed, self.loaded.remarks)
             document["certificate"] = self._certificate(document, computed)
         read = self.loaded.files_read(computed) if self._source is None else ()
@@ -204,15 +202,13 @@ def assignments_of(overrides: Mapping[str, Any], above: str = "") -> list[str]:
     return found
 
 
-def loaded_from(
-    path: Path, assignments: Sequence[str], source: Source | None = None, stages: Stages | None = None
-) -> Project:
-    """Read a project from files, or from a source in memory; stages are those that other runs of it have made."""
+def loaded_from(path: Path, assignments: Sequence[str], source: Source | None = None) -> Project:
+    """Read a project from files, or from a source in memory."""
     from photostrip.project.loading import load_project
 
     with reading_from(source), accounted(current() or Source()) as account:
         loaded = load_project(path, assignments)
-        return Project(loaded, assignments, source, dict(account.digests), stages)
+        return Project(loaded, assignments, source, dict(account.digests))
 
 
 def _checked(path: Path, assignments: Sequence[str], source: Source | None) -> Check:

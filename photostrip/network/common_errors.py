@@ -231,7 +231,7 @@ def _conceivable(problem: BundleProblem) -> Iterator[CommonError]:
                 yield CommonError(OFFSET, ALL)
             yield CommonError(OFFSET, EACH)
         yield CommonError(DRIFT, EACH)
-    given = len(problem.control) + len(problem.positions) > 0
+    given = len(problem.control) + len(problem.positions) > 0 and len(problem.cameras.focal) > 0
     if given and (problem.cameras.sigma is None or not problem.cameras.sigma[:, PRINCIPAL_DISTANCE].any()):
         yield CommonError(DISTANCE, EACH)
 

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from dataclasses import replace
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.notes import Note
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, StripResult, Ties
-from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
 from photostrip.pipeline.strips.notes import precision_of_long_strip
+from photostrip.pipeline.strips.photos_on_control import ScreenedPhotos
 from photostrip.plausibility.photos.tied_strips import TiesOfStrips
 from photostrip.points import ControlPoints, PhotoPoints
 
 
-def join_strips(
+def join_photos(
     strips: tuple[StripResult, ...],
-    screened: Sequence[ScreenedStrip[Any]],
+    screened: Sequence[ScreenedPhotos],
     observations: PhotoPoints,
     given: ControlPoints,
     output: GroundFrame,
@@ -31,47 +31,34 @@ def join_strips(
     *,
     of_checks: bool,
 ) -> AdjustedStrips:
-    """Join strips that were adjusted each by itself.
+    """Join strips of photos that were adjusted each by itself, with their precision.
 
     screened: the same strips before their deformation was corrected.
     given: all given points, check points too.
     of_checks: whether the precision of check points alone is wanted.
     """
-    points = _joined(strips, observations.point_ids, output)
-    each: list[strip_precision.StripPrecision] = []
-    notes: list[Note] = []
+    joined = join_strips(strips, observations, output)
     too_long = [strip for strip in strips if photo_precision.too_long(strip) and not of_checks]
-    if settings.precision and too_long:
-        notes += [precision_of_long_strip(strip.of_photos.strip, photo_precision.MOST_PHOTOS) for strip in too_long]
-    elif settings.precision:
-        each = [
-            _precision_of(strip, before.oriented, observations, given, of_checks=of_checks)
-            for strip, before in zip(strips, screened, strict=True)
-        ]
-    precision = strip_precision.joined(each, strips, points) if each else None
+    if too_long or not settings.precision:
+        notes = (precision_of_long_strip(strip.of_photos.strip, photo_precision.MOST_PHOTOS) for strip in too_long)
+        return replace(joined, notes=(*notes, *joined.notes)) if settings.precision else joined
+    each = [
+        photo_precision.of_photos(strip, before.photos, observations, given, of_checks=of_checks)
+        for strip, before in zip(strips, screened, strict=True)
+    ]
+    return replace(joined, precision=strip_precision.joined(each, strips, joined.points))
+
+
+def join_strips(strips: tuple[StripResult, ...], observations: PhotoPoints, output: GroundFrame) -> AdjustedStrips:
+    """Join strips that were adjusted each by itself."""
     return AdjustedStrips(
         strips=strips,
-        points=points,
+        points=_joined(strips, observations.point_ids, output),
         ties=_ties(strips, output),
         observations=observations,
-        precision=precision,
-        notes=(*notes, *(note for strip in strips for note in strip.notes)),
+        precision=None,
+        notes=tuple(note for strip in strips for note in strip.notes),
     )
-
-
-def _precision_of(
-    strip: StripResult,
-    oriented: OrientedStrip[Any],
-    observations: PhotoPoints,
-    given: ControlPoints,
-    *,
-    of_checks: bool,
-) -> strip_precision.StripPrecision:
-    if strip.photo_stages is not None:
-        return photo_precision.of_photos(strip, oriented, observations, given, of_checks=of_checks)
-    from photostrip.pipeline.precision import model_precision  # strips of photos need none of it
-
-    return model_precision.of_models(strip, oriented, observations, given)
 
 
 class StripMeans(NamedTuple):
@@ -112,7 +99,7 @@ def compared_strips(strips: Sequence[StripResult], point_ids: Sequence[str]) -> 
             plan=first[:, :2],
             difference=(second - first)[:, :2],
             rays=np.minimum(one.rays[at_one], other.rays[at_other]),
-            sigma=float(np.hypot(one.precision[0], other.precision[0])),
+            sigma=float(np.hypot(one.precision.plan, other.precision.plan)),
             depth=min(one.depth, other.depth),
             strips=(one.strip.id, other.strip.id),
         )

@@ -158,7 +158,7 @@ def _left_out(inputs: Inputs, settings: Settings, strips: Sequence[StripResult])
         return
     reach = float(np.hypot(*(plan - (plan.max(axis=0) + plan.min(axis=0)) / 2.0).T).max())
     fall = float(curvature_correction(reach, settings.absolute.earth_radius))
-    if LEFT_BY_A_LEVEL_FIT * fall > min(strip.precision[1] for strip in strips):
+    if LEFT_BY_A_LEVEL_FIT * fall > min(strip.precision.height for strip in strips):
         text = (
             f"local coordinates are taken as they are: if they are plane map coordinates with heights, the Earth's "
             f"curvature is left out, {fall:.2f} m at {reach / 1000.0:.1f} km from the middle of the control; "

@@ -18,7 +18,6 @@ from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import corrections
 
 if TYPE_CHECKING:
-    from photostrip.pipeline.strips.stages import Stages
     from photostrip.strip.image_coordinates.mark_fit import InteriorOrientation
 
 
@@ -48,9 +47,7 @@ def orient_interior(inputs: Inputs, settings: Settings) -> PhotoCoordinates:
     return PhotoCoordinates(interior.transform(inputs.observations, orientation), orientation)
 
 
-def correct(
-    photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground: GroundFrames, stages: Stages
-) -> corrections.Refined:
+def correct(photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground: GroundFrames) -> corrections.Refined:
     """Image coordinates reduced to the principal point, free of distortion and refraction.
 
     Refraction and Earth curvature need heights; where they are not given, they are those of the strips without these
@@ -62,14 +59,12 @@ def correct(
     if wanted.needs_heights and (wanted.flying_height is None or wanted.ground_height is None):
         plain = replace(wanted, refraction=False, earth_radius=None)
         bent = corrections.refine(photo.observations, inputs.cameras, plain).observations
-        heights = heights_of(bent, inputs, settings, ground, stages)
+        heights = heights_of(bent, inputs, settings, ground)
         wanted = replace(wanted, flying_height=heights.flying, ground_height=heights.ground)
     return corrections.refine(photo.observations, inputs.cameras, wanted)
 
 
-def heights_of(
-    observations: PhotoPoints, inputs: Inputs, settings: Settings, ground: GroundFrames, stages: Stages
-) -> Heights:
+def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, ground: GroundFrames) -> Heights:
     """Mean heights of cameras and ground from the strips, adjusted as they will be, in the frames of the run."""
     # a check, which asks for no heights, does without the fifty modules of a strip
     from photostrip.pipeline.common_points import mean_points
@@ -78,7 +73,7 @@ def heights_of(
     from photostrip.pipeline.strips.forming import form_photos
 
     control = measured_control(inputs.control, observations)
-    formed = form_photos(inputs, observations, settings, stages)
+    formed = form_photos(inputs, observations, settings)
     if settings.together:
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 

@@ -38,6 +38,15 @@ def require_named(settings: LinkSettings, measured: ModelPoints) -> None:
     _require_known(settings, known, "links", "model/point or model/photo, as in the table of models")
 
 
+def rows_of_models(entries: Sequence[str], measured: ModelPoints) -> Flags:
+    """Mark the model coordinates that a list of the user names, ``model/point`` or ``model/photo``."""
+    if not entries:
+        return np.zeros(len(measured), bool)
+    wanted, names = set(entries), [measured.name(node).removeprefix(CENTER) for node in measured.node.tolist()]
+    models = [measured.model_ids[number] for number in measured.model.tolist()]
+    return np.array([f"{model}/{name}" in wanted for model, name in zip(models, names, strict=True)], bool)
+
+
 def require_weighted(settings: StripFormationSettings, observations: PhotoPoints) -> None:
     """Refuse weights of points that no photo shows, with a fault for each."""
     known = set(observations.point_ids)

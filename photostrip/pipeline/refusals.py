@@ -10,12 +10,13 @@ from photostrip.errors import Fault, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, Settings
 
-OF_MODELS = ("auto", "polynomial", "similarity")  # adjustments that need no image coordinates
-
 
 def require_runnable(inputs: Inputs, settings: Settings) -> None:
     """Refuse an adjustment that does not exist, and photos in tables that no strip has."""
-    _require_adjustment(settings, ADJUSTMENTS, "is not available", "not-available")
+    if settings.adjustment not in ADJUSTMENTS:
+        message = f"adjustment {settings.adjustment!r} is not available"
+        known = " or ".join(ADJUSTMENTS)
+        raise InputError(Fault(message, "not-available", key="processing.adjustment", expected=known))
     positions, orientations = inputs.positions, inputs.orientations
     tables = {
         "is measured": inputs.observations.photo_ids,
@@ -71,15 +72,3 @@ def refuse_curvature_twice(inputs: Inputs, settings: Settings) -> None:
             fix="drop `earth_curvature: image`, or give plane coordinates of an unknown projection as `crs: local`",
         )
         raise InputError(fault)
-
-
-def require_adjustment_of_models(settings: Settings) -> None:
-    """Refuse adjustments that need image coordinates where models were measured."""
-    message = "needs image coordinates; the project gives model coordinates"
-    _require_adjustment(settings, OF_MODELS, message, "needs-image-coordinates")
-
-
-def _require_adjustment(settings: Settings, known: Sequence[str], message: str, code: str) -> None:
-    if settings.adjustment not in known:
-        message = f"adjustment {settings.adjustment!r} {message}"
-        raise InputError(Fault(message, code, key="processing.adjustment", expected=" or ".join(known)))

@@ -72,6 +72,7 @@ class ModelStages:
     formed: FormedModels  # the models in one system, and the links between them
     # (f, 3): adjusted perspective centres in flight order, intermediate frame, metres; NaN where none was measured
     centers: Floats
+    rotations: Floats  # (k, 3, 3): rotation of each model, model to intermediate frame
     scales: Floats  # (k,): denominator of the scale of each model
 
 
@@ -79,7 +80,7 @@ class ModelStages:
 class StripResult:
     """Every stage of one strip of photos or of independent models, in order."""
 
-    precision: tuple[float, float]  # a-priori standard deviation of a point in plan and height from one model, metres
+    precision: absolute.PointPrecision  # a-priori standard deviations of a point from one model, metres
     intermediate: IntermediateFrame
     control: ControlPoints  # control that took part
     control_rows: Numbers  # (n,): its rows in the strip's points
@@ -189,13 +190,14 @@ class BlockStart:
     """Start values of the bundle adjustment."""
 
     strips: tuple[StripResult, ...]  # strips of two photos or more, every stage of the strip method
-    photos: tuple[str, ...]  # all photos, strip by strip
+    photos: tuple[str, ...]  # all photos, or all independent models, strip by strip
     # centers, rotations: (m, 3), (m, 3, 3): their orientations, Cartesian frame
     centers: Floats
     rotations: Floats
     points: Floats  # (q, 3): all points of the observations; NaN where one has no coordinates
     strangers: Mapping[str, AbstractSet[int]]  # points by strip whose ids stand for other points in a strip before
     rough: Flags  # (m,): photos that stand as they were given, with too few known points to orient them
+    scales: Floats | None  # (m,): of models: metres per millimetre; None: photos
     free: bool  # whether nothing ties the block to the ground: its frame and scale are those of the first strip
 
     def rows_of(self, photos: Sequence[str]) -> Numbers:
@@ -211,7 +213,7 @@ class BlockProblem:
     origin: Floats  # (3,): origin of its frame in the project's Cartesian frame, metres
     begin: Selection
     kept: Flags  # (n,): rays that the user keeps
-    rows: Numbers  # (n,): row in the observations of each ray
+    rows: Numbers  # (n,): row in the observations, or in the model coordinates, of each ray
     control: Numbers  # (c,): row in the measured control of each row of ``problem.control``
     # for ``control`` and ``position``: whether the axes of each row are plan and height
     level: dict[str, tuple[bool, ...]]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.notes import Finding, Note
-from photostrip.pipeline.common_points import join_strips
+from photostrip.notes import Note
+from photostrip.pipeline.block.adjust import adjust_block
+from photostrip.pipeline.common_points import join_photos, join_strips
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
 from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
@@ -21,13 +20,15 @@ from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
 from photostrip.pipeline.results import AdjustedStrips, Result
-from photostrip.pipeline.strips.absolute import StripStage, on_control
-from photostrip.pipeline.strips.adjusting import adjust
+from photostrip.pipeline.strips.adjusting import adjust_formed, adjust_photos
 from photostrip.pipeline.strips.forming import as_single_photos, form_strips
+from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
-from photostrip.pipeline.strips.stages import Stages
+from photostrip.pipeline.strips.photos_on_control import on_control
 from photostrip.pipeline.unchecked_control import unchecked_control_notes
 from photostrip.points import PhotoPoints
+
+Formed = list[FormedPhotos] | list[LinkedModels]
 
 
 def triangulate(
@@ -36,55 +37,44 @@ def triangulate(
     *,
     directory: Path | None = None,
     tied: TiedFrames | None = None,
-    stages: Stages | None = None,
 ) -> Result:
     """Take a project through the whole strip method.
 
     directory: the project file's directory, where grids named by the frames are looked for first.
     tied: frames of these inputs that have been tied already; those of other inputs are not used.
-    stages: what runs with other settings have made, and what they may take over from this one.
     Raises InputError when the settings or frames contradict each other or the control is left-handed.
     Raises GeometryError when a pair, a junction or the absolute orientation cannot be determined.
 
     Either error carries in ``findings`` what the data say against themselves.
     """
     ground = photo = None
-    stages = stages or Stages("pairs")
-
-    def of_failure() -> tuple[Finding, ...]:
-        find = partial(gate.of_failure, inputs, settings, directory, photo, ground, stages)
-        # of several methods that fail the first is told of: another need not look again
-        return stages.once("failure", find, inputs, _of_any_method(settings), photo is None, ground is None)
-
     try:
         require_runnable(inputs, settings)
         ground = tie_ground_frames(inputs, settings, directory, tied)
         require_whole(inputs, ground.control)
         # 1 interior orientation
         photo = orient_interior(inputs, settings)
-        result = _walk_by_any_method(inputs, settings, ground, photo, stages)
+        result = _walk_by_any_method(inputs, settings, ground, photo)
     except (InputError, GeometryError) as error:
-        error.findings = of_failure()
+        error.findings = gate.of_failure(inputs, settings, directory, photo, ground)
         raise
     except np.linalg.LinAlgError as error:
         msg = f"the data contradict themselves so much that an equation cannot be solved ({str(error).lower()})"
         unsolvable = GeometryError(msg, code="singular")
-        unsolvable.findings = of_failure()
+        unsolvable.findings = gate.of_failure(inputs, settings, directory, photo, ground)
         raise unsolvable from error
-    return replace(result, findings=gate.of_result(result, directory, stages))
+    return replace(result, findings=gate.of_result(result, directory))
 
 
-def _walk_by_any_method(
-    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages
-) -> Result:
+def _walk_by_any_method(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates) -> Result:
     """Walk, with `auto` again strip by strip with polynomials where a bundle cannot be had."""
     try:
-        return _walk_from_orientations(inputs, settings, ground, photo, stages)
+        return _walk_from_orientations(inputs, settings, ground, photo)
     except GeometryError as error:
-        if settings.adjustment != AUTO or inputs.models is not None:
+        if settings.adjustment != AUTO:
             raise
         try:
-            result = _walk(inputs, replace(settings, adjustment=POLYNOMIAL), ground, photo, stages)
+            result = _walk(inputs, replace(settings, adjustment=POLYNOMIAL), ground, photo)
         except (GeometryError, InputError):
             raise error from None
         text = f"no bundle adjustment could be had, each strip is adjusted by polynomials in its place: {error}"
@@ -93,17 +83,17 @@ def _walk_by_any_method(
 
 
 def _walk_from_orientations(
-    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages
+    inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates
 ) -> Result:
     """Walk, and again with single photos at their given orientations in the place of a strip that cannot be formed."""
     try:
-        return _walk(inputs, settings, ground, photo, stages)
+        return _walk(inputs, settings, ground, photo)
     except GeometryError as error:
         cut = as_single_photos(inputs, settings, error)
         if cut is None:
             raise
         try:
-            result = _walk_from_orientations(cut, settings, ground, photo, stages)
+            result = _walk_from_orientations(cut, settings, ground, photo)
         except GeometryError:
             raise error from None
         text = f"{error}; all photos of the strip start from their given orientations in its place"
@@ -111,16 +101,15 @@ def _walk_from_orientations(
         return replace(result, notes=(note, *result.notes))
 
 
-def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates, stages: Stages) -> Result:
+def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates) -> Result:
     """Every stage takes what the stages before it found."""
     # 1 lens distortion, refraction
-    refined = correct(photo, inputs, settings, ground, stages)
+    refined = correct(photo, inputs, settings, ground)
     # 2-3 relative orientation; base direction, orientation chain, space intersection, scale transfer
-    formed = form_strips(inputs, refined.observations, settings, stages)
+    formed = form_strips(inputs, refined.observations, settings)
 
     def on_the_ground(inputs: Inputs, whole: Result | None = None) -> Result:
-        strips = formed if whole is None else _as_left_by(whole, formed)
-        adjusted = _adjusted(inputs, settings, ground, refined.observations, strips, stages, whole)
+        adjusted = _adjusted(inputs, settings, ground, refined.observations, formed, whole)
         missing = {}
         if whole is None:
             missing = not_determined(adjusted.observations, adjusted.points, inputs, adjusted.strips)
@@ -160,59 +149,29 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     return replace(result, folds=cross_validate(result, partial(on_the_ground, whole=result)))
 
 
-def _of_any_method(settings: Settings) -> Settings:
-    """Return settings without what a comparison of methods changes."""
-    return replace(settings, adjustment="", precision=False, cross_validation=False)
-
-
-def _as_left_by(whole: Result, formed: Sequence[StripStage[Any]]) -> Sequence[StripStage[Any]]:
-    """Give strips of photos without the wrong images of control that the whole adjustment found in them."""
-    if whole.bundle is not None or whole.inputs.models is not None:
-        return formed
-    of_photos = zip(cast("Sequence[FormedPhotos]", formed), whole.strips, strict=True)
-    return [
-        replace(stage, formed=strip.of_photos.formed, wrong_rays=strip.of_photos.wrong_rays)
-        for stage, strip in of_photos
-    ]
-
-
 def _adjusted(
     inputs: Inputs,
     settings: Settings,
     ground: GroundFrames,
     observations: PhotoPoints,
-    formed: Sequence[StripStage[Any]],
-    stages: Stages,
+    formed: Formed,
     whole: Result | None,
 ) -> AdjustedStrips:
-    """Bring formed strips to the ground and adjust them, each by itself or all in a bundle."""
+    """Bring formed strips to the ground and adjust them, all in one network or each by itself."""
     control = measured_control(inputs.control, observations)
-    if settings.together and inputs.models is None:
+    if settings.together:
         # 4-5 all strips at once
-        from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
-
-        of_photos = cast("Sequence[FormedPhotos]", formed)
-        return adjust_block(
-            inputs, settings, observations, control, ground, of_photos, None if whole is None else whole.bundle
-        )
-    # 4 intermediate frame, absolute orientation, wrong control
-    frames = tuple((frame.spec, frame.origin) for frame in (*ground.control, ground.output))
-    wanted = _of_any_method(settings)
-    screened = [
-        stages.once(
-            "control",
-            partial(on_control, strip, control, ground.control, settings, searched=whole is not None),
-            strip,
-            control,
-            frames,
-            wanted,
-            whole is None,
-        )
-        for strip in formed
-    ]
-    # 5 polynomials
-    strips = tuple(adjust(strip, settings) for strip in screened)
+        before = None if whole is None else whole.bundle
+        return adjust_block(inputs, settings, observations, control, ground, formed, before)
+    # 4-5 intermediate frame, absolute orientation, wrong control, polynomials
+    if inputs.models is not None:
+        of_models = tuple(adjust_formed(stage, control, ground.control, settings) for stage in formed)
+        return join_strips(of_models, observations, ground.output)
+    photos = [stage for stage in formed if isinstance(stage, FormedPhotos)]
+    if whole is not None:  # without the wrong images of control that the whole adjustment found
+        photos = [stage.as_left_by(strip.of_photos) for stage, strip in zip(photos, whole.strips, strict=True)]
+    screened = [on_control(stage, control, ground.control, settings, searched=whole is not None) for stage in photos]
+    strips = tuple(adjust_photos(strip, settings) for strip in screened)
     # 6 back to the map, with standard deviations
-    return join_strips(
-        strips, screened, observations, inputs.control, ground.output, settings, of_checks=whole is not None
-    )
+    of_checks = whole is not None
+    return join_photos(strips, screened, observations, inputs.control, ground.output, settings, of_checks=of_checks)

@@ -41,7 +41,6 @@ from photostrip.project.yaml.validation import valid_section
 
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result
-    from photostrip.pipeline.strips.stages import Stages
 
 OF_IMAGES = ("photostrip", "cameras", "strips", "observations", "fiducial_measurements", "accept")
 __all__ = ["Project", "adjust_project", "load_project", "read_project"]
@@ -115,11 +114,8 @@ class Project:
             raise
 
 
-def adjust_project(project: Project, stages: Stages | None = None) -> Result:
-    """Adjust a project; what is refused has its place in the project file.
-
-    stages: what runs of it by other methods have made.
-    """
+def adjust_project(project: Project) -> Result:
+    """Adjust a project; what is refused has its place in the project file."""
     from photostrip.pipeline.run import triangulate  # what only reads a project does without
 
     with project.places():
@@ -128,7 +124,6 @@ def adjust_project(project: Project, stages: Stages | None = None) -> Result:
             project.settings,
             directory=project.grid_folder,
             tied=project.tied,
-            stages=stages,
         )
 
 

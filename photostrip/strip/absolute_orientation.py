@@ -150,14 +150,24 @@ class AbsoluteOrientation:
     iterations: int
 
 
-def weights(control: ControlPoints, precision: tuple[float, float], kind: str = "stated") -> Floats:
+class PointPrecision(NamedTuple):
+    """A-priori standard deviations of a point of one model, metres, or in the unit of a strip not yet on the ground."""
+
+    plan: float
+    height: float
+
+    def at(self, scale: float) -> PointPrecision:
+        return PointPrecision(self.plan * scale, self.height * scale)
+
+
+def weights(control: ControlPoints, precision: PointPrecision, kind: str = "stated") -> Floats:
     """Weights 1/(sigma_control^2 + sigma_point^2) of the control coordinates against the strip, (n, 3), metres^-2.
 
     They are 0 where a coordinate does not count. The standard deviations of the control are those along the axes
     compared (``Targets.turned``); `precision` has those of a strip point in plan and in height, a priori.
     kind: ``"equal"``, as [001] eq. 149 has them: the mean of the variances in the place of each.
     """
-    point = np.array([precision[0], precision[0], precision[1]])
+    point = np.array([precision.plan, precision.plan, precision.height])
     variance = control.sigma**2 + point**2
     if kind == "equal":
         variance = np.where(control.use, variance[control.use].mean(), np.nan)

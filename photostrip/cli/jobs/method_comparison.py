@@ -13,7 +13,6 @@ from photostrip.errors import EXIT_DONE, GeometryError, InputError, PhotostripEr
 from photostrip.formats.text.writing import write_text
 from photostrip.library.project import Project, loaded_from
 from photostrip.pipeline.inputs import METHODS
-from photostrip.pipeline.strips.stages import Stages
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
 from photostrip.result.methods import method_of, methods_document, refused_method
@@ -39,11 +38,10 @@ def compare_methods(
     failures: list[PhotostripError] = []
     name = ""
     with failures_as(form), progress(sys.stderr, quiet=messages.quiet) as waiting:
-        stages = Stages("pairs", "strip", "control", "shifted", "failure")
         for adjustment in METHODS:
             waiting.at(f"adjusting: {adjustment}")
             try:
-                result = _loaded(project, assignments, adjustment, stages).run()
+                result = _loaded(project, assignments, adjustment).run()
             except (GeometryError, InputError) as error:
                 found[adjustment] = refused_method(error)
                 failures.append(error)
@@ -68,5 +66,5 @@ def compare_methods(
     return EXIT_DONE
 
 
-def _loaded(project: Path, assignments: Sequence[str], adjustment: str, stages: Stages) -> Project:
-    return loaded_from(project, [*assignments, f"processing.adjustment={adjustment}"], stages=stages)
+def _loaded(project: Path, assignments: Sequence[str], adjustment: str) -> Project:
+    return loaded_from(project, [*assignments, f"processing.adjustment={adjustment}"])

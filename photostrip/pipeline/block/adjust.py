@@ -20,6 +20,7 @@ from photostrip.network.selection import Selection, restarted, selected, support
 from photostrip.network.solution import BundleSolution, Cofactors
 from photostrip.network.solve import solve
 from photostrip.pipeline.block import block_result
+from photostrip.pipeline.block import models as block_models
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
 from photostrip.pipeline.block.check_points import check_errors
@@ -27,6 +28,7 @@ from photostrip.pipeline.block.datum import known_of
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import POLYNOMIAL, SIMILARITY, Inputs, Settings
 from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart, Bundle, SinglePhoto
+from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, locate
 
@@ -42,26 +44,30 @@ def adjust_block(
     observations: PhotoPoints,
     control: ControlPoints,
     ground: GroundFrames,
-    stages: Sequence[FormedPhotos],
+    stages: Sequence[FormedPhotos] | Sequence[LinkedModels],
     before: Bundle | None = None,
 ) -> AdjustedStrips:
     """Adjust all strips of a project together.
 
-    stages: strips of two photos or more, which give the start.
+    stages: strips of two photos or more, or of independent models, which give the start.
     before: the same block with more control: this one starts from it, without what it rejected.
     Raises GeometryError when a strip, a photo or the datum cannot be determined, by name.
     """
     known = known_of(inputs, control, ground)
+    if inputs.models is not None and settings.links.screening == "none":
+        settings = replace(settings, bundle=replace(settings.bundle, screening="none"))
 
     def formed(adjustment: str) -> BlockStart:
         return block_start.start(inputs, replace(settings, adjustment=adjustment), stages, observations, known)
 
     def built(start: BlockStart) -> BlockProblem:
+        if inputs.models is not None:
+            return block_models.build(inputs.models, settings, observations, control, ground, start)
         return block_problem.build(inputs, settings, observations, control, ground, start)
 
     if before is not None:
         start = _start_from(before, observations, known.control)
-        block = _refilled(_begin_from(before, built(start), len(observations)), control, ground.control)
+        block = _refilled(_begin_from(before, built(start)), control, ground.control)
         estimated = _as_before(before, block, settings)
     else:
         start = formed(POLYNOMIAL)
@@ -75,7 +81,10 @@ def adjust_block(
             estimated = _searched(_bent(built(start)), control, ground.control, settings)
     bundle = _bundle(inputs, settings, start, estimated)
     _refuse_inseparable(bundle.correlations, set(estimated.asked))
-    adjusted = block_result.adjusted_strips(inputs, observations, ground.output, bundle)
+    if inputs.models is not None:
+        adjusted = block_models.adjusted_strips(inputs.models, observations, ground.output, bundle)
+    else:
+        adjusted = block_result.adjusted_strips(inputs, observations, ground.output, bundle)
     if adjusted.precision is None or not settings.precision:
         return replace(adjusted, precision=None)
     checks = check_errors(bundle, adjusted, inputs.control, ground.control)
@@ -84,17 +93,20 @@ def adjust_block(
 
 def _start_from(before: Bundle, observations: PhotoPoints, control: ControlPoints) -> BlockStart:
     """Start where an adjustment with more control ended; a point on one photo that has lost its control is nowhere."""
-    solution, origin = before.screened.solution, before.block.origin
-    nowhere = np.bincount(observations.point, minlength=len(observations.point_ids)) < before.block.problem.least
+    solution, whole, origin = before.screened.solution, before.block.problem, before.block.origin
+    nowhere = np.bincount(whole.images.point, minlength=whole.points) < whole.least
     nowhere[locate(control.ids, observations.point_ids)] = False
     points = np.where(nowhere[:, None] | np.isnan(before.start.points), np.nan, solution.points + origin)
-    return replace(before.start, centers=solution.centers + origin, rotations=solution.rotations, points=points)
+    scales = None if before.start.scales is None else solution.scales
+    return replace(
+        before.start, centers=solution.centers + origin, rotations=solution.rotations, scales=scales, points=points
+    )
 
 
-def _begin_from(before: Bundle, block: BlockProblem, measured: int) -> BlockProblem:
+def _begin_from(before: Bundle, block: BlockProblem) -> BlockProblem:
     """Begin without what an adjustment with more control rejected."""
     held, whole = before.screened.selection, before.block.problem
-    inside = np.zeros(measured, bool)
+    inside = np.zeros(int(max(before.block.rows.max(initial=-1), block.rows.max(initial=-1))) + 1, bool)
     inside[before.block.rows[held.images]] = True
     used = np.ones((whole.points, 3), bool)
     used[whole.control.point] = held.control

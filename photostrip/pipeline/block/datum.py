@@ -17,9 +17,12 @@ from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.strips.absolute import middle_frame
+from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
 from photostrip.strip import absolute_orientation
+
+Stages = Sequence[FormedPhotos] | Sequence[LinkedModels]
 
 LEAST_TIES = 3
 ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line
@@ -92,7 +95,7 @@ class JoinedStrips:
     points: Floats
 
 
-def join_waiting(stages: Sequence[FormedPhotos], waiting: Sequence[int], count: int) -> JoinedStrips:
+def join_waiting(stages: Stages, waiting: Sequence[int], count: int) -> JoinedStrips:
     """Join the strip with the most points to all that share points with it, and so on."""
     first = max(waiting, key=lambda number: (len(stages[number].formed.point), -number))
     identity = Similarity(1.0, np.eye(3), np.zeros(3))
@@ -119,7 +122,7 @@ def join_waiting(stages: Sequence[FormedPhotos], waiting: Sequence[int], count: 
 
 
 def datum(
-    stages: Sequence[FormedPhotos], group: JoinedStrips, observations: PhotoPoints, known: Known, *, alone: bool
+    stages: Stages, group: JoinedStrips, observations: PhotoPoints, known: Known, *, alone: bool
 ) -> tuple[Similarity, bool]:
     """Similarity from the frame of a block to the Cartesian frame; True with it when nothing gave it."""
     names = tuple(photo for number in group.members for photo in stages[number].strip.photos)
@@ -196,15 +199,20 @@ def _levelled(strip: Floats, targets: absolute_orientation.Targets, level: Level
     return found
 
 
-def _oriented(stages: Sequence[FormedPhotos], group: JoinedStrips) -> tuple[Floats, Floats]:
-    """Centres and rotations of all photos, in the frame of the block."""
-    strips = [(group.joined[number], stages[number].formed) for number in group.members]
-    centers = np.concatenate([to_block(formed.centers) for to_block, formed in strips])
-    return centers, np.concatenate([to_block.rotation @ formed.rotations for to_block, formed in strips])
+def _oriented(stages: Stages, group: JoinedStrips) -> tuple[Floats, Floats]:
+    """Centres and rotations of all photos, in the frame of the block; models have no rotations but stand upright."""
+    centers, rotations = [], []
+    for number in group.members:
+        to_block, stage = group.joined[number], stages[number]
+        centers.append(to_block(stage.formed.centers))
+        upright = np.tile(np.eye(3), (len(centers[-1]), 1, 1))
+        of_photos = stage.formed.rotations if isinstance(stage, FormedPhotos) else upright
+        rotations.append(to_block.rotation @ of_photos)
+    return np.concatenate(centers), np.concatenate(rotations)
 
 
 def _with_cameras(
-    stages: Sequence[FormedPhotos],
+    stages: Stages,
     group: JoinedStrips,
     on_ground: tuple[Floats, ControlPoints],
     cameras: ControlPoints,
@@ -238,16 +246,17 @@ def _with_cameras(
     return found
 
 
-def _of_its_own(stages: Sequence[FormedPhotos], group: JoinedStrips) -> Similarity:
+def _of_its_own(stages: Stages, group: JoinedStrips) -> Similarity:
     """Frame and scale of a block that nothing ties to the ground: X along the first strip, Z against the view."""
     centers, rotations = _oriented(stages, group)
-    first = stages[group.members[0]].formed.centers
-    base = np.linalg.norm(np.diff(first, axis=0), axis=1).mean()
+    first, last = stages[group.members[0]].formed.ends
+    base = np.linalg.norm(last - first) / max(len(stages[group.members[0]].strip.photos) - 1, 1)
     up = rotations[:, :, 2].mean(axis=0)
     up /= np.linalg.norm(up)
-    along = first[-1] - first[0]
+    along = last - first
     along -= (along @ up) * up
     along /= np.linalg.norm(along)
     rotation = np.stack([along, np.cross(up, along), up])
     scale = FREE_BASE / float(base)
-    return Similarity(scale, rotation, -scale * rotation @ centers.mean(axis=0))
+    middle = np.nanmean(centers if np.isfinite(centers).any() else group.points, axis=0)
+    return Similarity(scale, rotation, -scale * rotation @ middle)

@@ -55,7 +55,7 @@ def build(
         xy=observations.xy[rows],
         sigma=observations.sigma[rows],
     )
-    given, control_rows = _control(control, ground.control, observations, start, origin)
+    given, control_rows = control_observations(control, ground.control, observations, start, origin)
     positions = _positions(inputs, ground.positions, ground.orientations, start, origin)
     attitudes = _attitudes(inputs.orientations, ground.orientations, start)
     in_block = inputs.positions is not None and inputs.positions.group == BLOCK
@@ -131,7 +131,7 @@ def given_positions(
     return GivenPositions(xyz, frame.axes_at(xyz), np.where(use, sigma, np.inf))
 
 
-def _control(
+def control_observations(
     control: ControlPoints, frames: Sequence[GroundFrame], observations: PhotoPoints, start: BlockStart, origin: Floats
 ) -> tuple[ControlObservations, Numbers]:
     """Control as observations; points without start coordinates, which no ray determines, are left out."""

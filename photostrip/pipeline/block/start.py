@@ -18,11 +18,13 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, distinct
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import collinearity
+from photostrip.pipeline.block import models
 from photostrip.pipeline.block.datum import (
     LEAST_TIES,
     ON_A_LINE,
     JoinedStrips,
     Known,
+    Stages,
     datum,
     join_waiting,
 )
@@ -32,6 +34,7 @@ from photostrip.pipeline.given_points import cartesian_of
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.results import BlockStart, StripResult
 from photostrip.pipeline.strips.adjusting import adjust_formed
+from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility.photos.tied_strips import odd_ties
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
@@ -44,17 +47,21 @@ MOST_TIES = 60  # points that hand the frame of a block to one of its strips
 
 
 def start(
-    inputs: Inputs, settings: Settings, stages: Sequence[FormedPhotos], observations: PhotoPoints, known: Known
+    inputs: Inputs,
+    settings: Settings,
+    stages: Stages,
+    observations: PhotoPoints,
+    known: Known,
 ) -> BlockStart:
     """Bring all strips and photos of a block into the Cartesian frame.
 
     settings: their ``adjustment`` is how a strip with control of its own meets it.
-    stages: strips of two photos or more.
+    stages: strips of two photos or more, or of independent models.
     Raises GeometryError when a strip or photo hangs together with nothing, or the block cannot be brought to the
         ground.
     """
     block = _Block(settings, observations, known)
-    waiting = [number for number, stage in enumerate(stages) if not block.take(number, stage)]
+    waiting = [number for number in range(len(stages)) if not block.take(number, stages[number])]
     waiting = block.tie(stages, waiting)
     free = False
     while waiting:
@@ -62,6 +69,8 @@ def start(
         free = block.place(stages, group) or free
         waiting = block.tie(stages, [number for number in waiting if number not in group.members])
     strips = tuple(block.done[number] for number in range(len(stages)))
+    if inputs.models is not None:
+        return models.together(inputs.models, strips, _strangers(strips, observations.point_ids), free=free)
     return _together(inputs, strips, observations, known, free=free)
 
 
@@ -74,7 +83,7 @@ class _Block:
         self.observations, self.known = observations, known
         self.done: dict[int, StripResult] = {}
 
-    def take(self, number: int, stage: FormedPhotos) -> bool:
+    def take(self, number: int, stage: FormedPhotos | LinkedModels) -> bool:
         """Bring a strip to the ground with its own control; False when that is too little."""
         known = self.known
         if not len(known.control):
@@ -93,7 +102,7 @@ class _Block:
             found[strip.formed.point] = strip.cartesian
         return found
 
-    def tie(self, stages: Sequence[FormedPhotos], waiting: Sequence[int]) -> list[int]:
+    def tie(self, stages: Stages, waiting: Sequence[int]) -> list[int]:
         """Tie strips to those on the ground, the best tied first; give those that are left."""
         left = list(waiting)
         while left and self.done:
@@ -107,7 +116,7 @@ class _Block:
                 return left
         return left
 
-    def _hang(self, number: int, stage: FormedPhotos, points: Floats) -> bool:
+    def _hang(self, number: int, stage: FormedPhotos | LinkedModels, points: Floats) -> bool:
         """Bring one strip to the ground with points of the others; False when they do not determine it."""
         shared = stage.formed.point[np.isfinite(points[stage.formed.point, 0])]
         if collinearity(points[shared]) < ON_A_LINE:
@@ -118,7 +127,7 @@ class _Block:
             return False
         return True
 
-    def _on(self, stage: FormedPhotos, numbers: Numbers, cartesian: Floats) -> StripResult:
+    def _on(self, stage: FormedPhotos | LinkedModels, numbers: Numbers, cartesian: Floats) -> StripResult:
         """Adjust a strip on points with Cartesian coordinates, beside its own control."""
         known = self.known
         chosen = distinct(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_TIES)).astype(np.intp))
@@ -139,7 +148,7 @@ class _Block:
         control = concatenated([others, of_ties])
         return adjust_formed(stage, control, (*known.frames, known.output), self.tied)
 
-    def place(self, stages: Sequence[FormedPhotos], group: JoinedStrips) -> bool:
+    def place(self, stages: Stages, group: JoinedStrips) -> bool:
         """Bring a block of strips to the ground; True when nothing was known and its own frame was taken."""
         similarity, free = datum(stages, group, self.observations, self.known, alone=not self.done)
         for number in group.members:
@@ -192,6 +201,7 @@ def _together(
         points=points,
         strangers=strangers,
         rough=np.array([name in rough for name in names], bool),
+        scales=None,
         free=free,
     )
 

@@ -20,7 +20,6 @@ from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
-from photostrip.pipeline.strips.stages import Stages
 from photostrip.plausibility import found
 from photostrip.plausibility.control import wrong_heights
 from photostrip.plausibility.control.wrong_heights import HeightStretch
@@ -66,7 +65,6 @@ def find_wrong_distance(
     given: Sequence[str],
     settings: Settings,
     compare: Compare,
-    stages: Stages | None,
     *,
     stretched: bool,
 ) -> list[Finding]:
@@ -92,7 +90,7 @@ def find_wrong_distance(
         return []
     some = _some_points(formed.orientation.pairs, observations, given)
     for start in (first.ratio, *FIRST_FACTORS)[: _most_starts(some)]:
-        trial = _followed(formed.strip, some, settings, compare, stages, start)
+        trial = _followed(formed.strip, some, settings, compare, start)
         if trial is None or trial.misfit > LEFT_SHARE * first.misfit or trial.sigma0 > MOST_SIGMA0_RATIO * sigma0:
             continue
         in_relief = no_bend or trial.in_relief < LEFT_SHARE * first.in_relief
@@ -116,7 +114,6 @@ def find_distance_without_pairs(
     given: Sequence[str],
     settings: Settings,
     compare: Compare,
-    stages: Stages | None,
 ) -> list[Finding]:
     """Try other principal distances on a strip whose pairs cannot be oriented (P105, at most one)."""
     if len(strip.photos) > MOST_PHOTOS:
@@ -127,7 +124,7 @@ def find_distance_without_pairs(
         return []  # whatever the principal distance
     some = _some_points(pairs, observations, given)
     for start in FIRST_FACTORS[: _most_starts(some)]:
-        trial = _followed(strip, some, settings, compare, stages, start)
+        trial = _followed(strip, some, settings, compare, start)
         if trial is not None and trial.misfit < LEAST_MISFIT:
             numbers: Evidence = {"misfit_then": trial.misfit, "pairs_sigma0_then_mm": trial.sigma0}
             return _finding(strip, trial.factor, "can be formed and fits the heights of its control only", numbers)
@@ -162,7 +159,7 @@ def _middle_sigma0(formed: EvidenceStrip) -> float:
 
 
 def _followed(
-    strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare, stages: Stages | None, ratio: float
+    strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare, ratio: float
 ) -> DistanceTrial | None:
     """Follow the stretch of the heights until it is gone; None where no strip can be formed and compared."""
     last, pairs = None, 0.0
@@ -172,7 +169,7 @@ def _followed(
         if not FACTOR_RANGE[0] < ratio < FACTOR_RANGE[1]:
             return None
         camera = replace(strip.camera, principal_distance=strip.camera.principal_distance * ratio)
-        again = evidence.form(replace(strip, camera=camera), observations, settings, stages)
+        again = evidence.form(replace(strip, camera=camera), observations, settings)
         last = compare(again) if again is not None else None
         if again is None or last is None:
             return None

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,10 +22,6 @@ from photostrip.points import ControlPoints, PhotoPoints, locate, located
 from photostrip.strip.image_coordinates import corrections
 from photostrip.strip.relative_orientation.orientation import Orientation, refuse_unusable
 from photostrip.strip.strip_formation.strip import FormedStrip, form_from_pairs, mean_points, model_points
-
-if TYPE_CHECKING:
-    from photostrip.pipeline.strips.stages import Stages
-
 
 MOSAIC_PHOTOS = 10  # of a mosaic that is laid on control: a longer one curls
 LONG_STRIP = 40  # photos: a longer one is looked at in stretches
@@ -110,16 +105,14 @@ def _mean_direction(axes: Floats) -> Floats:
     return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-12), float)
 
 
-def form(
-    strip: Strip, observations: PhotoPoints, settings: Settings, stages: Stages | None = None
-) -> EvidenceStrip | None:
+def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> EvidenceStrip | None:
     """Form a strip as far as that goes, for evidence alone; None when a pair or a junction cannot be determined."""
     if len(strip.photos) < 2:
         return None  # a single photo of a block has no pairs
     from photostrip.pipeline.strips.photos import screened_pairs  # a check forms no strips
 
     try:
-        screened, _ = screened_pairs(strip, observations, settings.relative, stages)
+        screened, _ = screened_pairs(strip, observations, settings.relative)
         refuse_unusable(screened.orientation, screened.converged, strip.photos)
         scatter = screened.scatter.by_pair
         formed = form_from_pairs(screened.orientation, settings.formation, strip.photos, scatter)

@@ -31,7 +31,6 @@ from photostrip.pipeline.plausibility import (
 from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import ImageEvidence, of_images
-from photostrip.pipeline.strips.stages import Stages
 from photostrip.plausibility import accepted
 from photostrip.plausibility.photos import flight, flight_order, identity, rotations, units
 from photostrip.points import PhotoPoints, locate
@@ -61,8 +60,8 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     return accepted(findings, settings.accept)
 
 
-def of_result(result: Result, directory: Path | None = None, made: Stages | None = None) -> tuple[Finding, ...]:
-    """Find what the data say against themselves, the adjustment being done; made: what strips formed anew may share."""
+def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
+    """Find what the data say against themselves, the adjustment being done."""
     from photostrip.pipeline.common_points import compared_strips  # a check has no adjusted strips
     from photostrip.pipeline.plausibility import shared_control, slips
     from photostrip.plausibility.control.shared_by_control import StretchedHeights
@@ -73,7 +72,7 @@ def of_result(result: Result, directory: Path | None = None, made: Stages | None
         return _of_adjusted_models(result, inputs.models, directory)
     points = result.refined.observations
     photo = PhotoCoordinates(result.measured, result.interior)
-    images = replace(of_images(inputs, settings, photo), observations=points, stages=made)
+    images = replace(of_images(inputs, settings, photo), observations=points)
     control = _given_control(inputs, directory, _plain_frames(settings, result.frames))
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
     formed = [
@@ -98,9 +97,7 @@ def of_result(result: Result, directory: Path | None = None, made: Stages | None
         findings += _of_formed(each, points)
     wrong = {photo for each in findings if each.is_error for photo in each.photos}
     names = {name for note in doubts for name in note.points}
-    findings += [
-        each for each in _shifted_photos(result, formed, names, made or Stages()) if wrong.isdisjoint(each.photos)
-    ]
+    findings += [each for each in _shifted_photos(result, formed, names) if wrong.isdisjoint(each.photos)]
     in_metres = not any(each.is_error for each in findings)
     if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
         checks = inputs.control.check
@@ -131,19 +128,18 @@ def of_failure(
     directory: Path | None,
     photo: PhotoCoordinates | None,
     ground: GroundFrames | None,
-    stages: Stages,
 ) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment having failed.
 
-    photo, ground, stages: what the run had found before it failed.
+    photo, ground: what the run had found before it failed.
     Returns nothing when the evidence cannot be put together either.
     """
     try:
         if inputs.models is not None:
             return _of_unadjusted_models(inputs, inputs.models, settings, directory)
-        images = replace(of_images(inputs, settings, photo), stages=stages)
+        images = of_images(inputs, settings, photo)
         points = evidence.ideal(images.observations, images.cameras, settings)
-        formed = [evidence.form(strip, points, settings, stages) for strip in images.strips]
+        formed = [evidence.form(strip, points, settings) for strip in images.strips]
         frames = () if ground is None else _plain_frames(settings, ground.control)
         control = _given_control(inputs, directory, frames)
         tried = dict.fromkeys([strip.id for strip in images.strips], True)
@@ -273,9 +269,7 @@ def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     return findings
 
 
-def _shifted_photos(
-    result: Result, formed: Sequence[EvidenceStrip], doubted: Collection[str], made: Stages
-) -> Iterator[Finding]:
+def _shifted_photos(result: Result, formed: Sequence[EvidenceStrip], doubted: Collection[str]) -> Iterator[Finding]:
     """Look for a photo of each strip whose image coordinates are all shifted; ``doubted`` are names of control."""
     from photostrip.plausibility.photos import shifted_photo  # a check forms no strips
 
@@ -284,8 +278,7 @@ def _shifted_photos(
             shifted_photo,  # needs the bundle adjustment
         )
 
-        given = (strip.orientation, strip.formed, points, position, about)
-        return made.once("shifted", partial(shifted_photo, *given), *given)
+        return shifted_photo(strip.orientation, strip.formed, points, position, about)
 
     points = result.refined.observations
     is_doubted = np.array([name in doubted for name in points.point_ids], bool)

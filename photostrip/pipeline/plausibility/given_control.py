@@ -136,13 +136,12 @@ def _of_distance(
             control.points.ids,
             images.settings,
             compare,
-            images.stages,
             stretched=stretched,
         )
     if images.findings:
         return []
     return distance_trial.find_distance_without_pairs(
-        strip, images.observations, control.points.ids, images.settings, compare, images.stages
+        strip, images.observations, control.points.ids, images.settings, compare
     )
 
 

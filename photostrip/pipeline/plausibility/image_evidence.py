@@ -12,7 +12,6 @@ from photostrip.notes import Finding
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.plausibility.base_directions import closer_look
-from photostrip.pipeline.strips.stages import Stages
 from photostrip.plausibility import accepted
 from photostrip.plausibility.photos import flight_order, units
 from photostrip.points import PhotoPoints
@@ -28,7 +27,6 @@ class ImageEvidence:
     strips: tuple[Strip, ...]  # the strips with their photos as they lie, each place once
     steps: dict[str, complex]  # centre of the next photo, as the photos lie, on each photo; mm, y up
     settings: Settings
-    stages: Stages | None = None  # of the run, for strips that are formed anew
 
 
 def of_units(inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:

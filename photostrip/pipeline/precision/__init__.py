@@ -2,7 +2,7 @@
 
 What comes in are adjusted strips and the same strips as they lay on their control, with their derivatives; what goes
 out is a ``results.Precision`` in the project's Cartesian frame. Each strip is differentiated by itself
-(``photo_precision``, ``model_precision``); points of several strips share the errors of common control
+(``photo_precision``); points of several strips share the errors of common control
 (``strip_precision``). ``check_points`` tests differences there, ``joint_points`` has covariances between points. The
 equations are derived in docs/precision.md.
 """

@@ -8,7 +8,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.pipeline.precision import check_points
 from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.pipeline.results import StripResult
-from photostrip.pipeline.strips.absolute import OrientedStrip
+from photostrip.pipeline.strips.photos_on_control import OrientedPhotos
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip.error_propagation.fitted_strip import FittedStrip
 from photostrip.strip.error_propagation.image_variance import image_variance
@@ -20,7 +20,7 @@ MOST_PHOTOS = 400  # of a strip fitted to its control: the work grows by the squ
 
 def of_photos(
     strip: StripResult,
-    oriented: OrientedStrip[StripErrors],
+    on_control: OrientedPhotos,
     observations: PhotoPoints,
     given: ControlPoints,
     *,
@@ -28,23 +28,23 @@ def of_photos(
 ) -> StripPrecision:
     """Covariances of one strip of photos, or ``of_checks`` alone.
 
-    oriented: the same strip before its deformation was corrected.
+    on_control: the same strip before its deformation was corrected.
     observations: ideal image coordinates of the project.
     given: all given points; the check points among them are compared with what is found.
     """
     checks = check_points.check_points(strip, given, observations)
-    compared = check_points.compare_with_checks(strip, checks.spread(), oriented.frames)
+    compared = check_points.compare_with_checks(strip, checks.spread(), on_control.oriented.frames)
     points = np.full((len(strip.xyz), 3, 3), np.nan)
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
     stated = strip.of_photos.sigma
     factor, basis = image_variance(strip.of_photos.orientation, stated)
-    found = fitted(strip, oriented, factor)
+    found = fitted(strip, on_control, factor)
     if of_checks:
         points[checks.rows] = found.covariances_of_points(checks.rows)
     else:
         points = found.covariances_of_points(np.arange(len(points)))
         solved = np.flatnonzero(strip.of_photos.resection.solved)
-        by_photo = photo_errors(strip, oriented.errors, observations)
+        by_photo = photo_errors(strip, on_control.errors, observations)
         photos[solved] = found.covariances_of_photos(by_photo, solved)
     axes, fit = strip.intermediate.axes, found.fit
     return StripPrecision(
@@ -76,11 +76,16 @@ def _turned(strip: StripResult, photos: Floats) -> Floats:
     return turn @ photos @ turn.T
 
 
-def fitted(strip: StripResult, oriented: OrientedStrip[StripErrors], factor: float) -> FittedStrip:
-    """Carry the errors of a strip over the fit to its control; `oriented` is the strip before it was corrected."""
+def fitted(strip: StripResult, on_control: OrientedPhotos, factor: float) -> FittedStrip:
+    """Carry the errors of a strip over the fit to its control, before which it was ``on_control``."""
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
+    oriented = on_control.oriented
     return FittedStrip(
-        errors=oriented.errors, control=oriented.misclosures, fit=oriented.fit(terms), xyz=oriented.xyz, factor=factor
+        errors=on_control.errors,
+        control=oriented.misclosures,
+        fit=on_control.fit(terms),
+        xyz=oriented.xyz,
+        factor=factor,
     )
 
 

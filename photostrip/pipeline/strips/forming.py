@@ -3,46 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from itertools import chain
-from typing import Any
 
 from photostrip.errors import GeometryError
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
-from photostrip.pipeline.refusals import require_adjustment_of_models
-from photostrip.pipeline.strips.absolute import StripStage
+from photostrip.pipeline.strips.models import LinkedModels, link_strip
 from photostrip.pipeline.strips.photos import FormedPhotos, form_strip
-from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import PhotoPoints
 
 
-def form_strips(inputs: Inputs, observations: PhotoPoints, settings: Settings, stages: Stages) -> list[StripStage[Any]]:
+def form_strips(
+    inputs: Inputs, observations: PhotoPoints, settings: Settings
+) -> list[FormedPhotos] | list[LinkedModels]:
     """Form the strips of a project, of photos or of independent models, each by itself."""
     models = inputs.models
     if models is None:
-        return list(form_photos(inputs, observations, settings, stages))
-    from photostrip.pipeline.strips.models import link_strip  # strips of photos need none of it
-
-    require_adjustment_of_models(settings)
+        return form_photos(inputs, observations, settings)
     overruling.require_named(settings.links, models.points)
-    wanted = replace(settings, adjustment="")
-    return [
-        stages.once("strip", partial(link_strip, strip, models.points, settings), strip, models.points, wanted)
-        for strip in models.strips
-    ]
+    return [link_strip(strip, models.points, settings) for strip in models.strips]
 
 
-def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings, stages: Stages) -> list[FormedPhotos]:
+def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings) -> list[FormedPhotos]:
     """Form the strips of photos; a single photo, which only a bundle adjustment can orient, forms nothing."""
     overruling.require(settings.relative, observations)
     overruling.require_weighted(settings.formation, observations)
     whole = [strip for strip in inputs.strips if len(strip.photos) > 1 or not settings.together]
-    given = (observations, settings.relative, settings.formation)
-    return [
-        stages.once("strip", partial(form_strip, strip, observations, settings, stages), strip, *given)
-        for strip in whole
-    ]
+    return [form_strip(strip, observations, settings) for strip in whole]
 
 
 def as_single_photos(inputs: Inputs, settings: Settings, refused: GeometryError) -> Inputs | None:

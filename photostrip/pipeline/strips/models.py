@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, median, quantile
+from photostrip.arrays import Floats, median
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline.inputs import ModelStrip, Settings
-from photostrip.pipeline.overruling import CENTER
+from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
+from photostrip.pipeline.overruling import rows_of_models
 from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes
+from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, to_ground
 from photostrip.pipeline.strips.model_notes import link_notes
-from photostrip.points import ModelPoints, locate, take_rows
-from photostrip.rejection import Rejection
-from photostrip.strip.independent_models import (
-    link_screening,
-    linking,
-    model_errors,
-    model_misclosures,
-    perspective_centers,
-)
+from photostrip.points import ControlPoints, ModelPoints, locate, take_rows
+from photostrip.strip import absolute_orientation
+from photostrip.strip.gross_errors.control.control_screening import not_screened
+from photostrip.strip.independent_models import link_screening, linking, perspective_centers
 from photostrip.strip.independent_models.formation import FormedModels, form_from_models, require_links
 from photostrip.strip.independent_models.link_screening import ScreenedLinks
 from photostrip.strip.independent_models.linking import StripModels
@@ -32,114 +29,114 @@ from photostrip.strip.independent_models.settings import LinkSettings
 from photostrip.strip.polynomial.correction import Polynomial
 from photostrip.units import MILLIMETRES
 
-if TYPE_CHECKING:
-    from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
-
-    Oriented = OrientedStrip[model_errors.ModelErrors]
-    WithControlScreened = ScreenedStrip[model_errors.ModelErrors]
-
 LEAST_SOLID = 4  # points that can tell a body from its mirror image
 
 
 @dataclass(frozen=True, eq=False)
 class LinkedModels:
-    """A strip of independent models before it meets its control, a ``StripStage``."""
+    """A strip of independent models before it meets its control."""
 
     strip: ModelStrip
     measured: ModelPoints  # model coordinates of the whole project
     formed: FormedModels
 
     @property
-    def point_ids(self) -> tuple[str, ...]:
-        return self.measured.point_ids
-
-    def point_precision(self, scale: float) -> tuple[float, float]:
-        """A-priori standard deviation of a point of one model in plan and height, metres."""
+    def point_precision(self) -> absolute_orientation.PointPrecision:
+        """A-priori standard deviation of a point of one model, in the unit of the strip."""
         models, places = self.formed.models, self.formed.places
-        turn = (scale * places.scale)[:, None, None] * places.rotation
+        turn = places.scale[:, None, None] * places.rotation
         variance = np.einsum("nij,nj->ni", turn[models.model] ** 2, models.sigma**2) * self.formed.links.factor
         point = models.node < models.points
         plan, height = median(variance[point, :2].mean(axis=1)), median(variance[point, 2])
-        return float(np.sqrt(plan)), float(np.sqrt(height))
+        return absolute_orientation.PointPrecision(float(np.sqrt(plan)), float(np.sqrt(height)))
 
-    def extent(self, similarity: Similarity) -> tuple[float, float]:
-        xyz = similarity(self.formed.xyz)
-        base = np.linalg.norm(np.diff(similarity(self.formed.centers), axis=0), axis=1)
-        length = np.ptp(xyz[:, 0]) / self.formed.models.count
-        spacing = float(base[np.isfinite(base)].mean()) if np.isfinite(base).any() else float(length)
-        return spacing, max(quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
 
-    def differentiate(self, similarity: Similarity) -> model_errors.ModelErrors:
-        return model_errors.differentiate_models(self.formed, similarity)
+class OrientedModels(NamedTuple):
+    """A strip of independent models with the similarity that lays it on its control."""
 
-    def misclosure_covariance(self, oriented: Oriented) -> Callable[[Numbers], Floats]:
-        rows, factor = oriented.control_rows, self.formed.links.factor
-        return lambda some: model_misclosures.covariance(oriented.errors, oriented.misclosures.take(some), rows, factor)
+    linked: LinkedModels  # as it was laid
+    oriented: OrientedStrip
 
-    def control_rays(self, _: Oriented) -> tuple[()]:
-        return ()
 
-    def without_images(self, _: Mapping[str, Rejection]) -> LinkedModels:
-        return self
+def on_control(
+    linked: LinkedModels,
+    control: ControlPoints,
+    frames: Sequence[GroundFrame],
+    settings: absolute_orientation.AbsoluteSettings,
+) -> OrientedModels:
+    """Lay a strip on its control; upside down where without perspective centres nothing has told which way is up.
 
-    def screens_control(self, settings: Settings) -> bool:
-        return settings.links.screening != "none"
+    Raises GeometryError, InputError when the control does not determine the similarity, or strip and control are of
+        different hands; the strip is named.
+    """
+    strip, formed = linked.strip, linked.formed
+    inside, rows = control_of(formed, control, linked.measured.point_ids)
+    try:
+        oriented = to_ground(strip, formed, linked.point_precision, inside, rows, frames, settings)
+    except InputError as refusal:
+        if not any(fault.code == "left-handed-control" for fault in refusal.faults):
+            raise
+        if formed.upright:
+            raise _left_handed(strip) from refusal
+        linked = replace(linked, formed=formed.overturned())
+        oriented = to_ground(strip, linked.formed, linked.point_precision, inside, rows, frames, settings)
+    _refuse_other_hand(oriented)
+    return OrientedModels(linked, oriented)
 
-    def turned_over(self, refusal: InputError) -> LinkedModels:
-        """Return the strip upside down: without centres nothing has told which way is up."""
-        upside_down = any(fault.code == "left-handed-control" for fault in refusal.faults)
-        if not upside_down:
-            raise refusal
-        if self.formed.upright:
-            raise _left_handed(self.strip) from refusal
-        return replace(self, formed=self.formed.overturned())
 
-    def refuse_other_hand(self, oriented: Oriented) -> None:
-        """Refuse a strip that a mirror image of it would fit far better; flat ground does not tell."""
-        control, spread = oriented.control, oriented.precision
-        full = control.use.all(axis=1)
-        if full.sum() < LEAST_SOLID:
-            return
-        xyz = self.formed.xyz[oriented.control_rows]
-        targets = oriented.targets.of(xyz)[full]
-        as_it_is, mirrored = linking.either_hand(xyz[full], targets)
-        expected = ((control.sigma[full] ** 2).sum(axis=1) + 2 * spread[0] ** 2 + spread[1] ** 2).sum()
-        conspicuous = as_it_is > link_screening.CONSPICUOUS * expected
-        if conspicuous and mirrored < link_screening.REFLECTED * as_it_is:
-            raise _left_handed(self.strip)
+def _refuse_other_hand(oriented: OrientedStrip) -> None:
+    """Refuse a strip that a mirror image of it would fit far better; flat ground does not tell."""
+    control, spread = oriented.control, oriented.precision
+    full = control.use.all(axis=1)
+    if full.sum() < LEAST_SOLID:
+        return
+    xyz = oriented.formed.xyz[oriented.control_rows]
+    targets = oriented.targets.of(xyz)[full]
+    as_it_is, mirrored = linking.either_hand(xyz[full], targets)
+    expected = ((control.sigma[full] ** 2).sum(axis=1) + 2 * spread.plan**2 + spread.height**2).sum()
+    conspicuous = as_it_is > link_screening.CONSPICUOUS * expected
+    if conspicuous and mirrored < link_screening.REFLECTED * as_it_is:
+        raise _left_handed(oriented.strip)
 
-    def adjusted(self, screened: WithControlScreened, correction: Polynomial | None, _: Settings) -> StripResult:
-        """Adjust the points, and move the perspective centres with them."""
-        oriented, strip, formed = screened.oriented, self.strip, self.formed
-        xyz = oriented.xyz if correction is None else correction(oriented.xyz)
-        similarity = oriented.absolute.similarity
-        centers = _centers(formed, similarity, correction)
-        known = np.isfinite(centers).any()
-        return StripResult(
-            precision=oriented.precision,
-            intermediate=oriented.intermediate,
-            control=oriented.control,
-            control_rows=oriented.control_rows,
-            absolute=oriented.absolute,
-            polynomial=correction,
-            xyz=xyz,
-            cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
-            rays=formed.photo_count,
-            depth=float(np.nanmean(centers[:, 2]) - xyz[:, 2].mean()) if known else float("nan"),
-            notes=(
-                *link_notes(strip, self.measured, formed),
-                *notes.wrong_control_notes(strip, screened.screened_control),
-                *notes.control_notes(strip, oriented.absolute),
-                *notes.polynomial_notes(strip, correction, xyz),
-            ),
-            screened_control=screened.screened_control,
-            model_stages=ModelStages(
-                strip=strip,
-                formed=formed,
-                centers=centers,
-                scales=similarity.scale * formed.places.scale * MILLIMETRES,
-            ),
-        )
+
+def adjusted(models: OrientedModels, correction: Polynomial | None) -> StripResult:
+    """Adjust the points, and move the perspective centres with the ground below them."""
+    linked, oriented = models
+    strip, formed = linked.strip, linked.formed
+    xyz = oriented.xyz if correction is None else correction(oriented.xyz)
+    similarity = oriented.absolute.similarity
+    centers = _centers(formed, similarity, correction)
+    return StripResult(
+        precision=oriented.precision,
+        intermediate=oriented.intermediate,
+        control=oriented.control,
+        control_rows=oriented.control_rows,
+        absolute=oriented.absolute,
+        polynomial=correction,
+        xyz=xyz,
+        cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
+        rays=formed.photo_count,
+        depth=depth_of(centers, xyz),
+        notes=(
+            *link_notes(strip, linked.measured, formed),
+            *notes.control_notes(strip, oriented.absolute),
+            *notes.polynomial_notes(strip, correction, xyz),
+        ),
+        screened_control=not_screened(oriented.control),
+        model_stages=ModelStages(
+            strip=strip,
+            formed=formed,
+            centers=centers,
+            rotations=similarity.rotation @ formed.places.rotation,
+            scales=similarity.scale * formed.places.scale * MILLIMETRES,
+        ),
+    )
+
+
+def depth_of(centers: Floats, xyz: Floats) -> float:
+    """Mean height of perspective centres above the points, metres; NaN without any."""
+    known = np.isfinite(centers).any()
+    return float(np.nanmean(centers[:, 2]) - xyz[:, 2].mean()) if known else float("nan")
 
 
 def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> LinkedModels:
@@ -159,7 +156,7 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
     except GeometryError as error:
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, code=error.code) from error
-    kept = _named(settings.links.keep, strip, measured, models)
+    kept = rows_of_models(settings.links.keep, measured)[models.row]
     links = link_screening.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
     _refuse_reflected(strip, links)
     photos = locate(strip.photos, measured.photo_ids)
@@ -180,18 +177,8 @@ def models_of(strip: ModelStrip, measured: ModelPoints, settings: LinkSettings) 
         xyz=measured.xyz[rows],
         sigma=measured.sigma[rows],
     )
-    left = ~_named(settings.drop, strip, measured, whole)
+    left = ~rows_of_models(settings.drop, measured)[rows]
     return take_rows(whole, left, ("row", "model", "node", "xyz", "sigma"))
-
-
-def _named(names: Sequence[str], strip: ModelStrip, measured: ModelPoints, models: StripModels) -> Flags:
-    """Rows that the user names as ``model/point`` or ``model/photo``."""
-    found = np.zeros(len(models.model), bool)
-    wanted = set(names)
-    if wanted:
-        for row, (model, node) in enumerate(zip(models.model.tolist(), models.node.tolist(), strict=True)):
-            found[row] = f"{strip.models[model]}/{measured.name(node).removeprefix(CENTER)}" in wanted
-    return found
 
 
 def _refuse_reflected(strip: ModelStrip, links: ScreenedLinks) -> None:
@@ -214,7 +201,7 @@ def _refuse_reflected(strip: ModelStrip, links: ScreenedLinks) -> None:
     raise InputError(fault)
 
 
-def _left_handed(strip: ModelStrip) -> InputError:
+def _left_handed(strip: Strip | ModelStrip) -> InputError:
     """Say that models and control are of different hands."""
     return InputError(
         Fault(

@@ -159,12 +159,13 @@ def _used(terms: list[tuple[str, ...]]) -> str:
     return names[0] if names[0] == names[1] else f"{names[0]} in plan, {names[1]} in height"
 
 
-def _precision(strip: IdealStrip) -> tuple[float, float]:
+def _precision(strip: IdealStrip) -> absolute_orientation.PointPrecision:
     """A-priori standard deviation of a point of one model in plan and height, metres, as a run takes it."""
     geometry = strip.geometry
     plan = geometry.image_sigma * geometry.scale / 1000.0
     depth = float(strip.centers[:, 2].mean())
-    return plan, plan * float(np.sqrt(2.0)) * depth / geometry.base
+    height = plan * float(np.sqrt(2.0)) * depth / geometry.base
+    return absolute_orientation.PointPrecision(plan, height)
 
 
 def _bundle(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], control: ControlPoints) -> Accuracy:

@@ -95,7 +95,7 @@ def _of_model(
     given = strip.control.take(control)
     targets = Targets(given, frames, strip.intermediate)
     residual = targets.misclosures(xyz, targets.axes(xyz))[:, 2]
-    sigma = np.hypot(strip.precision[1], given.sigma[:, 2])
+    sigma = np.hypot(strip.precision.height, given.sigma[:, 2])
     width = float(np.abs(xy[:, 1]).max())
     surface = fit_paraboloid(xy, residual, sigma)
     return ModelDeformation(

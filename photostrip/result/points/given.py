@@ -168,7 +168,9 @@ def _expected(result: Result, held: Flags) -> Floats:
     """
     control, bundle = result.inputs.control, result.bundle
     of_bundle = None if bundle is None or result.precision is None else result.precision.points
-    of_models = np.array([[s.precision[0], s.precision[0], s.precision[1]] for s in result.strips]).reshape(-1, 3)
+    of_models = np.array([[s.precision.plan, s.precision.plan, s.precision.height] for s in result.strips]).reshape(
+        -1, 3
+    )
     variance = (held.T @ of_models**2) / np.maximum(held.sum(axis=0), 1)[:, None]
     for index, frame in enumerate(result.frames):
         rows = np.flatnonzero((control.frame == index) & (result.control_rows >= 0))
