@@ -105,7 +105,7 @@ def _gains(
     common = np.concatenate([known, rest, np.zeros(len(prepared.prior) - len(known) - len(rest))])
     state = replace(solution.state, common=common)
     equations = equations_at(prepared, state)
-    found = factored(equations, datum.anchor(equations.own, prepared.rank, state) if solution.free else None)
+    found = factored(equations, datum.anchor(equations.unreduced, prepared.rank, state) if solution.free else None)
     if found is None:
         return [0.0] * len(columns)
     pull = equations.right_common - found.cross.T @ equations.right_photos

@@ -72,6 +72,7 @@ class NormalEquations:
     # between rays. NaN where the matrix is not positive definite
     strength: Floats
     carried: bsr_array  # (u m, 3 q): T
+    unreduced: Floats  # (m, u, u): A'A of each photo, with what positions and attitudes add
     blocks: Floats  # (b, u, u): A'A - T T' for each pair of photos, with what positions and attitudes add
     border: Floats  # (u m, p): A'C - T R
     common_points: csr_array  # (3 q, p): R
@@ -144,6 +145,7 @@ def equations_at(prepared: PreparedProblem, state: Parameters, damping: float = 
         root=root,
         strength=strength,
         carried=carried,
+        unreduced=own,
         blocks=blocks,
         border=border,
         common_points=common_points,

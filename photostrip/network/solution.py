@@ -62,7 +62,7 @@ class BundleSolution:
     def factored(self) -> FactoredEquations:
         """The normal equations at the solution in factors; ``bundle-rank`` where they are singular."""
         equations = self.equations or equations_at(self.prepared, self.state)
-        anchor = datum.anchor(equations.own, self.prepared.rank, self.state) if self.free else None
+        anchor = datum.anchor(equations.unreduced, self.prepared.rank, self.state) if self.free else None
         found = factored(equations, anchor)
         if found is None:
             raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")

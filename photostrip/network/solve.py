@@ -132,7 +132,7 @@ class _Move(NamedTuple):
 def _move(state: Parameters, equations: NormalEquations, damping: float, *, free: bool) -> _Move:
     """Find the step of all parameters from the normal equations."""
     prepared = equations.prepared
-    anchor = datum.anchor(equations.own, prepared.rank, state) if free else None
+    anchor = datum.anchor(equations.unreduced, prepared.rank, state) if free else None
     added = anchor
     if damping:
         added = np.eye(prepared.problem.unknowns) * (damping * equations.own) + (0.0 if anchor is None else anchor)

@@ -19,7 +19,7 @@ ROTATION = {
     "geocentric": "the geocentric axes X, Y, Z",
     "local": "the axes east, north, up of the local frame",
 }
-OF_PHOTOS, OF_MODELS = ("relative", "formation", "bundle", "interior", "refinement"), ("links",)
+OF_PHOTOS, OF_MODELS = ("relative", "formation", "interior", "refinement"), ("links",)
 EFFECTS = ("principal point", "distortion", "refraction")
 MEANT_OF_PHOTOS = ("vx_um, vy_um", "q_um")
 MEANT_OF_MODELS = {

@@ -39,7 +39,9 @@ def counts_of(result: Result, measurements: int) -> Document:
     transfers = [each.formed.junctions.used for each in photos]
     transfers += [strip.of_models.formed.links.used for strip in result.model_strips]
     bundle = result.bundle
-    used = sum(len(each.rows) for each in photos) if bundle is None else int(bundle.screened.selection.images.sum())
+    used = sum(len(each.rows) for each in photos)
+    if bundle is not None and not result.model_strips:
+        used = int(bundle.screened.selection.images.sum())
     out = [] if bundle is None else [each for each in bundle.screened.rejections if not each.readmitted]
     return {
         "strips": len(result.inputs.flights),
@@ -142,10 +144,14 @@ def _of_models(result: Result) -> Document:
     share = redundancy / max(int(redundancy.sum()), 1)
     ratio = np.sqrt((share * np.nan_to_num([links.sigma0(strip) ** 2 for strip in strips])).sum())
     stated = rms(np.array([links.stated_sigma(strip) for strip in strips]))
+    freedom = int(redundancy.sum())
+    if result.bundle is not None:
+        solution = result.bundle.screened.solution
+        ratio, freedom = solution.sigma0, solution.redundancy
     return {
-        "sigma0_um": 1000.0 * (ratio * stated) if redundancy.sum() else None,
+        "sigma0_um": 1000.0 * (ratio * stated) if freedom else None,
         "sigma_given_um": 1000.0 * stated,
-        "redundancy": int(redundancy.sum()),
+        "redundancy": freedom,
         "max_parallax_um": None,
         "image_rms_um": None,
         "photo_scale": None,

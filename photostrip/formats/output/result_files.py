@@ -46,7 +46,7 @@ def beside_json(document: Document, resolved: str, result: Result | None) -> dic
         "parallaxes.csv": _grouped(tables.parallaxes_csv(), document["parallaxes"]),
         "rejected.csv": rejected_csv(document),
     }
-    if "bundle" in document:
+    if "bundle" in document and "link_residuals" not in document:
         files["reliability.csv"] = _table(tables.reliability_csv(), _checked_rays(document["residuals"]))
     if "link_residuals" in document:
         files["links.csv"] = _grouped(tables.links_csv(), document["link_residuals"])

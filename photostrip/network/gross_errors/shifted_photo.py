@@ -115,7 +115,7 @@ class _Network:
         prepared = prepare(selected(freed, self.plain))
         state = prepared.begun
         equations = equations_at(prepared, state)
-        found = factored(equations, datum.anchor(equations.own, prepared.rank, state))
+        found = factored(equations, datum.anchor(equations.unreduced, prepared.rank, state))
         if found is None:
             return np.zeros(len(photos))
         normal = found.left.reshape(len(photos), 2, len(photos), 2)[photos, :, photos]

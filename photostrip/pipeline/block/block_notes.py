@@ -96,7 +96,7 @@ def _contradiction(problem: BundleProblem, each: Rejection) -> tuple[str, tuple[
     if each.kind == reliability.CONTROL:
         name = problem.point_name(int(problem.control.point[each.row]))
         size = f"{axis} by about {each.worst:+.2f} m"
-        text = f"control point {name} contradicts the photos and the other control: {size}"
+        text = f"control point {name} contradicts the {problem.unit}s and the other control: {size}"
         return f"{text} ({reached})", (), (name,)
     part = problem.positions if each.kind == reliability.POSITION else problem.attitudes
     photo = problem.photo_name(int(part.photo[each.row]))

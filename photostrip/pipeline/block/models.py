@@ -17,7 +17,7 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
 from photostrip.network.selection import Selection
 from photostrip.pipeline.block import block_notes
-from photostrip.pipeline.block.problem import control_observations
+from photostrip.pipeline.block.problem import control_begun, control_observations
 from photostrip.pipeline.common_points import mean_points
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import MeasuredModels, Settings
@@ -126,7 +126,11 @@ def build(
     return BlockProblem(
         problem=problem,
         origin=origin,
-        begin=replace(Selection.everything(problem), images=_begun(agree, rows, start, measured)),
+        begin=replace(
+            Selection.everything(problem),
+            images=_begun(agree, rows, start, measured),
+            control=control_begun(problem, control, control_rows, start),
+        ),
         kept=rows_of_models(settings.links.keep, measured)[rows],
         rows=rows,
         control=control_rows,

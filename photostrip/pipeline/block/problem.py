@@ -294,9 +294,14 @@ def _begin(
         if strangers := start.strangers.get(strip.strip.id):
             of_strip = np.isin(images.photo, start.rows_of(strip.strip.photos))
             inside &= ~(of_strip & np.isin(images.point, list(strangers)))
-    whole = Selection.everything(problem)
-    given = whole.control.copy()
+    given = control_begun(problem, control, control_rows, start)
+    return replace(Selection.everything(problem), images=inside | (free & (miss <= far)), control=given)
+
+
+def control_begun(problem: BundleProblem, control: ControlPoints, control_rows: Numbers, start: BlockStart) -> Flags:
+    """Control coordinates (c, 3) that take part at first: those that the strips by themselves did not reject."""
+    given = Selection.everything(problem).control
     wrong = {strip.control.ids[each.row]: list(each.axes) for strip in start.strips for each in strip.wrong_control}
     for row, number in enumerate(control_rows.tolist()):
         given[row, wrong.get(control.ids[number], [])] = False
-    return replace(whole, images=inside | (free & (miss <= far)), control=given)
+    return given

@@ -30,8 +30,8 @@ def adjust_formed(
     """Lay a formed strip on its control and correct its deformation."""
     if isinstance(stage, FormedPhotos):
         return adjust_photos(photos_on_control.on_control(stage, control, frames, settings), settings)
-    found = models.on_control(stage, control, frames, settings.absolute)
-    return models.adjusted(found, _correction(found.oriented, settings))
+    found = models.on_control(stage, control, frames, settings)
+    return models.adjusted(found, _correction(found.models.oriented, settings))
 
 
 def _correction(oriented: OrientedStrip, settings: Settings) -> polynomial.Polynomial | None:

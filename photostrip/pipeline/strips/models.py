@@ -7,11 +7,16 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_array
 
-from photostrip.arrays import Floats, median
+from photostrip.arrays import Floats, Numbers, median
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.geometry.similarity import Similarity
+from photostrip.geometry.similarity import Similarity, similarity_derivatives
+from photostrip.network.cofactors import joint_cofactors
+from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
+from photostrip.network.solution import BundleSolution
+from photostrip.network.solve import solve
 from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
 from photostrip.pipeline.overruling import rows_of_models
 from photostrip.pipeline.results import ModelStages, StripResult
@@ -20,7 +25,8 @@ from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, to_gr
 from photostrip.pipeline.strips.model_notes import link_notes
 from photostrip.points import ControlPoints, ModelPoints, locate, take_rows
 from photostrip.strip import absolute_orientation
-from photostrip.strip.gross_errors.control.control_screening import not_screened
+from photostrip.strip.error_propagation.strip_at_control import StripAtControl
+from photostrip.strip.gross_errors.control import control_screening
 from photostrip.strip.independent_models import link_screening, linking, perspective_centers
 from photostrip.strip.independent_models.formation import FormedModels, form_from_models, require_links
 from photostrip.strip.independent_models.link_screening import ScreenedLinks
@@ -29,6 +35,7 @@ from photostrip.strip.independent_models.settings import LinkSettings
 from photostrip.strip.polynomial.correction import Polynomial
 from photostrip.units import MILLIMETRES
 
+OVER = np.array([1.0, -1.0, -1.0])  # turns a strip by 180 degrees about its X axis
 LEAST_SOLID = 4  # points that can tell a body from its mirror image
 
 
@@ -38,7 +45,9 @@ class LinkedModels:
 
     strip: ModelStrip
     measured: ModelPoints  # model coordinates of the whole project
-    formed: FormedModels
+    formed: FormedModels  # with points and models as all its links together place them
+    network: BundleSolution  # of its models alone, in the system of the strip; points are those of the project
+    over: bool = False  # whether the strip has been turned over since
 
     @property
     def point_precision(self) -> absolute_orientation.PointPrecision:
@@ -50,6 +59,10 @@ class LinkedModels:
         plan, height = median(variance[point, :2].mean(axis=1)), median(variance[point, 2])
         return absolute_orientation.PointPrecision(float(np.sqrt(plan)), float(np.sqrt(height)))
 
+    def overturned(self) -> LinkedModels:
+        """Return the strip turned by 180 degrees about its X axis; its network stays as it was."""
+        return replace(self, formed=self.formed.overturned(), over=not self.over)
+
 
 class OrientedModels(NamedTuple):
     """A strip of independent models with the similarity that lays it on its control."""
@@ -57,8 +70,62 @@ class OrientedModels(NamedTuple):
     linked: LinkedModels  # as it was laid
     oriented: OrientedStrip
 
+    def misclosure_covariance(self, some: Numbers) -> Floats:
+        """Covariance of misclosures at the control, strip and control together, metres^2, but for a similarity."""
+        linked, similarity = self.linked, self.oriented.absolute.similarity
+        found = self.oriented.misclosures.take(some)
+        node = linked.formed.point[found.row]
+        turned = similarity.rotation * (OVER if linked.over else 1.0)
+        rows, across = np.arange(len(some)), found.direction @ turned * similarity.scale
+        columns = 3 * node[:, None] + np.arange(3)
+        places = (np.repeat(rows, 3), columns.ravel())
+        functions = csr_array((across.ravel(), places), shape=(len(some), 3 * len(linked.network.points)))
+        joint = joint_cofactors(linked.network, functions) * linked.formed.links.factor
+        return np.asarray(joint + np.diag(found.variance), float)
+
+
+class ScreenedModels(NamedTuple):
+    """A strip of independent models on the control that is not contradicted by the strip and the other control."""
+
+    models: OrientedModels
+    screened_control: control_screening.ScreenedControl
+
 
 def on_control(
+    linked: LinkedModels,
+    control: ControlPoints,
+    frames: Sequence[GroundFrame],
+    settings: Settings,
+) -> ScreenedModels:
+    """Lay a strip on that of its control which nothing contradicts.
+
+    Raises as ``orient_on_control`` does.
+    """
+    models = orient_on_control(linked, control, frames, settings.absolute)
+    if settings.links.screening == "none":
+        return ScreenedModels(models, control_screening.not_screened(models.oriented.control))
+    oriented = models.oriented
+    found = oriented.misclosures
+    moved = similarity_derivatives(oriented.at_control[found.point], oriented.at_control.mean(axis=0))
+    screened = control_screening.screen_control(
+        StripAtControl(
+            targets=oriented.targets,
+            xyz=linked.formed.xyz[oriented.control_rows],
+            similarity=oriented.absolute.similarity,
+            weight=oriented.weights,
+            rays=(),
+            coordinates=found,
+            design=np.einsum("wi,wij->wj", found.direction, moved),
+            covariance=models.misclosure_covariance,
+            share=1.0,
+        )
+    )
+    if screened.rejections:
+        models = orient_on_control(linked, screened.kept, frames, settings.absolute)
+    return ScreenedModels(models, screened)
+
+
+def orient_on_control(
     linked: LinkedModels,
     control: ControlPoints,
     frames: Sequence[GroundFrame],
@@ -78,7 +145,7 @@ def on_control(
             raise
         if formed.upright:
             raise _left_handed(strip) from refusal
-        linked = replace(linked, formed=formed.overturned())
+        linked = linked.overturned()
         oriented = to_ground(strip, linked.formed, linked.point_precision, inside, rows, frames, settings)
     _refuse_other_hand(oriented)
     return OrientedModels(linked, oriented)
@@ -99,9 +166,9 @@ def _refuse_other_hand(oriented: OrientedStrip) -> None:
         raise _left_handed(oriented.strip)
 
 
-def adjusted(models: OrientedModels, correction: Polynomial | None) -> StripResult:
+def adjusted(screened: ScreenedModels, correction: Polynomial | None) -> StripResult:
     """Adjust the points, and move the perspective centres with the ground below them."""
-    linked, oriented = models
+    linked, oriented = screened.models
     strip, formed = linked.strip, linked.formed
     xyz = oriented.xyz if correction is None else correction(oriented.xyz)
     similarity = oriented.absolute.similarity
@@ -119,10 +186,11 @@ def adjusted(models: OrientedModels, correction: Polynomial | None) -> StripResu
         depth=depth_of(centers, xyz),
         notes=(
             *link_notes(strip, linked.measured, formed),
+            *notes.wrong_control_notes(strip, screened.screened_control),
             *notes.control_notes(strip, oriented.absolute),
             *notes.polynomial_notes(strip, correction, xyz),
         ),
-        screened_control=not_screened(oriented.control),
+        screened_control=screened.screened_control,
         model_stages=ModelStages(
             strip=strip,
             formed=formed,
@@ -140,7 +208,36 @@ def depth_of(centers: Floats, xyz: Floats) -> float:
 
 
 def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> LinkedModels:
-    return LinkedModels(strip, measured, form_models(strip, measured, settings))
+    """Link the models of a strip and adjust them by themselves, without any control."""
+    formed = form_models(strip, measured, settings)
+    models, places = formed.models, formed.places
+    rows = np.flatnonzero(formed.used)
+    of_project = models.row[rows]
+    nodes = np.zeros((len(measured.point_ids) + len(measured.photo_ids), 3))
+    nodes[formed.node] = formed.node_xyz
+    network = solve(
+        BundleProblem(
+            images=ModelObservations(
+                photo=models.model[rows],
+                point=models.node[rows],
+                xy=models.xyz[rows],
+                sigma=models.sigma[rows],
+                correlation=None if measured.correlation is None else measured.correlation[of_project],
+            ),
+            cameras=BundleCameras(of_photo=np.zeros(0, np.intp), focal=np.zeros(0)),
+            start=StartValues(places.shift, places.rotation, nodes, places.scale),
+            photo_ids=strip.models,
+            point_ids=tuple(map(measured.name, range(len(nodes)))),
+        )
+    )
+    adjusted = linking.Similarities(network.scales, network.rotations, network.centers)
+    formed = replace(
+        formed,
+        places=adjusted,
+        model_xyz=adjusted.of(models.model, models.xyz),
+        node_xyz=network.points[formed.node],
+    )
+    return LinkedModels(strip, measured, formed, network)
 
 
 def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> FormedModels:

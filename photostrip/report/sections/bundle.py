@@ -12,9 +12,16 @@ from photostrip.report.page.numbers import fixed, metres, power, short, unit
 from photostrip.report.page.parts import DASH, Facts, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
-NAMES = {"image": "image coordinates", "control": "control", "position": "camera positions", "attitude": "attitudes"}
+NAMES = {
+    "image": "image coordinates",
+    "model": "model coordinates",
+    "control": "control",
+    "position": "camera positions",
+    "attitude": "attitudes",
+}
 ONE = {
     "image": "image coordinate",
+    "model": "model coordinate",
     "control": "control coordinate",
     "position": "camera position coordinate",
     "attitude": "attitude angle",
@@ -81,7 +88,8 @@ def _degrees(block: Document) -> str:
 def _adjustment(block: Document, angles: AngleUnit) -> Section:
     test, screening, unknowns = block["sigma0_test"], block["screening"], block["unknowns"]
     observed = ", ".join(counted(number, ONE[kind]) for kind, number in block["observations"].items())
-    parts = f"{sum(unknowns.values())}: {unknowns['photos']} of photos, {unknowns['points']} of points"
+    units = "models" if "models" in unknowns else "photos"
+    parts = f"{sum(unknowns.values())}: {unknowns[units]} of {units}, {unknowns['points']} of points"
     parts += f", {unknowns['common']} common" if unknowns["common"] else ""
     facts = [
         ("datum", _datum(block)),
@@ -101,7 +109,8 @@ def _adjustment(block: Document, angles: AngleUnit) -> Section:
     )
     steps = [{"count": count, **step} for count, step in enumerate(block["convergence"], 1)]
     note = "of the last adjustment, from the one before it; length: of the step, in standard deviations"
-    return Section("Bundle adjustment", (Facts(tuple(facts)), tabulated(steps, columns, note=note)))
+    title = "Network of independent models" if units == "models" else "Bundle adjustment"
+    return Section(title, (Facts(tuple(facts)), tabulated(steps, columns, note=note)))
 
 
 def _datum(block: Document) -> str:
@@ -162,7 +171,7 @@ def _named(title: str, rows: Sequence[Document]) -> list[Part]:
         return []
     columns = (
         words(title, _name),
-        words("photo", lambda each: each["photo"] or DASH),
+        words("model" if "model" in rows[0] else "photo", lambda each: each.get("model", each["photo"]) or DASH),
         words("point", lambda each: each["point"] or DASH),
         words("", "axis"),
         number("r", "redundancy", 2),

@@ -53,9 +53,8 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
 
 def _adjustment(document: Document) -> str:
     if "bundle" in document:
-        return "bundle, which all photos together determine"
-    if of_models(document):
-        return "polynomial: independent models have no image coordinates"
+        units = "models" if of_models(document) else "photos"
+        return f"bundle, which all {units} together determine"
     return "polynomial: no bundle could be had, the notes say why"
 
 

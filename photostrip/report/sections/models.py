@@ -83,10 +83,10 @@ def models_section(document: Document, *, everything: bool) -> Section:
         ("models", "models", "models"),
         everything=everything,
     )
+    placed = "has one position in the network" if "bundle" in document else "gets the mean of its positions"
     text = (
         "The models are independent: each has its own scale, rotation and origin, and is linked to the model before "
-        "it. A point in several models gets the mean of its positions. The rotations of the photos are not known from "
-        "model coordinates."
+        f"it. A point in several models {placed}. The rotations of the photos are not known from model coordinates."
     )
     counts: dict[int, int] = {}
     for point in document["points"]:

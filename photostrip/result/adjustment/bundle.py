@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers, median
-from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.network import reliability
+from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import BundleSettings
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result
@@ -22,9 +23,6 @@ from photostrip.result.quantities import grouped, record, records
 from photostrip.result.records import Records, as_records
 from photostrip.units import MICROMETRES
 
-if TYPE_CHECKING:
-    from photostrip.network.problem import BundleProblem
-
 OBSERVED = (reliability.IMAGE, reliability.CONTROL, reliability.POSITION, reliability.ATTITUDE)
 SHOWN = 10  # observations named as the weakest and as the worst
 RELIABILITY = ("redundancy_x", "redundancy_y", "test_x", "test_y", "detectable_x_um", "detectable_y_um")
@@ -33,18 +31,20 @@ RELIABILITY = ("redundancy_x", "redundancy_y", "test_x", "test_y", "detectable_x
 class GroupKind(NamedTuple):
     """How observations of a kind are written."""
 
+    name: str
     axes: tuple[str, ...]
     unit: str
     factor: float  # of the unit in the unit of the adjustment
 
 
-def kinds(angle_unit: str) -> dict[str, GroupKind]:
+def kinds(problem: BundleProblem, angle_unit: str) -> dict[str, GroupKind]:
     """Return how observations are written, with angles in the unit of the output."""
+    measured = GroupKind("model", CARTESIAN_AXES, "um", MICROMETRES)
     return {
-        reliability.IMAGE: GroupKind(("x", "y"), "um", MICROMETRES),
-        reliability.CONTROL: GroupKind(GROUND_AXES, "m", 1.0),
-        reliability.POSITION: GroupKind(GROUND_AXES, "m", 1.0),
-        reliability.ATTITUDE: GroupKind(("1", "2", "3"), angle_unit, PER_RADIAN[angle_unit]),
+        reliability.IMAGE: measured if problem.of_models else GroupKind("image", ("x", "y"), "um", MICROMETRES),
+        reliability.CONTROL: GroupKind("control", GROUND_AXES, "m", 1.0),
+        reliability.POSITION: GroupKind("position", GROUND_AXES, "m", 1.0),
+        reliability.ATTITUDE: GroupKind("attitude", ("1", "2", "3"), angle_unit, PER_RADIAN[angle_unit]),
     }
 
 
@@ -56,16 +56,16 @@ def bundle_of(result: Result) -> Document:
     screened, settings = found.screened, result.settings.bundle
     problem, solution = screened.problem, screened.solution
     shift = reliability.noncentrality(screened.limit.alpha, settings.power)
-    written = kinds(result.settings.angle_unit)
+    written = kinds(problem, result.settings.angle_unit)
     block: Document = {
         "free_network": solution.free,
         "sigma0": solution.sigma0,
         "redundancy": solution.redundancy,
         "sigma0_test": _sigma0(found),
-        "observations": {group.kind: int(np.isfinite(group.sigma).sum()) for group in found.groups},
+        "observations": {written[group.kind].name: int(np.isfinite(group.sigma).sum()) for group in found.groups},
         "unknowns": {
-            "photos": 6 * problem.photos,
-            "points": 3 * len(result.points.number),
+            f"{problem.unit}s": problem.unknowns * problem.photos,
+            "points": 3 * int(np.isfinite(screened.precision.points[:, 0, 0]).sum()),
             "common": len(solution.common),
         },
         "iterations": len(solution.steps),
@@ -80,7 +80,7 @@ def bundle_of(result: Result) -> Document:
             }
             for step in solution.steps
         ],
-        "screening": _screening(found, settings),
+        "screening": _screening(found, settings, written),
         "reliability": {
             "power": settings.power,
             "noncentrality": shift,
@@ -114,7 +114,7 @@ def _sigma0(found: Bundle) -> Document:
     }
 
 
-def _screening(found: Bundle, settings: BundleSettings) -> Document:
+def _screening(found: Bundle, settings: BundleSettings, written: Mapping[str, GroupKind]) -> Document:
     screened = found.screened
     out = [each for each in screened.rejections if not each.readmitted]
     return {
@@ -122,7 +122,7 @@ def _screening(found: Bundle, settings: BundleSettings) -> Document:
         "test": settings.test,
         "alpha": screened.limit.alpha,
         "limit": screened.limit.value,
-        "rejected": {kind: sum(each.kind == kind for each in out) for kind in OBSERVED},
+        "rejected": {written[kind].name: sum(each.kind == kind for each in out) for kind in OBSERVED},
         "readmitted": len(screened.rejections) - len(out),
     }
 
@@ -199,7 +199,7 @@ def _group(group: reliability.Group, shift: float, kind: GroupKind) -> Document:
     detectable = group.detectable(shift)[given][controlled] * kind.factor if controlled.any() else nothing
     external = group.external(shift)[given][controlled] if controlled.any() else nothing
     return {
-        "group": group.kind,
+        "group": kind.name,
         "observations": int(given.sum()),
         "redundancy": share.sum(),
         "mean": share.mean(),
@@ -219,7 +219,7 @@ def with_reliability(result: Result, images: Sequence[ImageResiduals], residuals
     Without a bundle adjustment the list stays as it is.
     """
     found = result.bundle
-    if found is None:
+    if found is None or result.model_strips:
         return residuals
     shift = reliability.noncentrality(found.screened.limit.alpha, result.settings.bundle.power)
     (group,) = (each for each in found.groups if each.kind == reliability.IMAGE)
@@ -257,8 +257,9 @@ def _observed(found: Bundle, group: reliability.Group, at: Numbers, shift: float
     checked = group.redundancy[row, axis] >= UNCONTROLLED
     external = np.where(checked, group.external(shift)[row, axis], np.nan)
     return {
-        "kind": [group.kind] * count,
-        "photo": [photo for photo, _ in names],
+        "kind": [kind.name] * count,
+        "photo": [None if problem.of_models else unit for unit, _ in names],
+        **({"model": [unit for unit, _ in names]} if problem.of_models else {}),
         "point": [point for _, point in names],
         "axis": [kind.axes[each] for each in axis.tolist()],
         "redundancy": group.redundancy[row, axis],
@@ -287,7 +288,7 @@ def _effect(found: Bundle, kind: str, row: Numbers, external: Floats) -> Floats:
 
 
 def names_of_observation(problem: BundleProblem, kind: str, row: int) -> tuple[str | None, str | None]:
-    """Return photo and point of an observation, as far as it has them."""
+    """Return photo, or model, and point of an observation, as far as it has them."""
     if kind == reliability.IMAGE:
         images = problem.images
         return problem.photo_name(int(images.photo[row])), problem.point_name(int(images.point[row]))

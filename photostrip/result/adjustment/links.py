@@ -56,7 +56,7 @@ def _models(strip: StripResult) -> Records:
         "base_formed": np.linalg.norm(np.diff(formed.centers, axis=0), axis=1) * strip.absolute.similarity.scale,
         "scale_factor": formed.places.scale,
         "model_scale": strip.of_models.scales,
-        "rotation": (strip.absolute.similarity.rotation @ formed.places.rotation).reshape(-1, 9),
+        "rotation": strip.of_models.rotations.reshape(-1, 9),
     }
     return records("models", columns)
 

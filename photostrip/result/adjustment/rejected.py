@@ -8,6 +8,7 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.network.gross_errors.ray_log import START
+from photostrip.network.problem import BundleProblem
 from photostrip.notes import Document
 from photostrip.pipeline.results import Bundle, Result, StripResult
 from photostrip.points import PhotoPoints
@@ -27,6 +28,10 @@ REASONS = {
     WRONG_RAY: "the other rays of the point meet without it",
     TWO_RAYS: "the two rays of the point contradict each other: neither is used",
     SEVERAL_RAYS: "the rays of the point contradict each other, and it cannot be told which is wrong: none is used",
+}
+REASONS_OF_MODELS = {
+    TWO_RAYS: "two models contradict each other at the point: it takes part in neither",
+    SEVERAL_RAYS: "the models contradict each other at the point, and it cannot be told which is wrong: none counts",
 }
 EMPTY: Document = {
     "strip": "",
@@ -66,7 +71,7 @@ def rejected_of(result: Result) -> list[Document]:
         found += [_from_control(strip, wrong, strip.control.ids[wrong.row]) for wrong in strip.wrong_control]
     if result.bundle is None:
         return found
-    written = kinds(result.settings.angle_unit)
+    written = kinds(result.bundle.block.problem, result.settings.angle_unit)
     return _after_bundle(result.bundle, found) + _from_bundle(result.bundle, written)
 
 
@@ -290,6 +295,7 @@ def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
     rows = []
     for each in rejected:
         photos = [photo for photo in (each["photo"], each["other_photo"]) if photo is not None]
+        photos = each.get("models", photos)
         back = all((photo, each["point"]) in used for photo in photos) if photos else each["point"] in held
         rows.append(each | after_all if back else each)
     return rows
@@ -298,7 +304,12 @@ def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
 def _from_bundle(found: Bundle, written: Mapping[str, GroupKind]) -> list[Document]:
     """Observations that the search in the bundle took out, in its order; what it began without by point and photo."""
     every, problem = found.screened.rejections, found.block.problem
-    strip_of = {photo: strip.strip.id for strip in reversed(found.start.strips) for photo in strip.strip.photos}
+    of_models = problem.of_models
+    strip_of = {
+        unit: strip.strip.id
+        for strip in reversed(found.start.strips)
+        for unit in (strip.of_models.strip.models if of_models else strip.strip.photos)
+    }
     entries: list[Document] = [{}] * len(every)
     for name, kind in written.items():
         places = [place for place, each in enumerate(every) if each.kind == name]
@@ -306,8 +317,9 @@ def _from_bundle(found: Bundle, written: Mapping[str, GroupKind]) -> list[Docume
         names = [names_of_observation(problem, name, each.row) for each in some]
         size = [rounded(each.worst * kind.factor, DECIMALS_BY_UNIT[kind.unit]) for each in some]
         made = _entries(
-            strip=[strip_of.get(photo or "", "") for photo, _ in names],
-            photo=[photo for photo, _ in names],
+            strip=[strip_of.get(unit or "", "") for unit, _ in names],
+            photo=[None if of_models else unit for unit, _ in names],
+            **({"models": [[] if unit is None else [unit] for unit, _ in names]} if of_models else {}),
             point=[point for _, point in names],
             stage="bundle",
             test=[each.test for each in some],
@@ -317,10 +329,10 @@ def _from_bundle(found: Bundle, written: Mapping[str, GroupKind]) -> list[Docume
             size_unit=[kind.unit] * len(some),
             readmitted=[each.readmitted for each in some],
             blamed=[
-                [photo] if each.cause == WRONG_RAY and not each.readmitted else []
-                for each, (photo, _) in zip(some, names, strict=True)
+                [unit] if each.cause == WRONG_RAY and not each.readmitted and not of_models else []
+                for each, (unit, _) in zip(some, names, strict=True)
             ],
-            reason=[_reason_of_bundle(each, kind, shift) for each, shift in zip(some, size, strict=True)],
+            reason=[_reason_of_bundle(each, kind, shift, problem) for each, shift in zip(some, size, strict=True)],
         )
         for place, entry in zip(places, made, strict=True):
             entries[place] = entry
@@ -329,11 +341,11 @@ def _from_bundle(found: Bundle, written: Mapping[str, GroupKind]) -> list[Docume
     return begun + [each for each in entries if each["test"] != START]
 
 
-def _reason_of_bundle(each: Rejection, kind: GroupKind, size: Plain) -> str:
+def _reason_of_bundle(each: Rejection, kind: GroupKind, size: Plain, problem: BundleProblem) -> str:
     if each.readmitted:
         return "taken back: it fits after the others went"
     if each.cause in {TWO_RAYS, SEVERAL_RAYS}:
-        return REASONS[each.cause]
+        return REASONS_OF_MODELS[each.cause] if problem.of_models else REASONS[each.cause]
     if size is None:
         return "does not fit the other observations"
     return f"{kind.axes[each.axes[0]]} is wrong by about {size:+g} {kind.unit.replace('um', 'µm')}"

@@ -58,7 +58,7 @@ def _of_strip(result: Result, strip: StripResult, rank: Numbers) -> ImageResidua
 
 
 def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
-    if result.bundle is None:
+    if result.bundle is None or not result.bundle.singles:
         return []
     observations = result.refined.observations
     known = np.full((len(observations.point_ids), 3), np.nan)
