@@ -23,14 +23,13 @@ limit_threads()  # as the command does, before numpy is imported
 import numpy as np  # noqa: E402
 
 from photostrip.geometry.rotation import from_vector  # noqa: E402
+from photostrip.network.settings import BundleSettings  # noqa: E402
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings  # noqa: E402
 from photostrip.pipeline.run import triangulate  # noqa: E402
-from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
-from photostrip.pipeline.strips.models import form_models, link_strip  # noqa: E402
+from photostrip.pipeline.strips.models import form_models  # noqa: E402
 from photostrip.points import ModelPoints, PhotoPoints  # noqa: E402
 from photostrip.simulation import Control, Flight, Image, Models, Points, Simulation, Spec, simulate  # noqa: E402
 from photostrip.strip.independent_models.settings import LinkSettings  # noqa: E402
-from photostrip.strip.polynomial import correction  # noqa: E402
 from photostrip.strip.relative_orientation.orientation import orient_unchecked  # noqa: E402
 from photostrip.strip.relative_orientation.pairs import collect_pairs  # noqa: E402
 from photostrip.strip.strip_formation.strip import model_points  # noqa: E402
@@ -103,7 +102,7 @@ def accuracy(strips: int) -> None:
     print("| models | adjustment | images, plan / height | models of these images | plotter | models / images |")
     print("|---|---|---|---|---|---|")
     for models in (6, 12, 20):
-        for adjustment in ("similarity", "polynomial"):
+        for adjustment in ("polynomial", "bundle"):
             settings = Settings(adjustment=adjustment, precision=False)
             found: list[list[Floats]] = [[], [], []]
             for seed in range(strips):
@@ -122,18 +121,13 @@ def accuracy(strips: int) -> None:
 
 def precision(repetitions: int) -> None:
     """Print the scatter of repeated measurements over the standard deviations that are stated."""
-    print("| models | adjustment | points, mean (least to largest) | centers, mean (least to largest) |")
-    print("|---|---|---|---|")
+    print("| models | points, mean (least to largest) | centers, mean (least to largest) |")
+    print("|---|---|---|")
+    settings = Settings("bundle", bundle=BundleSettings(test="baarda"), links=LinkSettings("none"))
     for models in (3, 8):
-        for degree in ("", "1", "2"):
-            settings = Settings(
-                "polynomial" if degree else "similarity",
-                polynomial=correction.PolynomialSettings(degree or "auto"),
-                links=LinkSettings("none"),
-            )
-            ratios = scatter(models, settings, repetitions)
-            cells = " | ".join(f"{r.mean():.3f} ({r.min():.2f} to {r.max():.2f})" for r in ratios)
-            print(f"| {models} | {f'degree {degree}' if degree else 'similarity'} | {cells} |")
+        ratios = scatter(models, settings, repetitions)
+        cells = " | ".join(f"{r.mean():.3f} ({r.min():.2f} to {r.max():.2f})" for r in ratios)
+        print(f"| {models} | {cells} |")
 
 
 def scatter(models: int, settings: Settings, repetitions: int) -> list[Floats]:
@@ -141,23 +135,23 @@ def scatter(models: int, settings: Settings, repetitions: int) -> list[Floats]:
     simulation = simulate(spec_of(models + 1, 1, Models()))
     given, rng = inputs_of(simulation), np.random.default_rng(1)
     assert given.models is not None  # noqa: S101
-    points, control = given.models.points, given.control.take(~given.control.check)
+    points, control = given.models.points, given.control
     exact = inputs_of(simulate(spec_of(models + 1, 1, Models((0, 0, 0), (0, 0, 0)))))
     assert exact.models is not None  # noqa: S101
     whole = triangulate(given, settings)
     assert whole.precision is not None  # noqa: S101
-    factor = {"a-priori": 1.0}.get(whole.precision.basis[0], whole.precision.sigma[0] / float(np.median(points.sigma)))
     places: list[list[Floats]] = [[], []]
-    (strip,) = given.models.strips
     for _ in range(repetitions):
         measured = replace(points, xyz=exact.models.points.xyz + points.sigma * rng.normal(size=points.xyz.shape))
         moved = replace(control, enu=control.enu + control.sigma * rng.normal(size=control.enu.shape))
-        found = adjust_formed(link_strip(strip, measured, settings), moved, whole.frames, settings)
-        places[0].append(found.cartesian)
-        places[1].append(found.intermediate.cartesian_from_intermediate(found.centers))
+        again = replace(given, control=moved, models=replace(given.models, points=measured))
+        found = triangulate(again, replace(settings, precision=False))
+        (strip,) = found.strips
+        places[0].append(found.points.cartesian)
+        places[1].append(strip.intermediate.cartesian_from_intermediate(strip.centers))
     stated = [whole.precision.points, whole.precision.photos[0][:, :3, :3]]
     return [
-        np.std(place, axis=0, ddof=1) / np.sqrt(np.diagonal(each, axis1=1, axis2=2)) * factor
+        np.std(place, axis=0, ddof=1) / np.sqrt(np.diagonal(each, axis1=1, axis2=2))
         for place, each in zip(places, stated, strict=True)
     ]
 
@@ -194,7 +188,7 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--strips", type=int, default=40)
-    parser.add_argument("--repetitions", type=int, default=2000)
+    parser.add_argument("--repetitions", type=int, default=500)
     options = parser.parse_args()
     print(f"Errors of new and check points, µm at photo scale, {options.strips} strips\n")
     accuracy(options.strips)

@@ -11,6 +11,7 @@ from photostrip.pipeline.precision.photo_precision import fitted
 from photostrip.pipeline.run import triangulate
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
+from photostrip.pipeline.strips.photos_on_control import OrientedPhotos
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Control, Flight, Image, Points, Spec
 from photostrip.strip.relative_orientation.orientation import RelativeSettings
@@ -55,7 +56,7 @@ def fitted_strip(result: Result, factor: float = 1.0) -> FittedStrip:
     return fitted(result.strips[0], oriented_of(result), factor)
 
 
-def oriented_of(result: Result, number: int = 0) -> OrientedStrip[StripErrors]:
+def oriented_of(result: Result, number: int = 0) -> OrientedPhotos:
     """Return a strip of a result as it lay on its control before its deformation was corrected."""
     strip = result.strips[number]
     photos = strip.of_photos
@@ -67,8 +68,9 @@ def oriented_of(result: Result, number: int = 0) -> OrientedStrip[StripErrors]:
         formed=photos.formed,
         wrong_rays=photos.wrong_rays,
     )
-    return OrientedStrip(
-        stage=stage,
+    oriented = OrientedStrip(
+        strip=photos.strip,
+        formed=photos.formed,
         frames=result.frames,
         control=strip.control,
         control_rows=strip.control_rows,
@@ -77,6 +79,7 @@ def oriented_of(result: Result, number: int = 0) -> OrientedStrip[StripErrors]:
         precision=strip.precision,
         settings=result.settings.absolute,
     )
+    return OrientedPhotos(stage, oriented)
 
 
 def written_out(errors: StripErrors, rows: csr_array) -> Floats:

@@ -21,7 +21,6 @@ from pyproj import Proj
 from photostrip.camera import Camera, Distortion
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.stages import Stages
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.result.document import document_of
 from photostrip.simulation import (
@@ -404,7 +403,7 @@ def rms(spec: Spec, seeds: int, *choices: str) -> dict[str, Floats]:
     squares: dict[str, list[Floats]] = {choice: [] for choice in choices}
     for seed in range(1, seeds + 1):
         done = simulate(replace(spec, seed=seed))
-        inputs, stages = inputs_of(done), Stages("pairs", "strip", "control")
+        inputs = inputs_of(done)
         for choice in choices:
             simple = choice == "similarity"
             asked = Settings(
@@ -412,7 +411,7 @@ def rms(spec: Spec, seeds: int, *choices: str) -> dict[str, Floats]:
                 polynomial=correction.PolynomialSettings("auto" if simple else choice),
                 precision=False,
             )
-            squares[choice].append(Recovery(done, triangulate(inputs, asked, stages=stages)).along_across_up())
+            squares[choice].append(Recovery(done, triangulate(inputs, asked)).along_across_up())
     return {choice: np.sqrt(np.mean(found, axis=0)) / SIGMA for choice, found in squares.items()}
 
 

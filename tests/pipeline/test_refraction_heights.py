@@ -12,7 +12,6 @@ from photostrip.pipeline.frames import tie_ground_frames
 from photostrip.pipeline.image_coordinates import heights_of, orient_interior
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.stages import Stages
 from photostrip.simulation import simulate
 from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings
 from tests.geodesy.frames import write_gtx
@@ -55,7 +54,7 @@ def test_a_geoid_grid_beside_the_project_is_found_with_refraction(adjustment: st
 def test_heights_are_those_of_the_whole_run() -> None:
     inputs, settings = inputs_of(simulate(spec())), Settings()
     ground, result = tie_ground_frames(inputs, settings, None), triangulate(inputs, settings)
-    found = heights_of(orient_interior(inputs, settings).observations, inputs, settings, ground, Stages())
+    found = heights_of(orient_interior(inputs, settings).observations, inputs, settings, ground)
     (strip,) = result.strips
     centers = strip.intermediate.cartesian_from_intermediate(strip.centers)
     flying, terrain = (ground.output.geodetic(xyz)[:, 2].mean() for xyz in (centers, result.points.cartesian))

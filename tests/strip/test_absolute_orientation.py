@@ -18,7 +18,7 @@ from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Flight, Ground, Spec, simulate
 from photostrip.strip import absolute_orientation
-from photostrip.strip.absolute_orientation import AbsoluteOrientation, Targets, orient, weights
+from photostrip.strip.absolute_orientation import AbsoluteOrientation, PointPrecision, Targets, orient, weights
 from tests.simulated import inputs_of
 from tests.strips import attitude, control_points, fly, project, targets
 from tests.vectors import cases
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SEEDS = st.integers(0, 2**32 - 1)
-PRECISION = (0.05, 0.10)  # of a strip point in plan and height, metres
+PRECISION = PointPrecision(0.05, 0.10)  # of a strip point in plan and height, metres
 # Control along 8 km, two rows across, relief: A to H, and three points on the axis: I, J, K.
 GROUND = {
     "A": (0.0, 700.0, 30.0),
@@ -240,7 +240,7 @@ def test_weights_are_respected(seed: int) -> None:
     sigma[[0, 3, 6]] = 0.001  # three points that hold, five that hardly count
     noise[[0, 3, 6]] = 0
     one = case(FULL, sigma=sigma, noise=noise)
-    weight = weights(one.control, (0.001, 0.001))
+    weight = weights(one.control, PointPrecision(0.001, 0.001))
     found = one.orient(weight)
     assert np.abs(found.misclosures[[0, 3, 6]]).max() < 0.001
     assert np.abs(found.misclosures[1]).max() > 1e-6
@@ -248,7 +248,7 @@ def test_weights_are_respected(seed: int) -> None:
 
 def test_weights_add_the_strip_to_the_control() -> None:
     control = control_points(GROUND, {"A": "xy", "B": "z"}, sigma=np.array([0.03, 0.04, 0.12]))
-    weight = weights(control, (0.04, 0.05))
+    weight = weights(control, PointPrecision(0.04, 0.05))
     assert np.allclose(weight[2], [1 / 0.0025, 1 / 0.0032, 1 / 0.0169])
     assert np.array_equal(weight[0] > 0, [True, True, False])
     assert np.array_equal(weight[1] > 0, [False, False, True])
@@ -287,7 +287,7 @@ def test_with_noise_sigma0_is_one() -> None:
     for _ in range(150):
         sigma = np.full((8, 3), [0.2, 0.2, 0.4])
         one = case(FULL, sigma=sigma, noise=rng.normal(0, 1, (8, 3)) * sigma)
-        squares.append(one.orient(weights(one.control, (0.0, 0.0))).sigma0 ** 2)
+        squares.append(one.orient(weights(one.control, PointPrecision(0.0, 0.0))).sigma0 ** 2)
     assert np.mean(squares) == pytest.approx(1, abs=0.11)  # 150 times 17 degrees of freedom: 4 standard deviations
 
 
@@ -548,7 +548,7 @@ def test_check_points_have_no_say() -> None:
 )
 def test_weights_do_not_decide_what_is_determined(sigma: Floats) -> None:
     one = case(FULL, sigma=sigma)
-    found = one.orient(weights(one.control, (0.001, 0.001)))
+    found = one.orient(weights(one.control, PointPrecision(0.001, 0.001)))
     assert np.abs(one.errors(found)).max() < 1e-6
     assert found.condition < 20  # a matter of geometry
 

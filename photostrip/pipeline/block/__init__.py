@@ -2,7 +2,7 @@
 
 What comes in are ideal image coordinates, control, camera positions and given orientations; what goes out is a
 ``results.AdjustedStrips`` with orientations, points, covariances and calibration. ``datum`` and ``start`` bring all
-strips to the ground, ``problem`` collects the observations, ``adjust`` solves and searches for gross errors,
+strips to the ground, ``problem`` collects the observations, ``models`` those of independent models, ``adjust`` solves and searches for gross errors,
 ``block_result`` puts the solution where the pipeline goes on, ``block_notes`` says what it says beside its numbers,
 ``check_points`` has the joint errors at check points. The equations are those of ``network``, see
 docs/bundle.md.

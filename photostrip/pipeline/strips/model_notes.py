@@ -10,9 +10,8 @@ from photostrip.arrays import distinct, median
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import ModelStrip
 from photostrip.points import ModelPoints
-from photostrip.strip.independent_models.formation import FormedModels
+from photostrip.strip.independent_models.formation import FormedModels, far_ends
 from photostrip.strip.independent_models.link_screening import LEFT
-from photostrip.strip.independent_models.model_errors import far_ends
 
 ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others
 # ratio of residuals to what is stated; below the second there are no errors at all

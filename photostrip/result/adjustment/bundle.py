@@ -37,11 +37,11 @@ class GroupKind(NamedTuple):
     factor: float  # of the unit in the unit of the adjustment
 
 
-def kinds(problem: BundleProblem, angle_unit: str) -> dict[str, GroupKind]:
-    """Return how observations are written, with angles in the unit of the output."""
+def kinds(angle_unit: str, *, of_models: bool = False) -> dict[str, GroupKind]:
+    """Return how observations are written, with angles in the unit of the output; rays or model coordinates first."""
     measured = GroupKind("model", CARTESIAN_AXES, "um", MICROMETRES)
     return {
-        reliability.IMAGE: measured if problem.of_models else GroupKind("image", ("x", "y"), "um", MICROMETRES),
+        reliability.IMAGE: measured if of_models else GroupKind("image", ("x", "y"), "um", MICROMETRES),
         reliability.CONTROL: GroupKind("control", GROUND_AXES, "m", 1.0),
         reliability.POSITION: GroupKind("position", GROUND_AXES, "m", 1.0),
         reliability.ATTITUDE: GroupKind("attitude", ("1", "2", "3"), angle_unit, PER_RADIAN[angle_unit]),
@@ -56,7 +56,7 @@ def bundle_of(result: Result) -> Document:
     screened, settings = found.screened, result.settings.bundle
     problem, solution = screened.problem, screened.solution
     shift = reliability.noncentrality(screened.limit.alpha, settings.power)
-    written = kinds(problem, result.settings.angle_unit)
+    written = kinds(result.settings.angle_unit, of_models=problem.of_models)
     block: Document = {
         "free_network": solution.free,
         "sigma0": solution.sigma0,

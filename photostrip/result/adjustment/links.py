@@ -71,7 +71,7 @@ def _links(result: Result, strip: StripResult) -> list[Document]:
 
     formed, names = strip.of_models.formed, strip.of_models.strip.models
     links, models, shared, solved = formed.links, formed.models, formed.links.shared, formed.links.solved
-    from photostrip.strip.independent_models.model_errors import far_ends
+    from photostrip.strip.independent_models.formation import far_ends
 
     gap, far, smallest, found = discrepancies(strip), far_ends(formed), detectable(shared, links), []
     for number in range(shared.count):

@@ -71,7 +71,7 @@ def rejected_of(result: Result) -> list[Document]:
         found += [_from_control(strip, wrong, strip.control.ids[wrong.row]) for wrong in strip.wrong_control]
     if result.bundle is None:
         return found
-    written = kinds(result.bundle.block.problem, result.settings.angle_unit)
+    written = kinds(result.settings.angle_unit, of_models=bool(result.model_strips))
     return _after_bundle(result.bundle, found) + _from_bundle(result.bundle, written)
 
 

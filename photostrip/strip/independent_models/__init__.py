@@ -2,7 +2,6 @@
 
 In come the model coordinates of a strip (``StripModels``), out comes the formed strip with its links and their tests
 (``FormedModels``), which takes the place of a strip formed from photos. ``linking`` solves all links,
-``link_screening`` takes gross errors out, ``formation`` chains them, ``model_errors`` carries errors to the points,
-``model_misclosures`` to the control, ``perspective_centers`` moves centres with a polynomial. Source: [001] eq.
-145-149; docs/independent-models.md.
+``link_screening`` takes gross errors out, ``formation`` chains them, the start of their network;
+``perspective_centers`` moves centres with a polynomial. Source: [001] eq. 145-149; docs/independent-models.md.
 """

@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers, distinct, median
 from photostrip.errors import GeometryError
+from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import counted
 from photostrip.strip.independent_models import linking
 from photostrip.strip.independent_models.link_screening import ScreenedLinks
@@ -232,3 +233,22 @@ def _agreeing(rows: Numbers, models: StripModels, links: ScreenedLinks, places: 
             if agree:
                 group[group == group[second]] = group[first]
     return np.unique(group, return_inverse=True)[1].astype(np.intp)
+
+
+def far_ends(formed: FormedModels) -> Floats:
+    """Uncertainty of the far end of the model after each link, in standard deviations of a coordinate.
+
+    Returns (j,), largest standard deviation of a coordinate over the median one of a coordinate of the model.
+    """
+    models, solved = formed.models, formed.links.solved
+    rows = np.flatnonzero((models.model > 0) & (models.node < models.points))
+    link = models.model[rows] - 1
+    moved = solved.similarities.of(link, models.xyz[rows])
+    design = similarity_derivatives(moved - solved.centroid[link], np.zeros(3))
+    variance = np.einsum("nij,njk,nik->ni", design, solved.cofactors[link], design).max(axis=1)
+    scale = solved.similarities.scale
+    found = np.zeros(len(scale))
+    np.maximum.at(found, link, variance)
+    stated = np.array([median(models.sigma[rows[link == number]]) for number in range(len(scale))])
+    ratio: Floats = np.sqrt(found) / np.maximum(scale * stated, 1e-300)
+    return ratio

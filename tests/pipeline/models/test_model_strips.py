@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
+from photostrip.network.settings import BundleSettings
 from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings
 from photostrip.pipeline.results import StripResult
 from photostrip.pipeline.run import triangulate
@@ -76,7 +77,7 @@ def test_a_bent_strip_takes_its_centers_along() -> None:
 
     beam = replace(given, points=bent(given.points), centers=bent(given.centers))
     points = beam.measured()
-    settings = Settings(polynomial=correction.PolynomialSettings("2"))
+    settings = Settings("polynomial", polynomial=correction.PolynomialSettings("2"))
     plain, strip = (linked(inputs(given, points, bands=9), each) for each in (PLAIN, settings))
     off = [np.abs(s.intermediate.cartesian_from_intermediate(s.centers) - given.centers).max() for s in (plain, strip)]
     assert off[0] > 1.0
@@ -180,7 +181,8 @@ SEARCHED_FOR_NOTHING = Settings(links=LinkSettings("none"))
 def test_standard_deviations_are_the_scatter_of_repetitions() -> None:
     given, rng = truth(3, 3, 1), np.random.default_rng(5)
     first = inputs(given, given.measured(rng.normal(size=(len(given.model), 3))), bands=2)
-    whole = triangulate(first, SEARCHED_FOR_NOTHING)
+    settings = replace(SEARCHED_FOR_NOTHING, bundle=BundleSettings(test="baarda"))
+    whole = triangulate(first, settings)
     assert whole.precision is not None
     assert whole.precision.basis == ("a-priori",)
     points, places = [], []
@@ -191,7 +193,7 @@ def test_standard_deviations_are_the_scatter_of_repetitions() -> None:
         again = with_points(first, given.measured(of_models))
         enu = first.control.enu.copy()
         enu[taken] += 0.02 * of_control
-        found = triangulate(replace(again, control=replace(first.control, enu=enu)), SEARCHED_FOR_NOTHING)
+        found = triangulate(replace(again, control=replace(first.control, enu=enu)), settings)
         (strip,) = found.strips
         points.append(found.points.cartesian)
         places.append(strip.intermediate.cartesian_from_intermediate(strip.centers))

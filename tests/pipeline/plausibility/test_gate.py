@@ -22,7 +22,6 @@ from photostrip.network.solve import solve
 from photostrip.pipeline.inputs import GivenOrientations, Settings, Strip
 from photostrip.pipeline.plausibility import distance_trial, evidence, gate, image_evidence
 from photostrip.pipeline.run import triangulate
-from photostrip.pipeline.strips.stages import Stages
 from photostrip.plausibility import KINDS
 from photostrip.plausibility.control.straightening import StripPoints
 from photostrip.plausibility.photos import flight_order
@@ -284,11 +283,9 @@ def test_trials_of_the_principal_distance_do_without_some_points(monkeypatch: py
     tried: list[PhotoPoints] = []
     wrong = replace(inputs, strips=(replace(strip, camera=replace(strip.camera, principal_distance=210.0)),))
 
-    def formed(
-        strip: Strip, observations: PhotoPoints, settings: Settings, stages: Stages
-    ) -> evidence.EvidenceStrip | None:
+    def formed(strip: Strip, observations: PhotoPoints, settings: Settings) -> evidence.EvidenceStrip | None:
         tried.append(observations)
-        return form(strip, observations, settings, stages)
+        return form(strip, observations, settings)
 
     monkeypatch.setattr(distance_trial, "ENOUGH_POINTS", 10)
     monkeypatch.setattr(evidence, "form", formed)

@@ -16,7 +16,7 @@ from scipy.stats import f as f_distribution
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline.inputs import Settings as RunSettings
 from photostrip.pipeline.run import triangulate
-from photostrip.strip.absolute_orientation import weights
+from photostrip.strip.absolute_orientation import PointPrecision, weights
 from photostrip.strip.polynomial import correction
 from photostrip.strip.polynomial.correction import FitProblem, PolynomialSettings, fit
 from photostrip.strip.polynomial.terms import DROP_ORDER, LADDER, POWERS, bands, choose_terms, count_stations
@@ -65,7 +65,11 @@ def problem(
     points = {f"{number}": row for number, row in enumerate(np.asarray(given_, float))}
     control = control_points(points, dict(zip(points, use, strict=False)), sigma)
     return FitProblem(
-        np.asarray(xyz, float), targets(control, azimuth_deg), weights(control, (0.0, 0.0)), spacing, BREADTH
+        np.asarray(xyz, float),
+        targets(control, azimuth_deg),
+        weights(control, PointPrecision(0.0, 0.0)),
+        spacing,
+        BREADTH,
     )
 
 
