@@ -11,7 +11,7 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault
-from photostrip.formats.measured.models import ModelTable, read_models
+from photostrip.formats.measured.models import ModelTable, correlations, read_models
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.notes import counted, listed
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip
@@ -179,6 +179,8 @@ def measured_models(tables: ModelTables, given: Models, strips: Sequence[ModelSt
     point_ids = tuple(dict.fromkeys(measured.targets))
     centers_of = [name for part in parts[1:] for name in part.targets]
     node = np.concatenate([locate(measured.targets, point_ids), locate(centers_of, photos) + len(point_ids)])
+    covariance = np.concatenate([part.covariance for part in parts])
+    correlation = correlations(np.concatenate([part.sigma for part in parts]), covariance)
     model_points = ModelPoints(
         model_ids=tuple(wanted),
         point_ids=point_ids,
@@ -187,6 +189,7 @@ def measured_models(tables: ModelTables, given: Models, strips: Sequence[ModelSt
         node=node,
         xyz=np.concatenate([part.xyz for part in parts]) * factor * hand,
         sigma=np.concatenate([part.sigma for part in parts]) * factor,
+        correlation=None if np.isnan(covariance).all() else correlation * hand[:, None] * hand,
     )
     return MeasuredModels(tuple(strips), model_points)
 
@@ -198,6 +201,7 @@ class _Rows(NamedTuple):
     targets: list[str]
     xyz: Floats
     sigma: Floats
+    covariance: Floats
 
 
 def _rows(read: ModelTable, rows: Numbers, wanted: Sequence[str], default: Sequence[float] | None) -> _Rows:
@@ -209,5 +213,9 @@ def _rows(read: ModelTable, rows: Numbers, wanted: Sequence[str], default: Seque
         sigma = np.where(np.isnan(sigma), default, sigma)
     models = [read.model_ids[code] for code in read.models[rows]]
     return _Rows(
-        models=models, targets=[read.target_ids[code] for code in read.targets[rows]], xyz=read.xyz[rows], sigma=sigma
+        models=models,
+        targets=[read.target_ids[code] for code in read.targets[rows]],
+        xyz=read.xyz[rows],
+        sigma=sigma,
+        covariance=read.covariance[rows],
     )

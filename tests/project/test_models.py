@@ -82,6 +82,30 @@ def test_units(tmp_path: Path, unit: str, factor: float) -> None:
     np.testing.assert_allclose(found.points.sigma, plain.points.sigma * factor, rtol=1e-12)
 
 
+def test_covariances_become_correlations_in_the_axes_of_the_models(tmp_path: Path) -> None:
+    text = PROJECT.replace("  sigma: [0.01, 0.01, 0.02]\n", "  sigma: [0.01, 0.02, 0.03]\n  axes: left-handed\n")
+    lines = [line + ",0.01,0.02,0.03,0.0001,,-0.0003" for line in MODELS.splitlines()[1:]]
+    header = "model,point,x,y,z,sx,sy,sz,cov_xy,cov_xz,cov_yz"
+    models = sample(tmp_path, {**FILES, P: text, M: "\n".join([header, *lines]) + "\n"}).load().inputs.models
+    assert models is not None
+    assert models.points.correlation is not None
+    expected = [[1.0, -0.5, 0.0], [-0.5, 1.0, 0.5], [0.0, 0.5, 1.0]]  # y is turned over
+    np.testing.assert_allclose(models.points.correlation, np.tile(expected, (16, 1, 1)))
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"), [("0.01,0.02,0.03,0.0002,,", "is not positive"), (",,,0.0001,,", "no standard deviations")]
+)
+def test_covariances_of_no_coordinates_are_refused(tmp_path: Path, cells: str, words: str) -> None:
+    lines = MODELS.splitlines()
+    lines[0] += ",sx,sy,sz,cov_xy,cov_xz,cov_yz"
+    lines[1:] = [line + ",,,,,," for line in lines[1:]]
+    lines[3] = MODELS.splitlines()[3] + "," + cells
+    with pytest.raises(InputError, match=words) as told:
+        sample(tmp_path, {**FILES, M: "\n".join(lines) + "\n"}).load()
+    assert [(fault.code, fault.line) for fault in told.value.faults] == [("wrong-covariance", 4)]
+
+
 def test_left_handed_axes_are_turned_over(tmp_path: Path) -> None:
     lines = MODELS.splitlines()
     exchanged = [lines[0], *(f"{m},{p},{y},{x},{z}" for m, p, x, y, z in (line.split(",") for line in lines[1:]))]

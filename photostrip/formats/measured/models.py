@@ -1,4 +1,4 @@
-"""Model coordinates measured on a plotter: tables ``model,point,x,y,z[,sx,sy,sz]`` and ``model,photo,x,y,z[,...]``.
+"""Measured model coordinates: tables ``model,point,x,y,z[,sx,sy,sz[,cov_xy,cov_xz,cov_yz]]`` and of ``photo`` alike.
 
 Files of blocks, a model's id, lines ``point x y z`` and -99, are read as well.
 """
@@ -17,7 +17,12 @@ from photostrip.formats.text.table_reader import read_table
 from photostrip.formats.text.tables import Column, Table
 
 MODEL = Column("model", aliases=("model_id", "pair", "stereopair"))
-COORDINATES = (*numbers(*AXES), *sigmas(*AXES))
+COVARIANCES = ("cov_xy", "cov_xz", "cov_yz")
+COORDINATES = (
+    *numbers(*AXES),
+    *sigmas(*AXES),
+    *(Column(name, number=True, required=False, filled=False) for name in COVARIANCES),
+)
 END = "-99"  # of a model, in a file of blocks
 MODEL_POINTS = (MODEL, POINT, *COORDINATES)
 MODEL_CENTERS = (MODEL, PHOTO, *COORDINATES)
@@ -35,6 +40,7 @@ class ModelTable:
     # xyz, sigma: (n, 3): coordinates and standard deviations in the unit of the table; NaN where a cell is empty
     xyz: Floats
     sigma: Floats
+    covariance: Floats  # (n, 3): of x and y, x and z, y and z in the square of that unit; NaN where a cell is empty
 
 
 def read_models(
@@ -65,13 +71,37 @@ def read_models(
         targets=table.codes[target],
         xyz=table.columns(*AXES),
         sigma=table.columns(*SIGMAS),
+        covariance=table.columns(*COVARIANCES),
     )
     if not has_sigma and not findings.number(file):
         fix = "set `models.sigma: [sx, sy, sz]` in the project file, or fill the columns sx, sy, sz"
         missing = np.asarray(np.isnan(read.sigma).any(axis=1, keepdims=True))
         refuse_without_sigma(table, missing, SIGMAS, fix, findings)
     _refuse_repeated(read, findings)
+    _refuse_wrong_covariances(read, findings)
     return read
+
+
+def correlations(sigma: Floats, covariance: Floats) -> Floats:
+    """Matrices (n, 3, 3) of correlations from standard deviations and covariances of xy, xz, yz; NaN counts as 0."""
+    found = np.tile(np.eye(3), (len(sigma), 1, 1))
+    for (one, other), column in zip(((0, 1), (0, 2), (1, 2)), np.nan_to_num(covariance).T, strict=True):
+        found[:, one, other] = found[:, other, one] = column / (sigma[:, one] * sigma[:, other])
+    return found
+
+
+def _refuse_wrong_covariances(read: ModelTable, findings: Findings) -> None:
+    """Refuse covariances without standard deviations beside them, and those that no coordinates have."""
+    given = np.flatnonzero(np.isfinite(read.covariance).any(axis=1))
+    alone = np.asarray(np.isnan(read.sigma[given]).any(axis=1), bool)
+    least = np.zeros(len(given))
+    least[~alone] = np.linalg.eigvalsh(correlations(read.sigma[given[~alone]], read.covariance[given[~alone]]))[:, 0]
+    for row, without in zip(given[least <= 0.0].tolist(), alone[least <= 0.0].tolist(), strict=True):
+        message = "the row has covariances and no standard deviations"
+        if not without:
+            message = "no coordinates have these standard deviations and covariances: their matrix is not positive"
+        expected = "sx, sy, sz and cov_xy with |cov_xy| < sx sy and so on, in the square of the unit of the coordinates"
+        findings.add(read.table.fault(row, "x", message, "wrong-covariance", expected=expected))
 
 
 def rows_of_blocks(data: bytes) -> bytes:
