@@ -223,13 +223,6 @@ FAULTS = [
         "exclude each other",
     ),
     (
-        "bundle",
-        {P: PROJECT + "processing: {adjustment: bundle}\n"},
-        "needs-image-coordinates",
-        "project.yaml:15",
-        "bundle",
-    ),
-    (
         "refraction",
         {P: PROJECT + "processing: {refraction: true}\n"},
         "needs-image-coordinates",

@@ -56,7 +56,6 @@ NEEDED = {
     "observations": "points measured on photos, or `models` measured on a plotter",
 }
 NEEDS_IMAGES = {
-    "adjustment": (("bundle",), "auto, polynomial or similarity"),
     "earth_curvature": (("image",), "auto, model or none"),
     "refraction": (("true", "yes", "on"), "false"),
 }
