@@ -283,8 +283,7 @@ def test_given_points_that_were_not_measured_are_named() -> None:
 
 
 def test_a_given_point_whose_rays_were_rejected_is_not_called_unmeasured() -> None:
-    document = saved()
-    document["not_determined"] = [{"id": "G4 bis", "reason": "rays contradict each other"}]
+    document = saved() | {"not_determined": [{"id": "G4 bis", "reason": "rays contradict each other"}]}
     text = words(section(document, "Control points"))
     assert "without coordinates: G4 bis" in text
     assert "given, but not measured" not in text
