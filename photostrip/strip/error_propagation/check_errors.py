@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtrc
 
 from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.statistics import gamma_cdf
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class CheckErrors:
     @property
     def probability(self) -> float:
         """Probability of a larger sum of squares by chance."""
-        return 1 - gamma_cdf(self.squares / 2, self.coordinates / 2)
+        return float(chdtrc(self.coordinates, self.squares))
 
     @property
     def independent(self) -> float:
