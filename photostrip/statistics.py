@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from math import sqrt
-
+import numpy as np
 from scipy.special import betainc, chdtri, chndtrinc, fdtrc, ndtri, stdtr, stdtrit
+
+from photostrip.arrays import Floats, Numbers
 
 # A sound result calls for a second look with this probability at the most, for whatever reason: sigma0, pairs, points
 # that the adjustment has not seen, given points that stand out, deformed models, control against a strip's covariance.
@@ -49,20 +50,20 @@ def noncentrality(significance: float, power: float, dof: float) -> float:
     return float(chndtrinc(chdtri(dof, significance), dof, 1 - power))
 
 
-def grubbs_limit(n: int, alpha: float) -> float:
-    """Critical value of Grubbs' test for one outlier among n values, n at least 3: limit of max |value - mean| / s.
+def grubbs_limit(n: int | Numbers, alpha: float) -> Floats:
+    """Critical values of Grubbs' test for one outlier among n values, n at least 3: limit of max |value - mean| / s.
 
     `alpha` is the probability of rejecting a value of a clean sample; the sign of the outlier is unknown. Where it is
     known, one-sided, the limit is that of twice the probability.
 
     Source: [004a]; [Grubbs 1969] as a function of Student's t.
     """
-    t2 = t_quantile(1 - alpha / (2 * n), n - 2) ** 2
-    return (n - 1) / sqrt(n) * sqrt(t2 / (n - 2 + t2))
+    t2 = stdtrit(n - 2, 1 - alpha / (2 * n)) ** 2
+    return np.asarray((n - 1) / np.sqrt(n) * np.sqrt(t2 / (n - 2 + t2)))
 
 
-def tau_limit(n: int, unknowns: int, alpha: float) -> float:
-    """Critical value of the largest studentised residual |v| / (sigma0 sqrt(r)) (Pope's tau, Bonferroni).
+def tau_limit(n: int | Numbers, unknowns: int, alpha: float) -> Floats:
+    """Critical values of the largest studentised residual |v| / (sigma0 sqrt(r)) (Pope's tau, Bonferroni).
 
     `alpha` is the probability of rejecting an observation of a clean adjustment; n - unknowns must be at least 2. For
     one unknown it is Grubbs' two-sided limit for the largest |v| / (s sqrt((n-1)/n)).
@@ -70,5 +71,5 @@ def tau_limit(n: int, unknowns: int, alpha: float) -> float:
     Source: [Pope 1976].
     """
     nu = n - unknowns
-    t = t_quantile(1 - alpha / (2 * n), nu - 1)
-    return t * sqrt(nu) / sqrt(nu - 1 + t * t)
+    t = stdtrit(nu - 1, 1 - alpha / (2 * n))
+    return np.asarray(t * np.sqrt(nu) / np.sqrt(nu - 1 + t * t))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, median
+from photostrip.arrays import Floats
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity
@@ -47,7 +47,7 @@ class LinkedModels:
         turn = places.scale[:, None, None] * places.rotation
         variance = np.einsum("nij,nj->ni", turn[models.model] ** 2, models.sigma**2) * self.formed.links.factor
         point = models.node < models.points
-        plan, height = median(variance[point, :2].mean(axis=1)), median(variance[point, 2])
+        plan, height = np.median(variance[point, :2].mean(axis=1)), np.median(variance[point, 2])
         return absolute_orientation.PointPrecision(float(np.sqrt(plan)), float(np.sqrt(height)))
 
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtrc
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class CheckErrors:
 
     @property
     def points(self) -> int:
-        return len(distinct(self.point))
+        return len(np.unique(self.point))
 
     @property
     def coordinates(self) -> int:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.notes import counted
 from photostrip.strip.independent_models import linking
@@ -204,7 +204,7 @@ def _counting(models: StripModels, links: ScreenedLinks, places: Similarities, x
     """
     used = np.ones(len(models.model), bool)
     shared = links.shared
-    touched = distinct(models.node[shared.before[~links.used]])
+    touched = np.unique(models.node[shared.before[~links.used]])
     for node in touched.tolist():
         rows = np.flatnonzero(models.node == node)
         rows = rows[np.argsort(models.model[rows], kind="stable")]

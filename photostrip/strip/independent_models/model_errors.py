@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, median
+from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.strip.independent_models.formation import FormedModels
@@ -239,6 +239,6 @@ def far_ends(formed: FormedModels) -> Floats:
     scale = solved.similarities.scale
     found = np.zeros(len(scale))
     np.maximum.at(found, link, variance)
-    stated = np.array([median(models.sigma[rows[link == number]]) for number in range(len(scale))])
+    stated = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
     ratio: Floats = np.sqrt(found) / np.maximum(scale * stated, 1e-300)
     return ratio
