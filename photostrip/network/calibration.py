@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Distortion
 from photostrip.network.problem import BundleCameras
 from photostrip.network.settings import CALIBRATION
@@ -55,7 +55,7 @@ def corrected(cameras: BundleCameras, values: Floats, xy: Floats, camera: Number
     principal point: that which is given moves with it, (x0', y0') = J (x0, y0) with J of ``by_image``.
     """
     found = xy.copy()
-    for number in distinct(camera):
+    for number in np.unique(camera):
         some = camera == number
         own, center = values[number], values[number, POINT]
         shifted = by_image(cameras, number, xy[some]) @ center

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import gammaincc, gammaln, log_ndtr
 
-from photostrip.arrays import Numbers, distinct
+from photostrip.arrays import Numbers
 from photostrip.network import datum
 from photostrip.network.calibration import values_of
 from photostrip.network.common_errors import (
@@ -63,7 +63,7 @@ def most_likely(problem: BundleProblem, solution: BundleSolution, unit: float) -
     cameras, given = problem.cameras, not datum.is_free(problem)
     may_be_off = _may_be_off(problem.positions)
     asked = [LENS] if may_be_off else [LENS, POINT, DISTANCE]  # the others are much like an offset: ``common_errors``
-    known, used = cameras.unknown >= 0, distinct(cameras.of_photo)
+    known, used = cameras.unknown >= 0, np.unique(cameras.of_photo)
     candidates = [
         CommonError(kind, of="each", number=int(camera))
         for kind in asked

@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 from scipy.sparse import csr_array
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.network import datum
 from photostrip.network.given_orientations import LinearisedOrientations
 from photostrip.network.normal_equations import FactoredEquations
@@ -208,7 +208,7 @@ class JointCofactors:
         u = factor.block
         found = np.empty((*row.shape, u, u))
         found[near] = inverse.blocks(row[near], column[near])
-        far, m = distinct(column[~near]), factor.size // u
+        far, m = np.unique(column[~near]), factor.size // u
         unit = np.zeros((m, u, len(far), u))
         unit[far, :, np.arange(len(far))] = np.eye(u)
         solved = factor.solve(unit.reshape(m * u, -1)).reshape(unit.shape)

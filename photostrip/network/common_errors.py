@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_array
 
-from photostrip.arrays import Floats, distinct
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.network.calibration import PRINCIPAL_DISTANCE, values_of
 from photostrip.network.cofactors import coordinates_of, joint_cofactors
@@ -224,7 +224,7 @@ def _solved(problem: BundleProblem, selection: Selection) -> BundleSolution | No
 def _conceivable(problem: BundleProblem) -> Iterator[CommonError]:
     """Errors that may be shared, those of fewest unknowns first."""
     positions = problem.positions
-    several = len(distinct(positions.group[positions.group >= 0])) > 1
+    several = len(np.unique(positions.group[positions.group >= 0])) > 1
     if (positions.group >= 0).any() and not positions.drift_sigma.any():
         if not positions.offset_sigma.any():
             if several:

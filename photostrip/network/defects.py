@@ -9,7 +9,7 @@ from typing import NoReturn
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.network import datum
@@ -52,7 +52,7 @@ MOVES = (
 def refuse_repeated(problem: BundleProblem) -> None:
     """Refuse points that are measured twice on a photo (``bundle-repeated``)."""
     key = np.sort(problem.images.point * np.intp(problem.photos) + problem.images.photo)
-    again = distinct(key[1:][key[1:] == key[:-1]])
+    again = np.unique(key[1:][key[1:] == key[:-1]])
     if len(again):
         pairs = zip(*(part.tolist() for part in np.divmod(again, problem.photos)), strict=True)
         raise InputError(
@@ -215,7 +215,7 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
         normal=normal,
         control=places,
         motion=motions.T @ motions / len(everything) + UNMOVED * radius**2 * np.eye(datum.DEFECT),
-        sigma=median(sigmas) if len(sigmas) else np.inf,
+        sigma=np.median(sigmas) if len(sigmas) else np.inf,
     )
 
 

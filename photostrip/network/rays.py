@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.network.calibration import (
     PRINCIPAL_DISTANCE,
@@ -125,7 +125,7 @@ def _by_calibration(
         return csr_array(shape)
     camera = problem.cameras.of_photo[problem.images.photo]
     entries, rows, columns = [], [], []
-    for number in distinct(calibrated.camera).tolist():
+    for number in np.unique(calibrated.camera).tolist():
         ray, column = np.flatnonzero(camera == number), np.flatnonzero(calibrated.camera == number)
         table = partials(problem.cameras, values, number, problem.images.xy[ray], ratio[ray])
         entries.append((table[calibrated.kind[column]] * weight[ray].T).ravel())

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from photostrip.arrays import Floats, median
+from photostrip.arrays import Floats
 from photostrip.network.problem import BundleProblem
 from photostrip.network.selection import restarted
 from photostrip.network.solution import BundleSolution
@@ -34,6 +34,6 @@ def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
         solution = solve(replace(problem, images=replace(problem.images, sigma=spread)))
         problem = restarted(problem, solution)
         size = np.linalg.norm(solution.image_residuals / sigma, axis=1)
-        unit = max(median(size) / normal, 1e-12)
+        unit = max(np.median(size) / normal, 1e-12)
         weight = falling_weights(size / unit)
     return solution, weight

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import median
 from photostrip.errors import GeometryError
 from photostrip.geodesy.curvature import curvature_correction
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
@@ -130,7 +129,7 @@ def datum_notes(inputs: Inputs, ground: GroundFrames) -> Iterator[Note]:
         yield Note("datum-change", text, severity="note", key=f"{key}.crs")
         sigma = sigma_of[key][(sigma_of[key] > 0) & np.isfinite(sigma_of[key])]
         moved = shift.moved_per_year
-        if epoch is None and len(sigma) and EPOCH_UNKNOWN * moved > median(sigma):
+        if epoch is None and len(sigma) and EPOCH_UNKNOWN * moved > np.median(sigma):
             text = (
                 f"{key}: {title}: coordinates move by {100 * moved:.1f} cm a year between them, and no `epoch` is "
                 f"given: that of the operation, {reference:.1f}, is taken"

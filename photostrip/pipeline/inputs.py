@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.camera import Camera
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.network.settings import BundleSettings
@@ -45,7 +45,7 @@ class Strip:
 
     def median_sigma(self, observations: PhotoPoints) -> float:
         """Median standard deviation of the image coordinates of its photos, mm."""
-        return median(observations.sigma[self.positions(observations) >= 0])
+        return np.median(observations.sigma[self.positions(observations) >= 0])
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Note
 from photostrip.points import ModelPoints, PhotoPoints
@@ -119,7 +119,7 @@ def restored(screened: ScreenedPairs, weight: Floats, kept: Flags) -> ScreenedPa
     if not back.any():
         return screened
     restored_weight = np.where(back, weight, oriented.pairs.weight)
-    oriented = orient_again(oriented, restored_weight, distinct(oriented.pairs.pair[back]))
+    oriented = orient_again(oriented, restored_weight, np.unique(oriented.pairs.pair[back]))
     log = tuple(replace(each, readmitted=each.readmitted or bool(back[each.row])) for each in screened.rejections)
     return replace(screened, orientation=oriented, rejections=log)
 

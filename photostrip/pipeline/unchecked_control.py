@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import Floats, median
+from photostrip.arrays import Floats
 from photostrip.network import reliability
 from photostrip.notes import Note
 from photostrip.pipeline.results import AdjustedStrips, Bundle, StripResult
@@ -54,8 +54,8 @@ def _note_of(
     parts = []
     for name, part in PARTS:
         known = np.isfinite(sigma[:, part]) & ~np.isnan(size[:, part])
-        if known.any() and median(size[:, part][known]) > HARDLY:
-            middle = median(detectable[:, part][known])
+        if known.any() and np.median(size[:, part][known]) > HARDLY:
+            middle = np.median(detectable[:, part][known])
             parts.append(f"{middle:.2g} m in {name}" if np.isfinite(middle) else f"any size in {name}")
     if parts:
         text = (

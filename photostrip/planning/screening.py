@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.rotation import from_angles
 from photostrip.strip.gross_errors.pairs.screening import ScreenedPairs, screen_pairs
@@ -197,7 +197,7 @@ def _outcome(
     size = np.abs(errors).reshape(shape)
     missed, total = wrong & ~out, float(wrong.sum())
     detection = []
-    for number in distinct(spec.layout.zone).tolist():
+    for number in np.unique(spec.layout.zone).tolist():
         for each in sorted(set(spec.sizes)):
             those = (zone == number) & (size == each)
             found = int((those & out).sum())
@@ -223,7 +223,7 @@ def error_effects(pairs: Pairs, layout: PairLayout) -> tuple[ErrorEffect, ...]:
     _, jacobian = linearised_parallaxes(oriented.elements, pairs)
     by_point = np.einsum("mij,jm->mi", oriented.cofactors[pairs.pair], jacobian)
     zone, found = np.tile(layout.zone, pairs.size), []
-    for number in distinct(layout.zone).tolist():
+    for number in np.unique(layout.zone).tolist():
         those = by_point[zone == number]
         rms = np.sqrt((those**2).mean(axis=0)).tolist()
         largest = float(np.sqrt((np.abs(those).max(axis=1) ** 2).mean()))

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photostrip.arrays import Floats, median
+from photostrip.arrays import Floats
 from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
 from photostrip.formats.measured.measurements import Measurements
@@ -46,7 +46,7 @@ def with_pixel_sizes(
             message = "the fiducial marks do not tell the size of a pixel"
             faults.append(Fault(message, "missing-key", key=".".join(path), expected="the size of a pixel in mm"))
             continue
-        size = float(f"{median(sizes):.6g}")
+        size = float(f"{np.median(sizes):.6g}")
         found[name] = replace(camera, pixel_size=size)
         message = (
             f"camera {name} has no pixel_size: a pixel is {size * 1000:.4g} µm by the calibrated fiducial marks of "

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from photostrip.arrays import Floats, distinct
+from photostrip.arrays import Floats
 from photostrip.geometry.rotation import from_vector
 from photostrip.points import ModelPoints, PhotoPoints
 from photostrip.simulation.draws import Draws, Purpose
@@ -47,7 +47,7 @@ def plotted(
     wanted, place = spec.models, {name: k for k, name in enumerate(truth.photo_ids)}
     pairs = [(place[a], place[b]) for _, photos in strips for a, b in pairwise(photos)]
     systems = Draws(spec.seed, Purpose.MODELS).normal(len(pairs), 7)
-    shows = [distinct(observations.point[observations.photo == k]) for k in range(len(observations.photo_ids))]
+    shows = [np.unique(observations.point[observations.photo == k]) for k in range(len(observations.photo_ids))]
     number = {name: k for k, name in enumerate(observations.photo_ids)}
     points = len(observations.point_ids)
     model, node, xyz = [], [], []

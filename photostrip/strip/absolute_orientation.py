@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, column_medians, median
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.geometry.rotation import cross_matrix, from_vector
@@ -238,7 +238,7 @@ def lay(
         if collinearity(given) < WEAK_LIMIT**2:
             raise _on_line(given, targets.control)  # a line fits upside down as well as upright
         xyz = similarity(strip)
-        off = median(np.linalg.norm(targets.misclosures(xyz, targets.axes(xyz)), axis=1))
+        off = np.median(np.linalg.norm(targets.misclosures(xyz, targets.axes(xyz)), axis=1))
         if off > MOST_OFF * half:
             message = (
                 f"the strip does not fit its control: half of the points are more than {off:.4g} m off, and the strip "
@@ -297,7 +297,7 @@ def _refuse_given_on_line(strip: Floats, given: Floats, control: ControlPoints) 
 
 def _on_line(given: Floats, control: ControlPoints) -> GeometryError:
     """Say that control lies on a line, or which point lies so far off that all others are one place beside it."""
-    away = np.linalg.norm(given - column_medians(given), axis=1)
+    away = np.linalg.norm(given - np.median(given, axis=0), axis=1)
     far, others = int(away.argmax()), float(np.delete(away, away.argmax()).max(initial=0.0))
     if len(away) > LEAST_WITH_ONE_FAR and away[far] > ALONE * others:
         times = away[far] / max(others, 1e-6)

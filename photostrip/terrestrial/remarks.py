@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from photostrip.arrays import distinct
 from photostrip.notes import Note, named
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.camera_motion import Turn
@@ -104,7 +103,7 @@ def _misorientation(result: Monitoring) -> Iterator[Note]:
 def _missing(result: Monitoring) -> Iterator[Note]:
     """Name points without displacements, by epoch and reason."""
     for number, epoch in enumerate(result.series.epochs):
-        for code in distinct(result.reason[number]):
+        for code in np.unique(result.reason[number]):
             if code == MEASURED:
                 continue
             names = [result.series.points[row] for row in np.flatnonzero(result.reason[number] == code)]

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import Flags, distinct
+from photostrip.arrays import Flags
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.tables import Column, Table
 from photostrip.notes import counted
@@ -34,7 +34,7 @@ def refuse_without_sigma(table: Table, missing: Flags, columns: Sequence[str], f
     """Ask for the standard deviations that neither rows nor project give; `missing` marks their cells."""
     rows, places = np.nonzero(missing)
     if len(rows):
-        number = counted(len(distinct(rows)), "row has no standard deviation", "rows have no standard deviation")
+        number = counted(len(np.unique(rows)), "row has no standard deviation", "rows have no standard deviation")
         message = f"{number} ({', '.join(columns)}), and the project file gives none"
         findings.add(table.fault(int(rows[0]), columns[int(places[0])], message, "no-sigma", fix=fix))
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.formats.measured.columns import POINT, numbers, sigmas
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.findings import Findings
@@ -126,7 +126,7 @@ def _exchanged(read: Measurements, inside: Flags) -> bool:
     given, then = (_apart(read, photo, np.repeat(inside, 2)) for photo in (read.photo, swapped.reshape(-1)))
     if min(len(given), len(then)) < LEAST_AGAIN:
         return False
-    return bool(median(then) < EXCHANGED_SHARE * median(given))
+    return bool(np.median(then) < EXCHANGED_SHARE * np.median(given))
 
 
 def _apart(read: Measurements, photo: Numbers, inside: Flags) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct, median, quantile
+from photostrip.arrays import Floats, Numbers
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.findings import Findings
 from photostrip.notes import Note, counted
@@ -89,13 +89,13 @@ def _refuse_all(
     """
     several = np.bincount(group)[group] > 1
     far = several & (np.nan_to_num(ratio.max(axis=1)) > FARTHEST_SIGMAS)
-    names = len(distinct(group[several]))
+    names = len(np.unique(group[several]))
     if names < LEAST_TOGETHER or far.sum() <= MOST_SHARE * several.sum():
         return False
-    scatter = median(np.abs(off[several]).max(axis=1))
-    reach = quantile(np.abs(read.xy), REACH_SHARE)
+    scatter = np.median(np.abs(off[several]).max(axis=1))
+    reach = np.quantile(np.abs(read.xy), REACH_SHARE)
     head = (
-        f"{names} {target}s are measured several times on a photo, and {len(distinct(group[far]))} of them lie more "
+        f"{names} {target}s are measured several times on a photo, and {len(np.unique(group[far]))} of them lie more "
         f"than {FARTHEST_SIGMAS:g} standard deviations from their mean"
     )
     if scatter < AGREEING_SHARE * reach:

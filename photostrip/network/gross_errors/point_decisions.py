@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.reliability import Limit
 from photostrip.rejection import SEVERAL_RAYS, TWO_RAYS, UNCONTROLLED, WRONG_RAY
 from photostrip.statistics import chi2_quantile
@@ -72,7 +72,7 @@ def without_place(decided: Decisions, nowhere: Flags) -> Decisions:
 def alike(rays: Numbers, known: Numbers) -> Iterator[Numbers]:
     """Places of points with as many rays and given coordinates (n,), to be decided on together."""
     size = rays * (known.max(initial=0) + 1) + known
-    for each in distinct(size):
+    for each in np.unique(size):
         places = np.flatnonzero(size == each)
         at_once = max(1, RAYS_AT_ONCE // int(rays[places[0]]))
         yield from np.split(places, range(at_once, len(places), at_once))

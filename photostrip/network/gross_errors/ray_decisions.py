@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.cofactors import JointCofactors
 from photostrip.network.gross_errors.point_decisions import (
     AGREE,
@@ -62,7 +62,7 @@ def decide_rays(adjusted: Adjusted, row: Numbers, xyz: Floats, limit: Limit) -> 
     """
     problem = adjusted.problem
     point = problem.images.point[row]
-    numbers = distinct(point)
+    numbers = np.unique(point)
     first = np.searchsorted(point, numbers)
     rays = np.diff(first, append=len(row))
     given, axis = np.nonzero(adjusted.control & np.isfinite(problem.control.sigma))

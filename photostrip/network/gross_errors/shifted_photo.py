@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.network import datum
 from photostrip.network.gross_errors.strip_network import STRIP_LEVEL, free_network
@@ -68,7 +68,7 @@ def shifted_photo(
         rotations=formed.rotations[inside],
         model_xyz=formed.model_xyz[oriented.pairs.rows_of(numbers)],
     )
-    rows = distinct(part.rows)
+    rows = np.unique(part.rows)
     problem = free_network(part, near, observations, position - first, rows, observations.sigma[rows])
     used = np.isin(rows, part.rows[part.used & np.isfinite(near.model_xyz[:, 0])])
     try:

@@ -15,7 +15,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.network import camera_errors, defects, reliability, robust
 from photostrip.network.cofactors import JointCofactors, cofactors_of
@@ -65,7 +65,7 @@ class ScreenedBundle:
     ) -> ScreenedBundle:
         chosen = selected(problem, selection)
         solution = solve(chosen, rough=rough)
-        points_out = len(distinct(problem.images.point[~selection.images]))
+        points_out = len(np.unique(problem.images.point[~selection.images]))
         return cls(
             problem=chosen,
             selection=selection,
@@ -418,7 +418,7 @@ class _Search:
         self.decided = replace(done.selection, images=np.where(changed[photo], images, self.decided.images))
         rays = np.bincount(point, minlength=len(xyz))
         asked = (self.beyond <= limit.of(rays)) | np.isinf(self.beyond)  # the limit rises where less is established
-        numbers = distinct(point[~images & (changed[photo] | asked[point])])
+        numbers = np.unique(point[~images & (changed[photo] | asked[point])])
         placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] >= self.problem.least
         place = np.where(placed, done.solution.points[numbers], np.nan)
         place = np.where(rays[numbers, None] < self.problem.least, xyz[numbers], place)

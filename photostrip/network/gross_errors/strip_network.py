@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.network.gross_errors.strip_rays import StripRays
 from photostrip.network.problem import (
@@ -37,7 +37,7 @@ def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> t
     """
     from photostrip.network.gross_errors.snooping import screen_bundle  # with 10 modules more
 
-    rows = distinct(oriented.rows)
+    rows = np.unique(oriented.rows)
     sigma = rays.observations.sigma[rows] * _spread_of_photos(oriented, rays)[rays.position[rows], None]
     problem = free_network(oriented, formed, rays.observations, rays.position, rows, sigma)
     kept = np.isin(rows, rays.kept)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photostrip.arrays import Numbers, median
+from photostrip.arrays import Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network import self_calibration
 from photostrip.pipeline.block import block_notes
@@ -35,7 +35,7 @@ def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFra
         _strip(strip, begin, calibrated, used, points, bundle)
         for strip, (_, begin) in zip(start.strips, places, strict=True)
     )
-    sigma = median(block.problem.images.sigma) * bundle.unit
+    sigma = np.median(block.problem.images.sigma) * bundle.unit
     covariances = bundle.screened.precision.points[number] * bundle.unit**2
     photos = tuple(bundle.photo_covariances[begin : begin + count[n]] for n, begin in places)
     basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"

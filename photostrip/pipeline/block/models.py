@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity
 from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
@@ -169,7 +169,7 @@ def adjusted_strips(
         rays=shown[number],
     )
     strips = tuple(_strip(strip, models, bundle, used, cartesian, held) for strip in bundle.start.strips)
-    sigma, unit = float(np.sqrt(median(measured.sigma**2))) * bundle.unit, bundle.unit
+    sigma, unit = float(np.sqrt(np.median(measured.sigma**2))) * bundle.unit, bundle.unit
     basis = "a-priori" if unit == 1.0 else "a-posteriori"
     precision = Precision(
         points=covariances[number],

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.rotation import angle_rates, from_angles
@@ -276,7 +276,7 @@ def _begin(
     paired = np.zeros(len(used), bool)
     for strip in start.strips:
         used[strip.of_photos.rows[strip.of_photos.rows < len(used)]] = True
-        in_pairs = distinct(strip.of_photos.orientation.rows)
+        in_pairs = np.unique(strip.of_photos.orientation.rows)
         paired[in_pairs[in_pairs < len(used)]] = True
     inside = used[rows]
     free = ~paired[rows]
@@ -286,10 +286,10 @@ def _begin(
         computed = project(problem.start.points[images.point], photos, images.photo)
         miss = (np.abs(images.xy - computed) / images.sigma).max(axis=1)
     known = miss[np.isfinite(miss)]
-    far = np.full(len(miss), max(LEAST_FAR, FAR_FROM_RAY * median(known) if len(known) else 0.0))
+    far = np.full(len(miss), max(LEAST_FAR, FAR_FROM_RAY * np.median(known) if len(known) else 0.0))
     loose = np.isin(images.point, images.point[start.rough[images.photo]]) & np.isfinite(miss)
     if loose.any():  # what an orientation that is only given approximately misses says nothing of the rays
-        far[loose] = np.maximum(far[loose], FAR_FROM_RAY * median(miss[loose]))
+        far[loose] = np.maximum(far[loose], FAR_FROM_RAY * np.median(miss[loose]))
     for strip in start.strips:
         if strangers := start.strangers.get(strip.strip.id):
             of_strip = np.isin(images.photo, start.rows_of(strip.strip.photos))

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import collinearity
 from photostrip.pipeline.block import models
@@ -130,7 +130,7 @@ class _Block:
     def _on(self, stage: FormedPhotos | LinkedModels, numbers: Numbers, cartesian: Floats) -> StripResult:
         """Adjust a strip on points with Cartesian coordinates, beside its own control."""
         known = self.known
-        chosen = distinct(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_TIES)).astype(np.intp))
+        chosen = np.unique(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_TIES)).astype(np.intp))
         ids = tuple(self.observations.point_ids[n] for n in numbers[chosen])
         ground = known.output.ground_from_cartesian(cartesian[chosen], ids=ids)
         given = set(ids)

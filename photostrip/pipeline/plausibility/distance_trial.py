@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import distinct, median
 from photostrip.camera import Camera
 from photostrip.errors import GeometryError
 from photostrip.notes import Finding
@@ -134,7 +133,7 @@ def find_distance_without_pairs(
 def _some_points(pairs: Pairs, observations: PhotoPoints, given: Sequence[str]) -> PhotoPoints:
     """Leave out what trials of a strip can do without, where its pairs have many points; given points stay."""
     some = pairs.some_points(ENOUGH_POINTS)
-    if len(some) == len(distinct(pairs.point)):
+    if len(some) == len(np.unique(pairs.point)):
         return observations
     chosen = np.zeros(len(observations.point_ids) + 1, bool)  # the last: given points that nobody measured
     chosen[some] = chosen[locate(given, observations.point_ids)] = True
@@ -155,7 +154,7 @@ def _middle_sigma0(formed: EvidenceStrip) -> float:
     """Middle sigma0 of the pairs, mm."""
     sigma0 = formed.orientation.sigma0
     known = sigma0[np.isfinite(sigma0)]
-    return median(known) if len(known) else 0.0
+    return np.median(known) if len(known) else 0.0
 
 
 def _followed(

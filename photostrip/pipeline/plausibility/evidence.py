@@ -11,7 +11,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, column_medians, distinct, median, quantile
+from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera
 from photostrip.errors import GeometryError, InputError
 from photostrip.pipeline.given_points import rows_of_given
@@ -54,7 +54,7 @@ class EvidenceStrip:
         points = self.formed.xyz[np.isfinite(self.formed.xyz).all(axis=1)]
         if len(axes) > LONG_STRIP or len(points) < LEAST_OF_PLANE:  # a long strip bends more than it is broad
             return axes
-        normal = np.linalg.svd(points - column_medians(points), full_matrices=False)[2][2]
+        normal = np.linalg.svd(points - np.median(points, axis=0), full_matrices=False)[2][2]
         looking = float(normal @ self.up)
         is_oblique = abs(looking) < np.cos(np.radians(OBLIQUE_DEG))
         return np.broadcast_to(normal * np.sign(looking), axes.shape) if is_oblique else axes
@@ -140,10 +140,10 @@ def strip_points(
     formed: EvidenceStrip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
 ) -> tuple[Numbers, StripPoints]:
     """Rows of the given points that a formed strip holds, and the same points in the strip."""
-    strip, depth = formed.formed, median(formed.depth)
+    strip, depth = formed.formed, np.median(formed.depth)
     row = rows_of_given(control.ids, strip.point, observations.point_ids)
     rows = np.flatnonzero(row >= 0)
-    base = median(np.linalg.norm(np.diff(strip.centers, axis=0), axis=1))
+    base = np.median(np.linalg.norm(np.diff(strip.centers, axis=0), axis=1))
     share = formed.strip.median_sigma(observations) / formed.strip.camera.principal_distance
     return rows, StripPoints(
         formed.strip.id,
@@ -193,7 +193,7 @@ def stretches(
     points, centers = (each - np.outer(each @ up, up) for each in (on_strip.xyz, on_strip.centers))
     near = _nearest(points, centers)
     count = min(most, -(-length // photos))
-    for start in distinct(np.linspace(0, length - photos, count).astype(np.intp)).tolist():
+    for start in np.unique(np.linspace(0, length - photos, count).astype(np.intp)).tolist():
         part = slice(start, start + photos)
         inside = (near >= part.start) & (near < part.stop)
         axes, centers = on_strip.axes[part], on_strip.centers[part]
@@ -232,7 +232,7 @@ def mosaic_points(
     numbers = located(control.ids, observations.point_ids)
     given = np.flatnonzero((numbers >= 0) & (total[numbers] > 0))
     held = numbers[given]
-    depth = strip.camera.principal_distance * median(np.abs(plane.factor))
+    depth = strip.camera.principal_distance * np.median(np.abs(plane.factor))
     return given, StripPoints(
         strip.id,
         xyz=np.column_stack([x[held], y[held], np.full(len(held), np.nan)]),
@@ -285,7 +285,7 @@ def places_in_photos(strip: Strip, observations: PhotoPoints, steps: Mapping[str
     rows = np.flatnonzero(position >= 0)
     step = np.array([steps.get(photo, complex("nan")) for photo in strip.photos])
     known = np.isfinite(step) & (step != 0)
-    usual = complex(median(step[known].real), median(step[known].imag)) if known.any() else 1.0
+    usual = complex(np.median(step[known].real), np.median(step[known].imag)) if known.any() else 1.0
     step = np.where(known, step, usual)[position[rows]]
     along = (observations.xy[rows] * np.column_stack([step.real, step.imag])).sum(axis=1) / np.abs(step) ** 2
     return rows, position[rows] + (along if known.any() else 0.0)
@@ -308,7 +308,7 @@ def half_breadth(
     inside = strip.positions(observations) >= 0
     angle = _base_angle(strip.photos, steps)
     across = observations.xy[inside] @ [-np.sin(angle), np.cos(angle)]
-    half = quantile(np.abs(across), BREADTH_SHARE)
+    half = np.quantile(np.abs(across), BREADTH_SHARE)
     given = locate(observations.point_ids, ids)[observations.point]
     rows = np.flatnonzero(inside & (given >= 0))
     rows = rows[np.argsort(observations.photo[rows], kind="stable")]
@@ -319,8 +319,8 @@ def half_breadth(
     ground = np.linalg.norm(plan[given[one]] - plan[given[other]], axis=1)
     if not (image > 0).any():
         order = np.argsort(place, kind="stable")
-        base = median([abs(step) for photo in strip.photos if (step := steps.get(photo, 0.0))] or [np.nan])
+        base = np.median([abs(step) for photo in strip.photos if (step := steps.get(photo, 0.0))] or [np.nan])
         image = np.diff(place[order]) * float(base)
         ground = np.linalg.norm(np.diff(plan[order], axis=0), axis=1)
     good = image > 0
-    return half * median(ground[good] / image[good]) if good.any() else 0.0
+    return half * np.median(ground[good] / image[good]) if good.any() else 0.0

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, median
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
@@ -259,7 +259,7 @@ def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     """Look at a formed strip: its perspective centres, and the ids of its points."""
     strip, formed = each.strip, each.formed
     whole = each.whole.formed  # rays that contradict each other may be those of two points
-    sigma = median(observations.sigma)
+    sigma = np.median(observations.sigma)
     findings = units.find_wrong_sigmas(each.orientation.sigma0, sigma, strip.id)
     findings += flight.find_odd_centers(formed.centers, each.depth, each.up, strip.photos, strip.id)
     names = observations.point_ids

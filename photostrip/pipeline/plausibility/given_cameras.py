@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, column_medians, median
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
@@ -113,7 +113,7 @@ def _level_plan(
 ) -> LevelPlan:
     """Bring perspective centres and control points to one level plane with heights above the ellipsoid."""
     together = np.concatenate([tied[0].cartesian_from_ground(given.enu), cartesian_of(control, tied[1:])])
-    middle = column_medians(together)
+    middle = np.median(together, axis=0)
     level = (together - middle) @ target.level_axes_at(middle[None, :])[0].T
     if target.kind != "local":  # the Earth falls away from a plane
         level[:, 2] = target.geodetic(together)[:, 2]
@@ -135,7 +135,7 @@ def _of_strip(strip: Strip, plan: LevelPlan, shown: Shown, photo_ids: Sequence[s
     wanted = scale * strip.camera.principal_distance
     known = (wanted > 0) & (depth > 0) & np.isfinite(height)
     if not below and known.sum() >= LEAST_HEIGHTS:
-        ratio = median(depth[known] / wanted[known])
+        ratio = np.median(depth[known] / wanted[known])
         if not 1.0 / MOST_HEIGHT_RATIO < ratio < MOST_HEIGHT_RATIO:
             findings = [_other_height(strip, plan, photos, depth[known], wanted[known])]
     for each in findings:
@@ -151,7 +151,7 @@ def _ground_below(photos: Numbers, plan: LevelPlan, shown: Shown) -> tuple[Float
     for place in np.flatnonzero(first < last).tolist():
         rows = order[first[place] : last[place]]
         ground = plan.control[shown.number[rows]]
-        height[place] = median(ground[:, 2])
+        height[place] = np.median(ground[:, 2])
         far = _spread(shown.xy[rows])
         scale[place] = _spread(ground[:, :2]) / far if len(rows) > 1 and far > 0 else np.nan
     known = np.isfinite(height)
@@ -166,10 +166,10 @@ def _spread(points: Floats) -> float:
 
 def _other_height(strip: Strip, plan: LevelPlan, photos: Sequence[str], depth: Floats, wanted: Floats) -> Finding:
     message = (
-        f"the perspective centres of strip {strip.id} are given {median(depth):.4g} m above the control, and the "
-        f"scale of the photos requires {median(wanted):.4g} m"
+        f"the perspective centres of strip {strip.id} are given {np.median(depth):.4g} m above the control, and the "
+        f"scale of the photos requires {np.median(wanted):.4g} m"
     )
-    numbers = {"given_above_control_m": median(depth), "by_photo_scale_m": median(wanted)}
+    numbers = {"given_above_control_m": np.median(depth), "by_photo_scale_m": np.median(wanted)}
     fix = "are their heights in another unit, or of another vertical datum? or is the principal distance wrong?"
     return found("P205", message, fix, numbers, photos=photos, strips=(strip.id,), key=plan.key)
 
@@ -223,5 +223,5 @@ def _on_control(
             return None
         similarity = Similarity.from_points(source[keep], target[keep])
         off = np.linalg.norm(similarity.residuals(source, target), axis=1)
-        keep = off <= KEPT_SIGMAS * max(median(off), 1e-9)
+        keep = off <= KEPT_SIGMAS * max(np.median(off), 1e-9)
     return similarity

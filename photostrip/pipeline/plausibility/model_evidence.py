@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, median, quantile
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
@@ -58,17 +58,17 @@ def _evidence(
     centers, depth = formed.centers[known], _depths(formed)[known]
     places = rows_of_given(control.ids, formed.point, point_ids)
     rows = np.flatnonzero(places >= 0)
-    xyz, middle = formed.xyz[places[rows]], median(depth)
+    xyz, middle = formed.xyz[places[rows]], np.median(depth)
     turn = formed.places.rotation[formed.models.model]
     variance = np.einsum("nij,nj->ni", turn**2, formed.models.sigma**2)
     variance *= (formed.places.scale[formed.models.model] ** 2 * formed.links.factor)[:, None]
-    plan, height = np.sqrt(median(variance[:, :2])), np.sqrt(median(variance[:, 2]))
+    plan, height = np.sqrt(np.median(variance[:, :2])), np.sqrt(np.median(variance[:, 2]))
     floor = 2.0 * float(plan) / abs(middle), 2.0 * float(height) / abs(middle)
     axes = np.tile(UP, (len(centers), 1))
     on_strip = StripPoints(strip.id, xyz, axes=axes, centers=centers, floor=floor, depth=abs(middle))
     along = np.interp(xyz[:, 0], centers[:, 0], known.astype(float))
     length = max(float(np.ptp(centers[:, 0])), 1e-9)
-    breadth = quantile(np.abs(formed.xyz[:, 1] - median(formed.xyz[:, 1])), 0.95) / length
+    breadth = np.quantile(np.abs(formed.xyz[:, 1] - np.median(formed.xyz[:, 1])), 0.95) / length
     return ModelStripEvidence(
         strip=strip,
         centers=centers,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Strip
@@ -84,7 +84,7 @@ def find_shifted_checks(result: Result) -> Iterator[Finding]:
     lists = dict(zip(control.ids, control.frame.tolist(), strict=True))
     known = [each for each in (() if result.precision is None else result.precision.checks) if each is not None]
     rows = [np.array([lists[each.ids[point]] for point in each.point]) for each in known]
-    for number in distinct(control.frame[control.check]).tolist():
+    for number in np.unique(control.frame[control.check]).tolist():
         of_list = [each.take(np.flatnonzero(own == number)) for each, own in zip(known, rows, strict=True)]
         axes, shared = _common_shift([each for each in of_list if each.coordinates])
         if shared is None:
@@ -101,14 +101,14 @@ def find_shifted_checks(result: Result) -> Iterator[Finding]:
 
 def _common_shift(checks: Sequence[CheckErrors]) -> tuple[Numbers, Shared | None]:
     """Test one shift of all check points against none, and against one wrong point; along the axes that are given."""
-    axes = distinct(np.array([axis for each in checks for axis in each.axis], np.intp))
+    axes = np.unique(np.array([axis for each in checks for axis in each.axis], np.intp))
     normal, pull, squares, alone = np.zeros((len(axes), len(axes))), np.zeros(len(axes)), 0.0, 0.0
     for each in checks:
         weight = np.linalg.inv(each.covariance)
         columns, pulled = (each.axis[:, None] == axes).astype(float), weight @ each.difference
         normal, pull = normal + columns.T @ weight @ columns, pull + columns.T @ pulled
         squares += float(each.difference @ pulled)
-        for point in distinct(each.point):
+        for point in np.unique(each.point):
             rows = np.flatnonzero(each.point == point)
             alone = max(alone, float(pulled[rows] @ np.linalg.solve(weight[np.ix_(rows, rows)], pulled[rows])))
     count = sum(each.coordinates for each in checks)

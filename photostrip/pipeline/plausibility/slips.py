@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, median
+from photostrip.arrays import Flags, Floats
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Finding
 from photostrip.pipeline.given_points import rejected_control, rows_of_given
@@ -85,7 +85,7 @@ class Predicted:
         columns = [2] if axis == point_slips.HEIGHT else [0, 1]
         ratio = np.abs(np.delete(self.off, row, axis=0) / np.delete(self.sigma, row, axis=0))[:, columns]
         known = ratio[np.isfinite(ratio)]
-        excess = max(SIGMA_FROM_MEDIAN * median(known), 1.0) if len(known) else 1.0
+        excess = max(SIGMA_FROM_MEDIAN * np.median(known), 1.0) if len(known) else 1.0
         return float(self.sigma[row, axis]) * excess
 
     def stands_out(self, row: int, axis: int) -> bool:

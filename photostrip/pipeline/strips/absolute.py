@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, quantile
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
@@ -70,7 +70,7 @@ class OrientedStrip:
         xyz, centers = self.xyz, self.absolute.similarity(self.formed.centers)
         bases = np.linalg.norm(np.diff(centers, axis=0), axis=1)
         spacing = np.nanmean(bases) if np.isfinite(bases).any() else np.ptp(xyz[:, 0]) / max(len(bases), 1)
-        return float(spacing), max(quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
+        return float(spacing), max(np.quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
 
     @cached_property
     def misclosures(self) -> Misclosures:

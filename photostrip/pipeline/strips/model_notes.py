@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from photostrip.arrays import distinct, median
 from photostrip.notes import Note
 from photostrip.pipeline.inputs import ModelStrip
 from photostrip.points import ModelPoints
@@ -61,7 +60,7 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
         )
         yield Note("contradicting-link", text, strip=strip.id, points=tuple(points))
     left = np.bincount(shared.link, links.used, shared.count)
-    for link in distinct(shared.link[[each.row for each in links.rejections]]).tolist():
+    for link in np.unique(shared.link[[each.row for each in links.rejections]]).tolist():
         if left[link] < LEFT:  # two conditions check nine coordinates
             names, out = strip.models[link : link + 2], shared.before[(shared.link == link) & ~links.used]
             points = [measured.name(node) for node in models.node[out].tolist()]
@@ -74,7 +73,7 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
 
 def _unit_notes(strip: ModelStrip, formed: FormedModels) -> Iterator[Note]:
     """Say where a model, or the standard deviations, seem to stand in another unit than they should."""
-    scale = formed.places.scale / median(formed.places.scale)
+    scale = formed.places.scale / np.median(formed.places.scale)
     for number in np.flatnonzero(np.abs(np.log(scale)) > np.log(ODD_SCALE)).tolist():
         times = f"{1 / scale[number]:.3g} times smaller" if scale[number] < 1 else f"{scale[number]:.3g} times larger"
         text = (

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_array
 
-from photostrip.arrays import Floats, Numbers, median
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import Similarity, similarity_derivatives
@@ -56,7 +56,7 @@ class LinkedModels:
         turn = places.scale[:, None, None] * places.rotation
         variance = np.einsum("nij,nj->ni", turn[models.model] ** 2, models.sigma**2) * self.formed.links.factor
         point = models.node < models.points
-        plan, height = median(variance[point, :2].mean(axis=1)), median(variance[point, 2])
+        plan, height = np.median(variance[point, :2].mean(axis=1)), np.median(variance[point, 2])
         return absolute_orientation.PointPrecision(float(np.sqrt(plan)), float(np.sqrt(height)))
 
     def overturned(self) -> LinkedModels:

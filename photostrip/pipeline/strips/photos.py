@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.network.gross_errors.strip_rays import StripRays
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import Settings, Strip
@@ -90,7 +90,7 @@ class FormedPhotos:
         """Rows of image points that are used in a model or place a point without one, in the order of the photos."""
         oriented, formed = self.orientation, self.formed
         in_models = oriented.rows[oriented.used & np.isfinite(formed.model_xyz).all(axis=1)]
-        rows = distinct(np.append(in_models, formed.bridging))
+        rows = np.unique(np.append(in_models, formed.bridging))
         return rows[np.argsort(self.strip.positions(self.observations)[rows], kind="stable")]
 
 

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, median, pieces
+from photostrip.arrays import Floats, Numbers, pieces
 from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import similarity_derivatives
@@ -57,7 +57,7 @@ class OrientedPhotos:
         """Covariance of any misclosures at the control, strip and control together, metres^2."""
         stage, misclosures = self.stage, self.oriented.misclosures
         # image coordinates are taken as good as stated, or as bad as the pairs have proved
-        factor = max(1.0, median(stage.screened.scatter.by_pair) ** 2 / (2 * stage.sigma**2))
+        factor = max(1.0, np.median(stage.screened.scatter.by_pair) ** 2 / (2 * stage.sigma**2))
         errors = self.errors.with_doubt(stage.formed.junctions.doubt / np.sqrt(factor))
 
         def of(some: Numbers) -> Floats:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, distinct
+from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
 from photostrip.network.gross_errors.strip_rays import StripRays
 from photostrip.rejection import SEVERAL_RAYS, Rejection
@@ -60,7 +60,7 @@ def form_screened(
     if found is None:
         return ScreenedFormation(of_pairs, formed, (), tested=False)
     used, aside = _uses(of_pairs, found, readmit=readmit)
-    changed = distinct(of_pairs.pairs.pair[used != of_pairs.used])
+    changed = np.unique(of_pairs.pairs.pair[used != of_pairs.used])
     oriented = orient_again(of_pairs, np.where(used, rays.weight, 0.0), changed) if len(changed) else of_pairs
     try:
         formed = form_from_pairs(
@@ -77,7 +77,7 @@ def _bridged(
 ) -> FormedStrip:
     """Add the points whose good rays come from photos that are no neighbours."""
     rows = oriented.rows[~np.isin(oriented.point, formed.point)]
-    good = distinct(rows[~np.isin(rows, np.array([each.row for each in found], np.intp))])
+    good = np.unique(rows[~np.isin(rows, np.array([each.row for each in found], np.intp))])
     if not len(good):
         return formed
     return non_neighbours.bridge(formed, rays.observations, photos, oriented.pairs.focal, good)

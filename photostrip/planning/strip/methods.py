@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, quantile
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
@@ -124,7 +124,7 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     numbers, targets, weight, xyz = ground.numbers, ground.targets, ground.weight, ground.xyz
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
-        breadth = max(quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
+        breadth = max(np.quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
         problem = correction.FitProblem(
             xyz=xyz[numbers], targets=targets, weight=weight, spacing=strip.geometry.base, breadth=breadth
         )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photostrip.arrays import Flags, median
+from photostrip.arrays import Flags
 from photostrip.notes import Finding
 from photostrip.plausibility.control.plan_fit import PlanSimilarity, fit_similarity
 from photostrip.plausibility.control.straightening import (
@@ -58,7 +58,7 @@ def find_foreign_lists(
             continue
         wrong.append(number)
         scale = None if (of_list := alone[number]) is None else abs(of_list.turn) / abs(reference.turn)
-        shift = complex(median(off.real), median(off.imag))
+        shift = complex(np.median(off.real), np.median(off.imag))
         names = tuple(given.ids[row] for row in np.flatnonzero(rows))
         findings.append(_other_frame(on_strip, names, number, first, shift, scale))
     return wrong, findings

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, column_medians, distinct, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.plausibility.control.straightening import GivenPoints, WrittenAxes
@@ -37,7 +37,7 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
     known = np.column_stack([plan, plan, height])
     sigma = np.where(known & (control.sigma > 0), control.sigma, np.nan)
     stated = (part[np.isfinite(part)] for part in (sigma[:, :2], sigma[:, 2]))
-    usual = [median(part) if len(part) else USUAL_SIGMA for part in stated]
+    usual = [np.median(part) if len(part) else USUAL_SIGMA for part in stated]
     return GivenPoints(
         ids=control.ids,
         xyz=np.where(known, xyz, np.nan),
@@ -66,12 +66,12 @@ def _plain_axes(control: ControlPoints, frames: Sequence[GroundFrame]) -> Writte
 def _moved(written: Floats, lists: Numbers) -> Floats:
     """By how much coordinates in plan that lie far from all others of their list are moved to its middle (n, 3)."""
     moved = np.zeros_like(written)
-    for number in distinct(lists).tolist():
+    for number in np.unique(lists).tolist():
         rows = np.flatnonzero((lists == number) & np.isfinite(written[:, :2]).all(axis=1))
         if len(rows) < LEAST_OF_LIST:
             continue
-        off = written[rows, :2] - column_medians(written[rows, :2])
-        far = np.abs(off) > FAR_AWAY * column_medians(np.abs(off)).max()
+        off = written[rows, :2] - np.median(written[rows, :2], axis=0)
+        far = np.abs(off) > FAR_AWAY * np.median(np.abs(off), axis=0).max()
         moved[rows, :2] = np.where(far, off, 0.0)
     return moved
 
@@ -79,13 +79,13 @@ def _moved(written: Floats, lists: Numbers) -> Floats:
 def _filled(written: Floats, lists: Numbers) -> Floats:
     """Coordinates with the mean of their list, or of all, where they are not given."""
     filled = written.copy()
-    for number in distinct(lists).tolist():
+    for number in np.unique(lists).tolist():
         rows = lists == number
         for axis in range(3):
             values = written[rows, axis]
             if not np.isfinite(values).any():
                 values = written[:, axis]
-            mean = median(values[np.isfinite(values)]) if np.isfinite(values).any() else 0.0
+            mean = np.median(values[np.isfinite(values)]) if np.isfinite(values).any() else 0.0
             part = filled[rows, axis]
             filled[rows, axis] = np.where(np.isfinite(part), part, mean)
     return filled
@@ -95,10 +95,10 @@ def _decoded(filled: Floats, control: ControlPoints, frames: Sequence[GroundFram
     """Bring the points through their frames; None where the frames refuse."""
     cartesian = np.empty_like(filled)
     try:
-        for number in distinct(control.frame).tolist():
+        for number in np.unique(control.frame).tolist():
             rows = control.frame == number
             cartesian[rows] = frames[number].cartesian_from_ground(filled[rows])
-        middle = column_medians(cartesian[plan])
+        middle = np.median(cartesian[plan], axis=0)
         first = frames[int(control.frame[int(np.argmax(plan))])]
         turn = first.level_axes_at(middle[None, :])[0]
     except (GeometryError, InputError):
@@ -113,7 +113,7 @@ def _axes_through_frames(
 ) -> WrittenAxes:
     axes, unit = np.empty((len(filled), 3, 3)), np.ones_like(filled)
     try:
-        for number in distinct(control.frame).tolist():
+        for number in np.unique(control.frame).tolist():
             rows, frame = control.frame == number, frames[number]
             axes[rows] = frame.axes_at(cartesian[rows])
             if frame.kind != "geocentric":  # whose coordinates are no plan and no height

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.statistics import SIGMA_FROM_MEDIAN, t_quantile
 
 Complex = NDArray[np.complex128]
@@ -90,7 +90,7 @@ def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> Plan
 
 def _evenly(count: int, most: int) -> Numbers:
     """Numbers below a count, evenly drawn from all where there are too many."""
-    return distinct(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
 
 
 def _median(size: Floats, unknowns: int) -> Floats:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, distinct
+from photostrip.arrays import Floats
 from photostrip.errors import PhotostripError
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.statistics import f_p_value
@@ -97,7 +97,7 @@ def _shifts(strip: StripAtControl, whole: JointAdjustment, alone: float) -> list
     found = []
     for number in numbers[np.argsort(sizes, kind="stable")][:-1].tolist():
         inside = lists == number
-        axes = distinct(place.axis[inside])
+        axes = np.unique(place.axis[inside])
         tested = _tested(whole, (inside[:, None] & (place.axis[:, None] == axes)).astype(float), alone)
         if tested is not None:
             shift, sigma = np.full((2, 3), np.nan)

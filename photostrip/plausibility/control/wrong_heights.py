@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, distinct, median
+from photostrip.arrays import Flags, Floats
 from photostrip.geodesy.curvature import EARTH_RADIUS
 from photostrip.notes import Finding
 from photostrip.plausibility.control.plan_fit import (
@@ -146,7 +146,7 @@ class HeightStretch:
         """Rms of what a fit leaves; what is far off counts less."""
         size = np.abs(residual[self.heights.in_fit])
         freedom = max(len(size) - unknowns, 1)
-        rms = float(np.sqrt((np.minimum(size, KEPT_SIGMAS * median(size)) ** 2).sum() / freedom))
+        rms = float(np.sqrt((np.minimum(size, KEPT_SIGMAS * np.median(size)) ** 2).sum() / freedom))
         return max(rms / self.heights.floor, 1.0)
 
 
@@ -252,7 +252,7 @@ def _other_scale(on_strip: StripPoints, ratio: float, sigma: float, in_fit: Flag
 
 def _groups(given: GivenPoints, in_fit: Flags) -> Iterator[tuple[str, Flags, str]]:
     """Give groups of heights that may be of another kind: lists, and points without plan."""
-    for number in distinct(given.group[in_fit])[1:].tolist():
+    for number in np.unique(given.group[in_fit])[1:].tolist():
         inside = given.group == number
         if min((inside & in_fit).sum(), (~inside & in_fit).sum()) >= LEAST_GROUP:
             yield f"control[{number}]", inside, f"control[{number}].height"

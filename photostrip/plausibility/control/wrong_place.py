@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, column_medians, median
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.crs import Area, AreasOfUse
 from photostrip.geodesy.ground_frame import GroundFrame
@@ -100,7 +100,7 @@ def _outside(frame: GroundFrame, areas: AreasOfUse, level: Floats, where: str, t
 
 def _other_zone(frame: GroundFrame, area: Area | None, level: Floats) -> str:
     """Say what to do where eastings begin with the number of the next zone: those of this one would lie in its area."""
-    begin = np.floor(median(level[:, 0]) / MILLION)
+    begin = np.floor(np.median(level[:, 0]) / MILLION)
     steps = np.array([[-MILLION, 0.0, 0.0], [MILLION, 0.0, 0.0]]) if begin > 0 else ()
     if not any(_inside(frame, area, level + step, margin=0.0) for step in steps):
         return ""
@@ -111,8 +111,8 @@ def _together(enu: Floats) -> Floats:
     """Return points without those that lie so far from the others that no map reaches there."""
     if not len(enu):
         return enu
-    far = np.abs(enu[:, :2] - column_medians(enu[:, :2])).max(axis=1)
-    return np.asarray(enu[far <= SLIP_OF_PEN * median(far)], float)
+    far = np.abs(enu[:, :2] - np.median(enu[:, :2], axis=0)).max(axis=1)
+    return np.asarray(enu[far <= SLIP_OF_PEN * np.median(far)], float)
 
 
 def _readings(level: Floats) -> Iterator[tuple[str, Floats, str, str]]:
@@ -178,7 +178,7 @@ def _degrees(frame: GroundFrame, enu: Floats) -> Floats | None:
 def _where(frame: GroundFrame, level: Floats, known: Floats) -> str:
     degrees = _degrees(frame, level)
     if degrees is None:
-        east, north = (median(known[:, axis]) for axis in (0, 1))
+        east, north = (np.median(known[:, axis]) for axis in (0, 1))
         return f"lies nowhere on the Earth (east about {east:.6g}, north about {north:.6g})"
-    lon, lat = (median(degrees[:, axis]) for axis in (0, 1))
+    lon, lat = (np.median(degrees[:, axis]) for axis in (0, 1))
     return f"lies about {abs(lon):.1f} {'E' if lon >= 0 else 'W'}, {abs(lat):.1f} {'N' if lat >= 0 else 'S'}"

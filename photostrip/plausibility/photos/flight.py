@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, column_medians, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.notes import Finding, listed
 from photostrip.plausibility.finding import found
 
@@ -38,7 +38,7 @@ def find_odd_centers(
         yield _below([photos[number] for number in below.tolist()], depth, below, names)
     if len(photos) < LEAST_PHOTOS:
         return
-    flying = median(np.abs(depth))
+    flying = np.median(np.abs(depth))
     yield from _heights(centers @ up, flying, photos, names)
     bases = np.diff(centers, axis=0)
     bases = bases - (bases @ up)[:, None] * up
@@ -53,7 +53,7 @@ def _below(photos: Sequence[str], depth: Floats, below: Numbers, names: tuple[st
         else f"the perspective centres of photos {listed(photos)} lie below the points that they show"
     )
     fix = "are x and y of the image coordinates or the axes of the control exchanged?"
-    evidence = {"lowest_over_usual": float(depth[below].min() / median(np.abs(depth)))}
+    evidence = {"lowest_over_usual": float(depth[below].min() / np.median(np.abs(depth)))}
     return found("P204", message, fix, evidence, photos=photos, strips=names)
 
 
@@ -91,14 +91,14 @@ def _beside(number: int, count: int) -> list[int]:
 def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
     """Line whose slope is the median of those of all pairs of points."""
     i, j = np.triu_indices(len(x), 1)
-    slope = median((y[j] - y[i]) / (x[j] - x[i]))
-    return median(y - slope * x), slope
+    slope = np.median((y[j] - y[i]) / (x[j] - x[i]))
+    return np.median(y - slope * x), slope
 
 
 def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
     step = np.abs(np.diff(np.log(np.maximum(length, 1e-12))))
     for number in _worth_a_look(np.append(step, 0.0) > STEP_SHARE * np.log(LONG_BASE)):
-        usual = median(length[_beside(number, len(length))])
+        usual = np.median(length[_beside(number, len(length))])
         ratio = float(length[number]) / max(usual, 1e-12)
         if SHORT_BASE < ratio < LONG_BASE:
             continue
@@ -112,7 +112,7 @@ def _directions(bases: Floats, up: Floats, photos: Sequence[str], names: tuple[s
     unit = bases / np.maximum(np.linalg.norm(bases, axis=1, keepdims=True), 1e-12)
     cosine = (unit[1:] * unit[:-1]).sum(axis=1)
     for number in _worth_a_look(np.append(cosine, 1.0) < np.cos(np.radians(STEP_SHARE * TURNED_DEG))):
-        usual = column_medians(unit[_beside(number, len(bases))])
+        usual = np.median(unit[_beside(number, len(bases))], axis=0)
         turn = np.degrees(np.arctan2(np.cross(usual, bases[number]) @ up, usual @ bases[number]))
         if abs(turn) <= TURNED_DEG:
             continue

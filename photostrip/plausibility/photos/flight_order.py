@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from photostrip.arrays import Floats, median
+from photostrip.arrays import Floats
 from photostrip.notes import MOST_NAMED, Finding, listed
 from photostrip.plausibility.finding import found
 from photostrip.plausibility.photos import mosaic
@@ -197,7 +197,7 @@ def _twice(links: mosaic.PhotoLinks) -> list[tuple[int, int]]:
     base = np.abs(links.bases[1])
     if not len(base):
         return []
-    usual = median(base)
+    usual = np.median(base)
     like = np.abs(np.log(np.maximum(np.abs(links.turn), mosaic.TINY))) < np.log(mosaic.SCALE_JUMP)
     same = (
         like
@@ -211,7 +211,7 @@ def _twice(links: mosaic.PhotoLinks) -> list[tuple[int, int]]:
 def _twin(links: mosaic.PhotoLinks, pair: tuple[int, int], strip: str, photos: Sequence[str]) -> Finding:
     row = links.index[pair]
     one, other = photos[pair[0]], photos[pair[1]]
-    usual = median(np.abs(links.bases[1]))
+    usual = np.median(np.abs(links.bases[1]))
     message = (
         f"photos {one} and {other} show their {links.count[row]} common points at the same places, within "
         f"{100 * float(links.misfit[row]) / usual:.2g} % of a base: the same photo twice"

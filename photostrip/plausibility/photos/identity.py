@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, median
+from photostrip.arrays import Floats, Numbers
 from photostrip.notes import Finding
 from photostrip.plausibility.finding import found
 from photostrip.points import ControlPoints, PhotoPoints, located
@@ -82,7 +82,7 @@ def find_double_ids(
     bases = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)
     depth = _depth(formed)
     reach = SAME_PLACE_SIGMAS * sigma / focal * depth
-    tall = SAME_HEIGHT_FACTOR * reach * depth / max(median(bases), 1e-12)
+    tall = SAME_HEIGHT_FACTOR * reach * depth / max(np.median(bases), 1e-12)
     one, two = _near(formed.xyz, reach)
     apart = len(formed.xyz) ** 2 * reach**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
     near = SAME_IMAGE_SIGMAS / SAME_PLACE_SIGMAS * reach  # two points farther apart are seen as two on their photos
@@ -146,7 +146,7 @@ def find_double_ids_in_images(observations: PhotoPoints, rows: Numbers, strip_id
     if not len(rows):
         return
     o = observations
-    reach = SAME_IMAGE_SIGMAS * median(o.sigma[rows]) * np.sqrt(2.0)
+    reach = SAME_IMAGE_SIGMAS * np.median(o.sigma[rows]) * np.sqrt(2.0)
     rows = rows[np.lexsort((o.xy[rows, 0], o.photo[rows]))]
     first = np.flatnonzero(np.diff(o.photo[rows], prepend=-1))
     extent = np.maximum.reduceat(o.xy[rows], first) - np.minimum.reduceat(o.xy[rows], first)
@@ -194,9 +194,9 @@ def find_copied_points(control: ControlPoints, observations: PhotoPoints) -> Ite
         evidence: dict[str, float | int | str] = {"photos": len(gaps)}
         where = "no photo shows both"
         if len(gaps):
-            evidence["apart_mm"] = median(gaps)
+            evidence["apart_mm"] = np.median(gaps)
             where = f"the photos show them {evidence['apart_mm']:.1f} mm apart"
-            if median(gaps) < COPIED_SIGMAS * median(observations.sigma[at[0]]):
+            if np.median(gaps) < COPIED_SIGMAS * np.median(observations.sigma[at[0]]):
                 continue  # two ids for one point
         names = (control.ids[a], control.ids[b])
         message = f"given points {' and '.join(names)} have the same coordinates, and {where}"
@@ -207,7 +207,7 @@ def _depth(formed: FormedStrip) -> float:
     """Usual distance of the points from the line of the cameras, units of the strip."""
     axis = formed.rotations[:, :, 2].mean(axis=0)
     axis /= max(float(np.linalg.norm(axis)), 1e-12)
-    return float(abs(median(formed.centers @ axis) - median(formed.xyz @ axis)))
+    return float(abs(np.median(formed.centers @ axis) - np.median(formed.xyz @ axis)))
 
 
 def _area(xyz: Floats) -> float:

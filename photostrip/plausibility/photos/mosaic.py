@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from photostrip.arrays import Flags, Floats, Numbers, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.points import PhotoPoints
 
 Complex = NDArray[np.complex128]
@@ -263,7 +263,7 @@ def lay_out(links: PhotoLinks, photos: int) -> Mosaic:
         if 2 * plane.mirrored[inside].sum() > inside.sum():  # most photos count as not mirrored: turn the plane over
             plane.factor[inside], plane.offset[inside] = np.conj(plane.factor[inside]), np.conj(plane.offset[inside])
             plane.mirrored[inside] = ~plane.mirrored[inside]
-        plane.size[inside] /= median(plane.size[inside])
+        plane.size[inside] /= np.median(plane.size[inside])
     sizes = np.bincount(plane.part, minlength=1)
     rank = np.empty(len(sizes), np.intp)
     rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.notes import Finding, counted
 from photostrip.plausibility.finding import found
 from photostrip.points import PhotoPoints
@@ -57,7 +57,7 @@ def find_shifted_photo(
         every image point, and that of the photo.
     """
     position = observations.places(adjusted.photos)
-    misfit = _misfit(position, distinct(rows), adjusted)
+    misfit = _misfit(position, np.unique(rows), adjusted)
     if not (adjusted.doubted or misfit.max() > POOR_SQUARES):
         return
     shifted = tried(position, int(misfit.argmax()))

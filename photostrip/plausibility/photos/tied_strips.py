@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, median
+from photostrip.arrays import Floats, Numbers
 from photostrip.notes import Finding
 from photostrip.plausibility.control.straightening import LEAST_REDUNDANCY, fit_simplest
 from photostrip.plausibility.finding import found
@@ -53,7 +53,7 @@ def odd_ties(ties: TiesOfStrips) -> OddTies | None:
     if len(ties.names) < LEAST_TIES:
         return _of_few(ties)
     place, off = ties.plan[:, 0] + 1j * ties.plan[:, 1], ties.difference[:, 0] + 1j * ties.difference[:, 1]
-    middle = complex(median(off.real), median(off.imag))
+    middle = complex(np.median(off.real), np.median(off.imag))
     if (np.abs(off - middle) <= MANY_RAYS_SHARE * ties.depth).all():
         return None  # none is far from the others even if the strips share no bend
     local = (place - place.mean()) / max(float(np.abs(place - place.mean()).max()), 1e-9)
@@ -97,4 +97,4 @@ def find_shared_ids_of_strips(ties: TiesOfStrips, *, joined: bool = False) -> It
 
 
 def _others(far: Floats) -> str:
-    return f"; half of the other common points agree within {median(far):.2g} m" if len(far) else ""
+    return f"; half of the other common points agree within {np.median(far):.2g} m" if len(far) else ""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct, median, quantile
+from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera
 from photostrip.notes import Finding, counted, listed
 from photostrip.plausibility.finding import found
@@ -92,16 +92,16 @@ def _scaled(observations: PhotoPoints, cameras: Mapping[str, Camera], camera: Ca
 def _reach(observations: PhotoPoints, scaled: Floats, photo: Numbers) -> _Reach:
     """Measure how far image points of a camera reach, photo by photo and from their own middle."""
     size = np.abs(scaled).max(axis=1)
-    ends = [[quantile(each, share) for each in scaled.T] for share in (1.0 - REACH_SHARE, REACH_SHARE)]
+    ends = [[np.quantile(each, share) for each in scaled.T] for share in (1.0 - REACH_SHARE, REACH_SHARE)]
     middle = np.mean(ends, axis=0)
     return _Reach(
-        whole=quantile(size, REACH_SHARE),
+        whole=np.quantile(size, REACH_SHARE),
         of_photo={
-            observations.photo_ids[number]: quantile(size[photo == number], REACH_SHARE)
-            for number in distinct(photo).tolist()
+            observations.photo_ids[number]: np.quantile(size[photo == number], REACH_SHARE)
+            for number in np.unique(photo).tolist()
         },
         middle=middle,
-        about_middle=quantile(np.abs(scaled - middle).max(axis=1), REACH_SHARE),
+        about_middle=np.quantile(np.abs(scaled - middle).max(axis=1), REACH_SHARE),
     )
 
 
@@ -120,7 +120,7 @@ def find_wrong_units(
         low, high = REACH if known else REACH_OF_DISTANCE
         factors[name] = 1.0
         scaled, photo = _scaled(observations, cameras, camera)
-        if not len(scaled) or low < quantile(np.abs(scaled).max(axis=1), REACH_SHARE) < high:
+        if not len(scaled) or low < np.quantile(np.abs(scaled).max(axis=1), REACH_SHARE) < high:
             continue
         reach = _reach(observations, scaled, photo)
         odd = [photo for photo, own in reach.of_photo.items() if not low < own < high]
@@ -146,8 +146,8 @@ def _unit_of_reach(camera: Camera) -> str:
 
 def _odd_photos(camera: Camera, photos: Sequence[str], reach: _Reach) -> Finding:
     """Say that some photos of a camera reach too far, or not far enough."""
-    own = median([reach.of_photo[photo] for photo in photos])
-    others = median([each for photo, each in reach.of_photo.items() if photo not in photos])
+    own = np.median([reach.of_photo[photo] for photo in photos])
+    others = np.median([each for photo, each in reach.of_photo.items() if photo not in photos])
     message = (
         f"image coordinates on {listed(photos)} reach to {own:.3g} times {_unit_of_reach(camera)}, on the other photos "
         f"of camera {camera.name} to {others:.2g}"
@@ -175,7 +175,7 @@ def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding
     odd = (scales < MARKS_RATIO[0]) | (scales > MARKS_RATIO[1])
     if not odd.any():
         return []
-    scale = median(scales[odd])
+    scale = np.median(scales[odd])
     names = tuple(photo for photo, each in zip(photos, odd, strict=True) if each)
     reading = reading_of(1.0 / scale, MARKS_RATIO)
     message = (
@@ -192,7 +192,7 @@ def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding
 def is_measured(sigma0: Floats) -> bool:
     """Whether pairs of photos have noise, by their standard deviations of an image coordinate (p,), mm."""
     known = sigma0[np.isfinite(sigma0)]
-    return bool(len(known) and median(known) > LEAST_MEASURED)
+    return bool(len(known) and np.median(known) > LEAST_MEASURED)
 
 
 def find_wrong_sigmas(sigma0: Floats, stated: float, strip: str) -> list[Finding]:
@@ -202,7 +202,7 @@ def find_wrong_sigmas(sigma0: Floats, stated: float, strip: str) -> list[Finding
     """
     if not is_measured(sigma0):
         return []
-    middle = median(sigma0[np.isfinite(sigma0)])
+    middle = np.median(sigma0[np.isfinite(sigma0)])
     if middle > stated / TOO_GOOD:
         return []
     message = (
@@ -223,7 +223,7 @@ def find_wrong_sigmas_of_given(off: Floats, sigma: Floats) -> list[Finding]:
         known = np.isfinite(off[:, columns] / sigma[:, columns]).all(axis=1)
         if known.sum() < LEAST_CHECKED:
             continue
-        middle, expected = (median(np.abs(each[known][:, columns])) for each in (off, sigma))
+        middle, expected = (np.median(np.abs(each[known][:, columns])) for each in (off, sigma))
         if middle < expected / TOO_GOOD:
             message = (
                 f"check points are {middle:.3g} m off in {name}, less than a thirtieth of the standard deviation that "

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photostrip.arrays import Numbers, distinct
+from photostrip.arrays import Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.control import ControlTable
 from photostrip.formats.text.findings import Findings
@@ -154,7 +154,7 @@ def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
 def _common(strip: Strip, observations: PhotoPoints) -> list[Numbers]:
     """Count the points that each photo of a strip has in common with the next, and with the next two."""
     place, width = strip.positions(observations), len(strip.photos) + 2
-    key = distinct((observations.point * width + place)[place >= 0])  # on the next photo it is larger by one
+    key = np.unique((observations.point * width + place)[place >= 0])  # on the next photo it is larger by one
     on_next = np.diff(key, append=-1) == 1
     rows = on_next, on_next & np.append(on_next[1:], [False])
     return [np.bincount(key[some] % width, minlength=width) for some in rows]
@@ -294,7 +294,7 @@ def _control(project: Project, tables: Tables) -> Iterator[Document]:
     else:
         measured = project.inputs.observations
         count, total = len(measured.photo_ids), len(measured.point_ids)
-        times = np.bincount(distinct(measured.point * count + measured.photo) // count, minlength=total)
+        times = np.bincount(np.unique(measured.point * count + measured.photo) // count, minlength=total)
         photos = dict(zip(measured.point_ids, times.tolist(), strict=True))
     for number, read in enumerate(tables.control):
         if read is not None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.measured.models import ModelTable
@@ -76,7 +76,7 @@ def points_of_strip(models: MeasuredModels, number: int) -> Numbers:
     points = models.points
     known = set(models.strips[number].models)
     inside = np.array([name in known for name in points.model_ids], bool)[points.model]
-    return distinct(points.node[inside & (points.node < len(points.point_ids))])
+    return np.unique(points.node[inside & (points.node < len(points.point_ids))])
 
 
 def photos_of_points(models: MeasuredModels) -> dict[str, set[str]]:

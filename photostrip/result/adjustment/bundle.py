@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, median
+from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.network import reliability
 from photostrip.network.problem import BundleProblem
@@ -205,10 +205,10 @@ def _group(group: reliability.Group, shift: float, kind: GroupKind) -> Document:
         "mean": share.mean(),
         "smallest": share.min(),
         "uncontrolled": int((~controlled).sum()),
-        "detectable": median(detectable),
+        "detectable": np.median(detectable),
         "detectable_largest": detectable.max(),
         "unit": kind.unit,
-        "external": median(external),
+        "external": np.median(external),
         "external_largest": external.max(),
     }
 

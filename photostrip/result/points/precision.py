@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from photostrip.arrays import Floats, median
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
 from photostrip.notes import Document
@@ -141,7 +141,7 @@ def _basis_of_singles(result: Result) -> list[Document]:
     if result.bundle is None:
         return []
     bundle = result.bundle
-    sigma_um = 1000.0 * median(bundle.block.problem.images.sigma) * bundle.unit
+    sigma_um = 1000.0 * np.median(bundle.block.problem.images.sigma) * bundle.unit
     basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"
     return [{"strip": each.strip.id, "sigma_um": sigma_um, "basis": basis} for each in bundle.singles]
 

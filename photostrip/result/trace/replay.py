@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.similarity import Similarity
 from photostrip.strip import absolute_orientation
 from photostrip.strip.relative_orientation.pairs import Pairs, collect_pairs
@@ -52,7 +52,7 @@ def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
     final = strip.of_photos.orientation
     given = _with_all_points(result, strip)
     rounds = [[first] for first in first_rounds(given, final.elements)]
-    changed = distinct(given.pair[given.weight != final.pairs.weight])
+    changed = np.unique(given.pair[given.weight != final.pairs.weight])
     ends = np.array([each[-1].end for each in rounds])
     for number, second in zip(changed.tolist(), _round(ends[changed], final.pairs.take(changed)), strict=True):
         rounds[number].append(second)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtrc
 
-from photostrip.arrays import Floats, Numbers, distinct
-from photostrip.statistics import gamma_cdf
+from photostrip.arrays import Floats, Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class CheckErrors:
 
     @property
     def points(self) -> int:
-        return len(distinct(self.point))
+        return len(np.unique(self.point))
 
     @property
     def coordinates(self) -> int:
@@ -54,7 +54,7 @@ class CheckErrors:
     @property
     def probability(self) -> float:
         """Probability of a larger sum of squares by chance."""
-        return 1 - gamma_cdf(self.squares / 2, self.coordinates / 2)
+        return float(chdtrc(self.coordinates, self.squares))
 
     @property
     def independent(self) -> float:

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.strip.error_propagation.control_errors import FitOperator, Misclosures
 from photostrip.strip.error_propagation.photo_errors import NUMBERS, PhotoErrors
 from photostrip.strip.error_propagation.strip_errors import StripErrors, entries_of
@@ -65,7 +65,7 @@ class FittedStrip:
         for some in self._pieces(np.arange(len(photos)), NUMBERS):
             numbers = entries_of(photos[some], NUMBERS).ravel()
             by_point = oriented.by_point[numbers]
-            points = np.asarray(distinct(by_point.indices // 3), np.intp)
+            points = np.asarray(np.unique(by_point.indices // 3), np.intp)
             by_point = by_point[:, entries_of(points, 3).ravel()]  # type: ignore[index]
             rows = by_point @ self.errors.points(points) + oriented.by_image[numbers]
             influence = by_point @ self.fit.influence(self.xyz[points]).reshape(3 * len(points), -1)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import ControlPoints
 from photostrip.strip import absolute_orientation
@@ -63,7 +63,7 @@ class StripAtControl:
         before = np.cumsum(self.control.use[order].sum(axis=1)) - 1
         total = len(self.coordinates.point)
         part = before * -(-total // LARGEST_SECTION) // max(total, 1)
-        parts = [np.sort(order[part == number]) for number in distinct(part)]
+        parts = [np.sort(order[part == number]) for number in np.unique(part)]
         return [(rows, self._section(rows)) for rows in parts]  # none of them holds the whole, which holds them
 
     def _section(self, rows: Numbers) -> StripAtControl:

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.strip.error_propagation.pair_errors import (
@@ -200,7 +200,7 @@ def differentiate_strip(
     pairs = differentiate_pairs(orientation, rotations[:-1], similarity.scale * formed.scale, across)
     centers = similarity(formed.centers)
     origin = centers.mean(axis=0)
-    images = distinct(orientation.rows)
+    images = np.unique(orientation.rows)
     column = np.zeros(len(sigma), np.intp)
     column[images] = 2 * np.arange(len(images))
     columns = (column[orientation.rows][..., None] + np.arange(2)).reshape(-1, 4)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from photostrip.arrays import Flags, median
+from photostrip.arrays import Flags
 from photostrip.camera import Camera
 from photostrip.errors import Fault
 from photostrip.notes import Note, named
@@ -31,7 +31,7 @@ def notes_on_marks(part: InteriorOrientation, camera: Camera) -> list[Note]:
     scale = np.sqrt(part.scale_x * part.scale_y)
     odd = np.abs(np.log(scale)) > ODD_SCALE
     if odd.any():
-        text = f"a measured millimetre is {median(scale[odd]):.5g} mm on {_photos(part, odd)}: unit or pixel size "
+        text = f"a measured millimetre is {np.median(scale[odd]):.5g} mm on {_photos(part, odd)}: unit or pixel size "
         text += "of the measurements is not as stated; the transformation puts it right"
         notes.append(_note("measured-scale", text, part, odd, severity="note"))
     affinity = np.abs(np.log(part.scale_x / part.scale_y))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import counted
@@ -205,7 +205,7 @@ def _counting(models: StripModels, links: ScreenedLinks, places: Similarities, x
     """
     used = np.ones(len(models.model), bool)
     shared = links.shared
-    touched = distinct(models.node[shared.before[~links.used]])
+    touched = np.unique(models.node[shared.before[~links.used]])
     for node in touched.tolist():
         rows = np.flatnonzero(models.node == node)
         rows = rows[np.argsort(models.model[rows], kind="stable")]
@@ -249,6 +249,6 @@ def far_ends(formed: FormedModels) -> Floats:
     scale = solved.similarities.scale
     found = np.zeros(len(scale))
     np.maximum.at(found, link, variance)
-    stated = np.array([median(models.sigma[rows[link == number]]) for number in range(len(scale))])
+    stated = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
     ratio: Floats = np.sqrt(found) / np.maximum(scale * stated, 1e-300)
     return ratio

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.strip.independent_models import linking
@@ -112,7 +112,7 @@ def _scatter(tests: PointTests, solved: SolvedLinks) -> float:
     independent = solved.redundancy.sum() / 3
     if len(known) < LEFT or independent < LEFT:
         return 1.0
-    ratio = median(known) / MEDIAN
+    ratio = np.median(known) / MEDIAN
     return ratio if ratio > 1 + SURE_SIGMAS * MEDIAN_SPREAD / np.sqrt(independent) else 1.0
 
 
@@ -133,7 +133,7 @@ def _worst(
     """One of the ``free`` rows of each link that must go; links that cannot tell it, or would break, are closed."""
     size = np.where(free & open_links[shared.link] & (value > limit[shared.link]), value, -np.inf)
     rows = []
-    for link in distinct(shared.link[np.isfinite(size)]).tolist():
+    for link in np.unique(shared.link[np.isfinite(size)]).tolist():
         rows_of_link = np.flatnonzero(shared.link == link)
         row = int(rows_of_link[np.argmax(size[rows_of_link])])
         alone = used.copy()
@@ -151,7 +151,7 @@ def _doubtful(shared: CommonPoints, value: Floats, limit: Floats) -> tuple[tuple
     """Rows of each link of which one is wrong, the worst first."""
     beyond = np.flatnonzero(value > limit[shared.link])
     found = []
-    for link in distinct(shared.link[beyond]).tolist():
+    for link in np.unique(shared.link[beyond]).tolist():
         rows_of_link = np.flatnonzero(shared.link == link)
         rows_of_link = rows_of_link[np.argsort(-np.nan_to_num(value[rows_of_link], nan=-np.inf), kind="stable")]
         near = rows_of_link[value[rows_of_link[0]] - value[rows_of_link] < EQUALLY_GOOD]

@@ -11,7 +11,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.statistics import f_p_value
 from photostrip.strip.polynomial import terms as polynomial_terms
 from photostrip.strip.polynomial.least_squares import AxisFit, FitProblem, Terms, fit_axes
@@ -240,7 +240,7 @@ def _carried_without(problem: FitProblem, counted: Numbers, inner: Sequence[Numb
     stations = polynomial_terms.count_stations(problem.xyz[counted, 0], problem.spacing) - 1
     degree = polynomial_terms.degree_of(terms)
     sizes = np.array([len(rows) for rows in inner])
-    for size in distinct(sizes).tolist():
+    for size in np.unique(sizes).tolist():
         chosen = polynomial_terms.ladder(stations, len(counted) - size, degree)
         left = np.array([rows for rows in inner if len(rows) == size])
         for drop in polynomial_terms.DROP_ORDER:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, distinct
+from photostrip.arrays import Floats, Numbers
 
 # Powers of X and Y. A term here, in the ladder and in the order of dropping is a term of X, Y and Z alike.
 POWERS = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
@@ -47,7 +47,7 @@ def columns(xyz: Floats, terms: Sequence[str]) -> Floats:
 
 def count_stations(x: Floats, spacing: float) -> int:
     """Largest number of points along the strip of which no two are nearer than a spacing."""
-    return len(distinct(bands(x, spacing))) if len(x) else 0
+    return len(np.unique(bands(x, spacing))) if len(x) else 0
 
 
 def bands(x: Floats, spacing: float) -> Numbers:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.notes import counted
 from photostrip.points import PhotoPoints, frozen_alike, take_rows
@@ -63,7 +63,7 @@ class Pairs:
         order = np.random.default_rng(0).permutation(points)[self.point]  # the same in all its pairs
         rows = np.lexsort((order, self.pair))
         rank = np.arange(len(rows)) - self.starts[self.pair]
-        return distinct(self.point[rows[rank < most]])
+        return np.unique(self.point[rows[rank < most]])
 
     def sums(self, values: Floats) -> Floats:
         """Sum columns over each pair: values by row, shape (..., m), become sums by pair, shape (..., p)."""
@@ -99,7 +99,7 @@ def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float
         pair=pair,
         left=left,
         right=right,
-        weight=frozen_alike(2 * median(observations.sigma[inside]) ** 2 / of_parallax, float, (len(rows),)),
+        weight=frozen_alike(2 * np.median(observations.sigma[inside]) ** 2 / of_parallax, float, (len(rows),)),
         focal=focal,
         point=observations.point[rows[:, 0]],
         rows=rows,

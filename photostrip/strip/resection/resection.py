@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct, pieces
+from photostrip.arrays import Flags, Floats, Numbers, pieces
 from photostrip.geometry.rotation import from_vector
 from photostrip.strip.resection.collinearity import KnownPhotos, distances, partials, project
 
@@ -34,7 +34,7 @@ class Resection:
 def runs(ends: Numbers, most: int) -> list[tuple[int, int]]:
     """Cut photos, whose rows end where ``ends`` says after a 0, into runs of about `most` rows: first, last + 1."""
     first = np.searchsorted(ends, np.append(np.arange(0, ends[-1], most), ends[-1]))
-    return list(pairwise(distinct(first).tolist()))
+    return list(pairwise(np.unique(first).tolist()))
 
 
 def of_known_photos(

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.statistics import normal_quantile
 from photostrip.strip.relative_orientation.orientation import Orientation
@@ -168,7 +168,7 @@ def depths(vectors: Floats, base: Floats) -> Floats:
 def _scatter(orientation: Orientation) -> Floats:
     """Estimate the standard deviation of a y parallax from all pairs together."""
     known = orientation.sigma0[np.isfinite(orientation.sigma0)]
-    value = np.sqrt(2.0) * median(known) if len(known) else 0.0
+    value = np.sqrt(2.0) * np.median(known) if len(known) else 0.0
     return np.full(orientation.pairs.size, max(value, SMALLEST_SIGMA))
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.strip.relative_orientation.orientation import Orientation
@@ -136,7 +136,7 @@ def _elsewhere(orientation: Orientation, formed: FormedStrip) -> Flags:
     other = point[1:] != point[:-1]
     apart = ~other & (np.diff(model) > 1)  # no photo is in both models
     if apart.any():
-        depth = median(np.linalg.norm(xyz - formed.centers[model], axis=1))
+        depth = np.median(np.linalg.norm(xyz - formed.centers[model], axis=1))
         extent = np.linalg.norm(np.ptp(np.concatenate([pairs.left, pairs.right]), axis=0))
         apart &= np.linalg.norm(np.diff(xyz, axis=0), axis=1) > extent / pairs.focal * depth
         begins = np.flatnonzero(np.append(True, other | apart))  # of the runs

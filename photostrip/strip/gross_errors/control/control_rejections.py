@@ -7,10 +7,11 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import fdtri
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.rejection import Rejection
-from photostrip.statistics import f_quantile, normal_quantile
+from photostrip.statistics import normal_quantile
 from photostrip.strip.error_propagation.strip_at_control import StripAtControl
 from photostrip.strip.gross_errors.control.control_deletion import (
     ALPHA,
@@ -111,7 +112,7 @@ def reliability(strip: StripAtControl, found: FoundErrors) -> tuple[Floats, Floa
 
 def _limit(freedom: int, whole: JointAdjustment, count: int) -> float:
     """Critical value of the length of an error of some coordinates, in standard deviations."""
-    return float(np.sqrt(count * f_quantile(1 - whole.level, count, freedom - count)))
+    return float(np.sqrt(count * fdtri(count, freedom - count, 1 - whole.level)))
 
 
 def _wrong_image(

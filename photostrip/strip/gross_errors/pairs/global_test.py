@@ -5,15 +5,15 @@ Source: derived; [004a] stops at tests of single residuals. See docs/sources.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from scipy.special import chdtri, ndtri
 
-from photostrip.arrays import Flags, Floats, Numbers, median
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.rejection import UNCONTROLLED
-from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, normal_quantile
+from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
 from photostrip.strip.relative_orientation.orientation import Orientation
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.strip.robust import MEDIAN_SPREAD
@@ -46,9 +46,8 @@ class GlobalTest:
 
     def limits(self, count: Numbers) -> Floats:
         """Critical values: chi-square with count - 5 degrees of freedom; infinite without redundancy."""
-        return by_number(
-            count, lambda n: chi2_quantile(1 - self.level, n - MINIMUM_POINTS) if n > MINIMUM_POINTS else np.inf
-        )
+        freedom = count - MINIMUM_POINTS
+        return np.where(freedom > 0, chdtri(freedom, self.level), np.inf)
 
     def standardised(self, orientation: Orientation) -> Floats:
         """Parallaxes of the points used in units of their standard deviation, (m,); 0 without redundancy."""
@@ -57,7 +56,7 @@ class GlobalTest:
 
     def largest_limits(self, count: Numbers) -> Floats:
         """Critical values of the largest standardised residual (Bonferroni)."""
-        return by_number(count, lambda n: normal_quantile(1 - self.level / (2 * max(n, 1))))
+        return np.asarray(ndtri(1 - self.level / (2 * np.maximum(count, 1))))
 
     def failing(self, orientation: Orientation) -> Flags:
         """Pairs whose sum of squares or largest residual exceeds its limit."""
@@ -87,7 +86,7 @@ class ParallaxScatter:
         found = np.nan
         if tested.any():
             sizes = np.abs(orientation.parallax[tested]) * np.sqrt(pairs.weight[tested] / share[tested])
-            scale = SIGMA_FROM_MEDIAN * median(sizes)
+            scale = SIGMA_FROM_MEDIAN * np.median(sizes)
             proof = 1.0 + normal_quantile(1.0 - ALPHA) * MEDIAN_SPREAD / np.sqrt(float(share[tested].sum()))
             found = scale if scale > spoiled * proof * stated else np.nan
         return cls(found, np.full(pairs.size, max(stated, np.nan_to_num(found))))
@@ -102,11 +101,3 @@ def residual_sigma(orientation: Orientation, sigma: Floats) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         size = sigma[pairs.pair] * np.sqrt(share / pairs.weight)
     return np.where(orientation.used & (share > UNCONTROLLED), size, np.inf)
-
-
-def by_number(count: Numbers, limit: Callable[[int], float]) -> Floats:
-    """Look up a limit for every number of points; each number is asked for once."""
-    table = np.zeros(int(count.max(initial=0)) + 1)
-    for number in np.flatnonzero(np.bincount(np.maximum(count.ravel(), 0))).tolist():
-        table[number] = limit(number)
-    return table[np.maximum(count, 0)]

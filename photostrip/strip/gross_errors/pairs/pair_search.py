@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.rejection import Rejection
 from photostrip.strip.gross_errors.pairs import deletion
 from photostrip.strip.gross_errors.pairs.global_test import FIFTH_WRONG, GlobalTest, ParallaxScatter
@@ -156,7 +156,7 @@ class _Log:
                         if size[row] > most[pair]:
                             self._remove(weight, np.array([row]), "residual", float(size[row]), float(most[pair]))
                             self.worst[pair] += 1
-        changed = distinct(pairs[weight != part.pairs.weight])
+        changed = np.unique(pairs[weight != part.pairs.weight])
         return orient_again(part, weight, changed, self.lost)
 
     def without_beyond(self, part: Orientation, test: GlobalTest, todo: Numbers) -> Orientation:
@@ -182,7 +182,7 @@ class _Log:
 
 def _alike(todo: Numbers, count: Numbers) -> list[Numbers]:
     """Split pairs into some at a time with equal numbers of points."""
-    groups = [todo[count[todo] == number] for number in distinct(count[todo])]
+    groups = [todo[count[todo] == number] for number in np.unique(count[todo])]
     return [some for group in groups for some in np.array_split(group, 1 + len(group) // AT_ONCE)]
 
 

@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers, distinct
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import InputError
 from photostrip.rejection import Rejection
 from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.strip.gross_errors.pairs.global_test import ParallaxScatter, by_number, residual_sigma
+from photostrip.strip.gross_errors.pairs.global_test import ParallaxScatter, residual_sigma
 from photostrip.strip.gross_errors.pairs.pair_search import PairSearch, rejection, search
 from photostrip.strip.relative_orientation.orientation import (
     LEAST_IN_FRONT,
@@ -160,7 +160,7 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
 def _without(orientation: Orientation, rows: Numbers) -> Orientation:
     weight = orientation.pairs.weight.copy()
     weight[rows] = 0.0
-    return orient_again(orientation, weight, distinct(orientation.pairs.pair[rows]))
+    return orient_again(orientation, weight, np.unique(orientation.pairs.pair[rows]))
 
 
 def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientation, list[Rejection]]:
@@ -208,7 +208,7 @@ def tested(orientation: Orientation, test: str, bound: float) -> Tested:
         spread = np.sqrt(2.0) * orientation.sigma0
         unit, least = residual_sigma(orientation, spread), MINIMUM_POINTS + 3
         limit = partial(tau_limit, unknowns=MINIMUM_POINTS, alpha=bound)
-    limits = by_number(count, lambda n: limit(n) if n >= least else np.inf)
+    limits = np.where(count >= least, limit(np.maximum(count, least)), np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         value = np.nan_to_num(np.abs(size) / unit, posinf=0.0)
     return Tested(value, np.where(spread > NEGLIGIBLE, limits, np.inf)[pairs.pair], unit)
