@@ -237,6 +237,7 @@ class Stopwatch:
 pipeline = import_module("photostrip.pipeline.run")  # the module; the package gives the function
 # functions imported by name are timed where they are called
 of_strips = import_module("photostrip.pipeline.strips.photos")
+on_control = import_module("photostrip.pipeline.strips.photos_on_control")
 common = import_module("photostrip.pipeline.common_points")
 screened_formation = import_module("photostrip.pipeline.strips.screened_formation")
 strip_network = import_module("photostrip.network.gross_errors.strip_network")
@@ -251,7 +252,7 @@ STAGES = (
     ("screening of control", control_screening, "screen_control"),
     ("absolute orientation", absolute_orientation, "orient"),
     ("polynomial", correction, "fit"),
-    ("resection", of_strips, "resect"),
+    ("resection", on_control, "resect"),
     ("points of all strips", common, "_joined"),
     ("differences at given points", pipeline, "compare_with_given"),
     ("points without coordinates", pipeline, "not_determined"),

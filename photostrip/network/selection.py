@@ -82,4 +82,6 @@ def restarted(problem: BundleProblem, solution: BundleSolution) -> BundleProblem
     known = np.asarray(np.isfinite(problem.start.points).all(axis=1), bool)
     points = np.where(known[:, None], solution.points, problem.start.points)
     scales = None if problem.start.scales is None else solution.scales
-    return replace(problem, start=StartValues(solution.centers, solution.rotations, points, scales))
+    return replace(
+        problem, start=StartValues(centers=solution.centers, rotations=solution.rotations, points=points, scales=scales)
+    )

@@ -113,7 +113,12 @@ def build(
             correlation=None if measured.correlation is None else measured.correlation[rows],
         ),
         cameras=BundleCameras(of_photo=np.zeros(0, np.intp), focal=np.zeros(0)),
-        start=StartValues(start.centers - origin, start.rotations, start.points - origin, start.scales),
+        start=StartValues(
+            centers=start.centers - origin,
+            rotations=start.rotations,
+            points=start.points - origin,
+            scales=start.scales,
+        ),
         control=given,
         photo_ids=start.photos,
         point_ids=tuple(map(measured.name, range(len(start.points)))),

@@ -225,7 +225,7 @@ def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> 
                 correlation=None if measured.correlation is None else measured.correlation[of_project],
             ),
             cameras=BundleCameras(of_photo=np.zeros(0, np.intp), focal=np.zeros(0)),
-            start=StartValues(places.shift, places.rotation, nodes, places.scale),
+            start=StartValues(centers=places.shift, rotations=places.rotation, points=nodes, scales=places.scale),
             photo_ids=strip.models,
             point_ids=tuple(map(measured.name, range(len(nodes)))),
         )
@@ -237,7 +237,7 @@ def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> 
         model_xyz=adjusted.of(models.model, models.xyz),
         node_xyz=network.points[formed.node],
     )
-    return LinkedModels(strip, measured, formed, network)
+    return LinkedModels(strip=strip, measured=measured, formed=formed, network=network)
 
 
 def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> FormedModels:
