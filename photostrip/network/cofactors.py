@@ -23,10 +23,10 @@ from photostrip.network.rays import whitening
 from photostrip.network.solution import BundleSolution, Cofactors
 
 
-def cofactors_of(solution: BundleSolution, *, rough: bool = False) -> Cofactors:
+def cofactors_of(solution: BundleSolution) -> Cofactors:
     """Cofactors of all parameters and residuals; ``bundle-rank`` when the normal matrix is singular at the solution.
 
-    rough: leave points and photos of a free network in the datum of its band, which no residual feels.
+    Points and photos of a rough solution of a free network stay in its datum, which no residual feels.
     """
     prepared, found = solution.prepared, solution.factored
     problem, at, p = prepared.problem, found.equations.linearised, len(solution.common)
@@ -58,7 +58,7 @@ def cofactors_of(solution: BundleSolution, *, rough: bool = False) -> Cofactors:
     of_photos[:, u:, :u] = of_photos[:, :u, u:].swapaxes(1, 2)
     of_photos[:, u:, u:] = found.common
     positions, attitudes = (_given(each, of_photos) for each in (at.positions, at.attitudes))
-    if solution.free and not rough:
+    if solution.free and not solution.rough:
         points, of_photos = _inner(solution, points, of_photos)
     points[~prepared.measured] = np.nan
     turn = _turns(solution.rotations, u)

@@ -48,6 +48,7 @@ class BundleSolution:
     # observations (weighted parameters included) minus parameters, plus the datum defect of a free network
     redundancy: int
     free: bool  # true when the datum came from inner constraints on the points: no control, no positions
+    rough: bool  # good enough for tests of residuals; the datum of a free network is then any
     steps: tuple[IterationStep, ...]  # the way from the start, one entry for each step that was taken or refused
     prepared: PreparedProblem  # the problem as it was laid out; spares the precision that work
     equations: NormalEquations | None  # at the solution, where the last steps of a rough one left them
@@ -62,7 +63,11 @@ class BundleSolution:
     def factored(self) -> FactoredEquations:
         """The normal equations at the solution in factors; ``bundle-rank`` where they are singular."""
         equations = self.equations or equations_at(self.prepared, self.state)
-        anchor = datum.anchor(equations.unreduced, self.prepared.rank, self.state) if self.free else None
+        anchor = None
+        if self.free and self.rough:
+            anchor = datum.held_everywhere(equations.unreduced)
+        elif self.free:
+            anchor = datum.anchor(equations.unreduced, self.prepared.rank, self.state)
         found = factored(equations, anchor)
         if found is None:
             raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")

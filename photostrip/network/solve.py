@@ -52,7 +52,7 @@ def solve(problem: BundleProblem, *, rough: bool = False) -> BundleSolution:
     free = datum.is_free(problem)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # starts far off: such steps are refused
         ended = _iterate(prepared, free=free, rough=rough)
-    return _solution(prepared, ended, free=free)
+    return _solution(prepared, ended, free=free, rough=rough)
 
 
 class _Ended(NamedTuple):
@@ -170,7 +170,7 @@ def _recorded(equations: NormalEquations, move: _Move, damping: float) -> Iterat
     return IterationStep(chi_square=equations.chi_square, length=move.length, damping=damping, shift=shift, turn=turn)
 
 
-def _solution(prepared: PreparedProblem, ended: _Ended, *, free: bool) -> BundleSolution:
+def _solution(prepared: PreparedProblem, ended: _Ended, *, free: bool, rough: bool) -> BundleSolution:
     """Find the residuals of all observations at the end, in their units, and the weighted sum of their squares."""
     problem, state = prepared.problem, ended.state
     at = linearise(prepared, state)
@@ -188,6 +188,7 @@ def _solution(prepared: PreparedProblem, ended: _Ended, *, free: bool) -> Bundle
         chi_square=at.chi_square,
         redundancy=_redundancy(prepared, free=free),
         free=free,
+        rough=rough,
         steps=tuple(ended.steps),
         prepared=prepared,
         equations=ended.equations,

@@ -206,7 +206,16 @@ def test_functions_of_photos_have_joint_cofactors(name: str) -> None:
 def test_a_rough_solution_has_the_cofactors_of_its_residuals() -> None:
     problem = PROBLEMS["free"]()
     exact, rough = solve(problem), solve(problem, rough=True)
-    found, expected = cofactors_of(rough, rough=True), cofactors_of(exact)
+    found, expected = cofactors_of(rough), cofactors_of(exact)
     np.testing.assert_allclose(found.image_residuals, expected.image_residuals, rtol=1e-4, atol=1e-9)
     assert rough.equations is not None
     assert exact.equations is None
+
+
+def test_thousands_of_photos_without_control_keep_their_redundancy_numbers() -> None:
+    flight = Flight(photos=3000, scale=3000.0)
+    simulation = simulate(Spec(flight=flight, control=SimulatedControl(every=1000, check=0)))
+    solution = solve(replace(problem_of(simulation, shift=0.1, turn=1e-4), control=ControlObservations()), rough=True)
+    images = solution.prepared.problem.images
+    numbers = np.diagonal(cofactors_of(solution).image_residuals, axis1=1, axis2=2) / images.sigma**2
+    assert numbers.sum() == pytest.approx(solution.redundancy, rel=2e-3)

@@ -70,7 +70,7 @@ class ScreenedBundle:
             problem=chosen,
             selection=selection,
             solution=solution,
-            precision=cofactors_of(solution, rough=rough),
+            precision=cofactors_of(solution),
             limit=reliability.limit_of(solution, settings, points_out, BOTH_GO if rough else 1.0),
         )
 
