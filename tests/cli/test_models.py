@@ -78,7 +78,8 @@ def test_the_trace_shows_the_way_to_the_ground(project: Path) -> None:
 
 
 def test_exit_codes(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", str(project), "--quiet", "--set", "processing.adjustment=bundle"]) == 2
+    assert main(["run", str(project), "--quiet", "--set", "processing.adjustment=polynomial"]) == 0
+    assert main(["run", str(project), "--quiet", "--set", "processing.refraction=true"]) == 2
     assert "needs image coordinates" in capsys.readouterr().err
     table = project.parent / "models.csv"
     lines = table.read_text(encoding="utf-8").splitlines()
