@@ -74,7 +74,7 @@ def adjust_block(
         try:
             estimated = _searched(built(start), control, ground.control, settings)
         except GeometryError as error:
-            if error.code != "bundle-diverged":
+            if error.code not in {"bundle-diverged", *defects.OPEN}:
                 raise
             # between bands of control 2000 models apart polynomials leave a strip 80 km off
             start = formed(SIMILARITY)

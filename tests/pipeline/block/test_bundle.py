@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.pipeline.inputs import Strip
+from photostrip.pipeline.inputs import Settings, Strip
+from photostrip.pipeline.run import triangulate
 from photostrip.points import PhotoPoints
 from photostrip.result.document import document_of
 from photostrip.simulation import Control, Flight, Ground, Image, Points, Spec, Terrain
+from photostrip.strip.polynomial.correction import PolynomialSettings
 from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
 from tests.simulated import inputs_of
 
@@ -65,6 +67,16 @@ def test_without_noise_the_truth_comes_back(title: str) -> None:
         [s.intermediate.cartesian_from_intermediate(s.of_photos.resection.centers) for s in result.strips]
     )
     assert np.abs(centers - simulation.truth.centers).max() < MICROMETRE
+
+
+def test_a_long_strip_with_control_at_one_end_starts_where_polynomials_tear_it() -> None:
+    simulation = simulate(Spec(flight=Flight(photos=200), control=Control(every=1)))
+    given = replace(simulation.control, check=np.arange(len(simulation.control)) >= 15)
+    settings = Settings(adjustment="bundle", polynomial=PolynomialSettings("3"))
+    result = triangulate(replace(inputs_of(simulation), control=given), settings)
+    assert result.precision is not None
+    off, sigmas = errors(simulation, result), np.sqrt(np.diagonal(result.precision.points, axis1=1, axis2=2))
+    assert 0.3 < np.sqrt(np.mean((off / sigmas) ** 2)) < 2.0
 
 
 def heights(given: CameraPositions) -> CameraPositions:
