@@ -135,13 +135,6 @@ class IntermediateFrame:
     axes: Floats  # (3, 3): M: columns are the axes X, Y, Z in the project's Cartesian frame
     azimuth: float = 0.0  # azimuth A0 of the X axis, clockwise from north, radians
 
-    def __post_init__(self) -> None:
-        """Keep private read-only copies of the arrays."""
-        for name in ("origin", "axes"):
-            array = np.array(getattr(self, name), dtype=np.float64)
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-
     @classmethod
     def at_centre(cls, cartesian_control: ArrayLike, lat: float, lon: float, azimuth: float) -> Self:
         """Frame at the middle of control points on an ellipsoid, given by geocentric coordinates (n, 3).

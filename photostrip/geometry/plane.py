@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,6 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.points import frozen
 
 SINGULAR = 1e-9  # smallest over largest singular value: below, rounding decides
 ITERATIONS = 50
@@ -36,9 +36,6 @@ class PlaneTransform:
     """Transformation of the plane: ``top = coefficients @ (x, y, x y, 1)``, target = the first two over the third."""
 
     coefficients: Floats  # (..., 3, 4): rows: target x, target y, denominator
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", frozen(self.coefficients))
 
     def __call__(self, points: ArrayLike) -> Floats:
         values = _terms(np.asarray(points, float)) @ self.coefficients.swapaxes(-1, -2)
@@ -78,30 +75,21 @@ def conformal_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLi
     return PlaneTransform(_from_matrix(_with_last_row(rows)) @ substitution)
 
 
-def affine_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> PlaneTransform:
-    """Affine transformation (two scales, rotation, shear, shift).
+def linear_from_points(
+    source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None, *, terms: list[int]
+) -> PlaneTransform:
+    """Affine or bilinear transformation: no denominator, and some of the terms x, y, x y, 1.
 
-    Needs three points that are not on one line; a ``GeometryError`` otherwise.
+    A bilinear one keeps lines parallel to the axes of the source straight, so it depends on how these axes lie; four
+    points in the middle of the sides of a square, on its axes, do not determine its term x y. A ``GeometryError`` when
+    points do not determine all coefficients.
     """
     a, b, w = _arrays(source, target, weights)
     local, substitution = _local(a, w)
-    solution = _solve(_terms(local)[..., LINEAR], b, w).swapaxes(-1, -2)
-    rows = solution.reshape(*solution.shape[:-2], 6)
-    return PlaneTransform(_from_matrix(_with_last_row(rows)) @ substitution)
-
-
-def bilinear_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> PlaneTransform:
-    """Bilinear transformation (affine and a term x y).
-
-    It keeps lines parallel to the axes of the source straight, so it depends on how these axes lie. Needs four points,
-    a ``GeometryError`` otherwise; four in the middle of the sides of a square, on its axes, do not determine the term x
-    y.
-    """
-    a, b, w = _arrays(source, target, weights)
-    local, substitution = _local(a, w)
-    solution = _solve(_terms(local), b, w).swapaxes(-1, -2)
-    last = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*solution.shape[:-2], 1, 4))
-    return PlaneTransform(np.concatenate([solution, last], -2) @ substitution)
+    coefficients = np.zeros((*w.shape[:-1], 3, 4))
+    coefficients[..., :2, terms] = _solve(_terms(local)[..., terms], b, w).swapaxes(-1, -2)
+    coefficients[..., 2, 3] = 1.0
+    return PlaneTransform(coefficients @ substitution)
 
 
 def projective_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> PlaneTransform:
@@ -144,8 +132,8 @@ class TransformKind(NamedTuple):
 
 KINDS = {
     "conformal": TransformKind(conformal_from_points, 4, 2),
-    "affine": TransformKind(affine_from_points, 6, 3),
-    "bilinear": TransformKind(bilinear_from_points, 8, 4),
+    "affine": TransformKind(partial(linear_from_points, terms=LINEAR), 6, 3),
+    "bilinear": TransformKind(partial(linear_from_points, terms=[0, 1, 2, 3]), 8, 4),
     "projective": TransformKind(projective_from_points, 8, 4),
 }
 

@@ -12,29 +12,36 @@ from numpy.typing import ArrayLike
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 
-SYSTEMS = ("alpha-omega-kappa", "omega-phi-kappa", "phi-omega-kappa")
+# systems of angles: the axes about which one turns after the other, each as the turns before have left it, and the
+# sign of the first angle
+AXES = {
+    "alpha-omega-kappa": ((1, 0, 2), -1.0),
+    "omega-phi-kappa": ((0, 1, 2), 1.0),
+    "phi-omega-kappa": ((1, 0, 2), 1.0),
+}
+SYSTEMS = tuple(AXES)
 GIMBAL_LIMIT = 1e-12  # 1 - |sine of the middle angle| below which the other two are not separable
 
 
 def rotation_x(angle: ArrayLike) -> Floats:
     """Rotation about the x axis by angles (...), right-hand rule."""
-    return _elementary(angle, 1, 2)
+    return _about(0, angle)
 
 
 def rotation_y(angle: ArrayLike) -> Floats:
     """Rotation about the y axis, right-hand rule; see ``rotation_x``."""
-    return _elementary(angle, 2, 0)
+    return _about(1, angle)
 
 
 def rotation_z(angle: ArrayLike) -> Floats:
     """Rotation about the z axis, right-hand rule; see ``rotation_x``."""
-    return _elementary(angle, 0, 1)
+    return _about(2, angle)
 
 
-def _elementary(angle: ArrayLike, first: int, second: int) -> Floats:
-    t = np.asarray(angle, float)
+def _about(axis: int, angle: ArrayLike) -> Floats:
+    t, first, second = np.asarray(angle, float), (axis + 1) % 3, (axis + 2) % 3
     matrix = np.zeros((*t.shape, 3, 3))
-    matrix[..., range(3), range(3)] = 1.0
+    matrix[..., axis, axis] = 1.0
     matrix[..., first, first] = matrix[..., second, second] = np.cos(t)
     matrix[..., second, first] = np.sin(t)
     matrix[..., first, second] = -matrix[..., second, first]
@@ -49,69 +56,39 @@ def from_alpha_omega_kappa(alpha: ArrayLike, omega: ArrayLike, kappa: ArrayLike)
 
     Source: [001] eq. 127, 132, 133.
     """
-    al, om, ka = np.broadcast_arrays(*(np.asarray(a, float) for a in (alpha, omega, kappa)))
-    sa, ca, so, co, sk, ck = np.sin(al), np.cos(al), np.sin(om), np.cos(om), np.sin(ka), np.cos(ka)
-    matrix = np.empty((*al.shape, 3, 3))
-    matrix[..., 0, 0] = ca * ck - sa * so * sk
-    matrix[..., 0, 1] = -ca * sk - sa * so * ck
-    matrix[..., 0, 2] = -sa * co
-    matrix[..., 1, 0] = co * sk
-    matrix[..., 1, 1] = co * ck
-    matrix[..., 1, 2] = -so
-    matrix[..., 2, 0] = sa * ck + ca * so * sk
-    matrix[..., 2, 1] = -sa * sk + ca * so * ck
-    matrix[..., 2, 2] = ca * co
-    return matrix
+    return rotation_y(-np.asarray(alpha, float)) @ rotation_x(omega) @ rotation_z(kappa)
 
 
 def alpha_omega_kappa(matrix: ArrayLike) -> Floats:
-    """Angles alpha, omega, kappa (..., 3) of rotations (..., 3, 3), photo to object.
-
-    Raises GeometryError when omega is +-90 degrees: alpha and kappa cannot be separated.
+    """Angles alpha, omega, kappa (..., 3) of rotations (..., 3, 3); see ``angles``.
 
     Source: [001] eq. 129 and 135, there misprinted as sin(omega) = -b3/c3; it is -b3.
     """
-    a = np.asarray(matrix, float)
-    _refuse_gimbal(a[..., 1, 2], "omega", "alpha")
-    alpha, omega = np.arctan2(-a[..., 0, 2], a[..., 2, 2]), np.arcsin(np.clip(-a[..., 1, 2], -1, 1))
-    return np.stack([alpha, omega, np.arctan2(a[..., 1, 0], a[..., 1, 1])], axis=-1)
-
-
-def _refuse_gimbal(sine: Floats, middle: str, first: str) -> None:
-    if np.any(1 - np.abs(sine) < GIMBAL_LIMIT):
-        msg = f"{middle} is 90 degrees: {first} and kappa cannot be separated; choose another system of angles"
-        raise GeometryError(msg, code="gimbal")
-
-
-def _require_system(system: str) -> None:
-    if system not in SYSTEMS:
-        msg = f"unknown system of angles {system!r}"
-        raise ValueError(msg)
+    return angles(matrix, "alpha-omega-kappa")
 
 
 def angles(matrix: ArrayLike, system: str) -> Floats:
     """Angles (..., 3) of rotations, photo to object, in a system of ``SYSTEMS`` and in the order of its name.
 
-    Raises GeometryError when the middle angle is +-90 degrees.
-    Raises ValueError when the system is not known.
+    Raises GeometryError when the middle angle is +-90 degrees: the others cannot be separated.
     """
-    _require_system(system)
     a = np.asarray(matrix, float)
-    if system == "omega-phi-kappa":
-        _refuse_gimbal(a[..., 0, 2], "phi", "omega")
-        omega = np.arctan2(-a[..., 1, 2], a[..., 2, 2])
-        phi = np.arcsin(np.clip(a[..., 0, 2], -1, 1))
-        return np.stack([omega, phi, np.arctan2(-a[..., 0, 1], a[..., 0, 0])], axis=-1)
-    return alpha_omega_kappa(a) * [-1.0 if system == "phi-omega-kappa" else 1.0, 1.0, 1.0]
+    (i, j, k), sign = AXES[system]
+    hand = 1.0 if (i + 1) % 3 == j else -1.0
+    sine = hand * a[..., i, k]
+    if np.any(1 - np.abs(sine) < GIMBAL_LIMIT):
+        first, middle, _ = system.split("-")
+        msg = f"{middle} is 90 degrees: {first} and kappa cannot be separated; choose another system of angles"
+        raise GeometryError(msg, code="gimbal")
+    first_angle = sign * np.arctan2(-hand * a[..., j, k], a[..., k, k])
+    last = np.arctan2(-hand * a[..., i, j], a[..., i, i])
+    return np.stack([first_angle, np.arcsin(np.clip(sine, -1, 1)), last], axis=-1)
 
 
 def from_angles(values: ArrayLike, system: str) -> Floats:
     """Rotations from angles (..., 3) in a system of ``SYSTEMS``; the inverse of ``angles``."""
-    _require_system(system)
-    first, second, kappa = np.moveaxis(np.asarray(values, float), -1, 0)
-    if system == "omega-phi-kappa":
-        return rotation_x(first) @ rotation_y(second) @ rotation_z(kappa)
-    return from_alpha_omega_kappa(-first if system == "phi-omega-kappa" else first, second, kappa)
+    first, middle, last = _turns(values, system)
+    return first @ middle @ last
 
 
 def angle_rates(values: ArrayLike, system: str) -> Floats:
@@ -120,19 +97,19 @@ def angle_rates(values: ArrayLike, system: str) -> Floats:
     ``exp([theta]) R`` is the rotation of the changed angles; theta refers to the axes of the object. D is singular
     where the middle angle is 90 degrees.
     """
-    _require_system(system)
-    first, second, _ = np.moveaxis(np.asarray(values, float), -1, 0)
-    if system == "omega-phi-kappa":
-        turns, axes, sign = (rotation_x(first), rotation_y(second)), (0, 1, 2), 1.0
-    else:
-        sign = 1.0 if system == "phi-omega-kappa" else -1.0  # alpha turns the other way about Y
-        turns, axes = (rotation_y(sign * first), rotation_x(second)), (1, 0, 2)
-    columns = [
-        np.broadcast_to(sign * np.eye(3)[axes[0]], turns[0].shape[:-1]),
-        turns[0][..., :, axes[1]],
-        (turns[0] @ turns[1])[..., :, axes[2]],
+    axes, sign = AXES[system]
+    first, middle, _ = _turns(values, system)
+    fixed = np.broadcast_to(sign * np.eye(3)[axes[0]], first.shape[:-1])
+    return np.stack([fixed, first[..., axes[1]], (first @ middle)[..., axes[2]]], axis=-1)
+
+
+def _turns(values: ArrayLike, system: str) -> list[Floats]:
+    """Give the three turns whose product is a rotation."""
+    axes, sign = AXES[system]
+    return [
+        _about(axis, angle)
+        for axis, angle in zip(axes, np.moveaxis(values * np.array([sign, 1, 1]), -1, 0), strict=True)
     ]
-    return np.stack(columns, axis=-1)
 
 
 def from_vector(vector: ArrayLike) -> Floats:

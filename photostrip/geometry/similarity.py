@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.rotation import cross_matrix
-from photostrip.points import frozen
 
 SIMILARITY_PARAMETERS = 7  # shift, rotation, logarithm of the scale
 
@@ -22,10 +21,6 @@ class Similarity:
     scale: float  # scale, positive
     rotation: Floats  # (3, 3): rotation, determinant +1
     shift: Floats  # (3,): shift in the unit of the target
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", frozen(self.rotation, shape=(3, 3)))
-        object.__setattr__(self, "shift", frozen(self.shift, shape=(3,)))
 
     def __call__(self, points: ArrayLike) -> Floats:
         """Transform points (n, 3)."""

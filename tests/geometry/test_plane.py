@@ -151,15 +151,15 @@ def test_photos_in_one_array_come_out_as_alone(kind: str, seed: int) -> None:
 @given(seed=SEEDS)
 def test_weight_two_is_the_same_point_twice(seed: int) -> None:
     source, target, _ = noisy("affine", np.random.default_rng(seed))
-    doubled = plane.affine_from_points(np.vstack([source, source[:1]]), np.vstack([target, target[:1]]))
-    weighted = plane.affine_from_points(source, target, [2, 1, 1, 1, 1, 1, 1, 1])
+    doubled = plane.KINDS["affine"].fit(np.vstack([source, source[:1]]), np.vstack([target, target[:1]]))
+    weighted = plane.KINDS["affine"].fit(source, target, [2, 1, 1, 1, 1, 1, 1, 1])
     assert np.allclose(weighted(source), doubled(source), rtol=0, atol=1e-11 * np.abs(target).max())
 
 
 def test_a_bilinear_transformation_keeps_the_sides_straight_and_a_projective_one_keeps_all_lines() -> None:
     target = SQUARE + np.array([[1.0, 0.5], [-0.3, 0.2], [0.4, -1.0], [0.0, 0.0]])
     middle = (SQUARE + np.roll(SQUARE, 1, 0)) / 2
-    bilinear = plane.bilinear_from_points(SQUARE, target)
+    bilinear = plane.KINDS["bilinear"].fit(SQUARE, target)
     assert np.allclose(bilinear(middle), (target + np.roll(target, 1, 0)) / 2, atol=PICOMETRE)
     projective = plane.projective_from_points(SQUARE, target)
     a, b, c = projective([[-106.0, -80.0], [13.0, 11.0], [106.0, 11 + 91 * 93 / 119]])

@@ -15,7 +15,6 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
-from photostrip.points import frozen
 
 PLACES = {
     f"{vertical}-{horizontal}".strip("-"): (x, y)
@@ -37,9 +36,6 @@ class Certificate:
     residuals: Floats  # (d,): computed minus given distances, mm
     sigma0: float  # standard deviation of a distance, mm; NaN without redundancy
     redundancy: int  # distances more than the figure needs
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "residuals", frozen(self.residuals))
 
 
 def solve(

@@ -13,12 +13,11 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault
 from photostrip.geometry import plane
 from photostrip.notes import Note
-from photostrip.points import frozen
 from photostrip.strip.image_coordinates.fiducial_marks import Marks, fault
 from photostrip.strip.image_coordinates.film_deformation import FilmDeformation
 
 SHAPE = ("scale_x", "scale_y", "rotation", "shear")
-BY_PHOTO = ("photo_ids", "transforms", "marks", "residuals", "sigma0", "redundancy", *SHAPE, "mirrored")
+TUPLES, ARRAYS = ("photo_ids", "transforms", "marks", "residuals"), ("sigma0", "redundancy", *SHAPE, "mirrored")
 LEAST_STRENGTH = 0.01  # strength of a transformation below which marks count as lying on one line
 
 
@@ -47,13 +46,6 @@ class InteriorOrientation:
     without_marks: tuple[str, ...] = ()
     notes: tuple[Note, ...] = ()  # what the marks show beside the numbers
     film: FilmDeformation | None = None  # deformation beyond the transformations, when it is interpolated
-
-    def __post_init__(self) -> None:
-        for name in ("sigma0", *SHAPE):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "redundancy", frozen(self.redundancy, dtype=np.intp))
-        object.__setattr__(self, "mirrored", frozen(self.mirrored, dtype=np.bool_))
-        object.__setattr__(self, "residuals", tuple(frozen(each) for each in self.residuals))
 
 
 def fit_marks(marks: Marks, kind: str) -> tuple[InteriorOrientation, list[Fault]]:
@@ -154,10 +146,11 @@ def joined_cameras(
     photos = [photo for part in parts for photo in part.photo_ids]
     place = {photo: number for number, photo in enumerate(order)}
     rows = sorted(range(len(photos)), key=lambda row: place[photos[row]])
-    columns: dict[str, Any] = {}
-    for name in BY_PHOTO:
-        column = [each for part in parts for each in getattr(part, name)]
-        columns[name] = tuple(column[row] for row in rows)
+    columns: dict[str, Any] = {
+        name: tuple(each for part in parts for each in getattr(part, name)) for name in TUPLES + ARRAYS
+    }
+    columns = {name: tuple(column[row] for row in rows) for name, column in columns.items()}
+    columns |= {name: np.array(columns[name]) for name in ARRAYS}
     coefficients = [part.photo_from_measured.coefficients for part in parts]
     transforms = plane.PlaneTransform(np.concatenate([np.zeros((0, 3, 4)), *coefficients])[rows])
     return InteriorOrientation(photo_from_measured=transforms, without_marks=digital, notes=notes, **columns)
