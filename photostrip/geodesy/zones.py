@@ -37,7 +37,9 @@ class ZoneJoint:
 
     def __call__(self, plane: Floats) -> Floats:
         """Bring coordinates east, north (n, 2) into the other zone."""
-        return _plane(_powers((_complex(plane) - self.center) / self.size, self.degree) @ self.coefficients)
+        return _plane(
+            np.vander((_complex(plane) - self.center) / self.size, self.degree + 1, increasing=True) @ self.coefficients
+        )
 
 
 def join_zones(source: Floats, target: Floats) -> ZoneJoint:
@@ -48,7 +50,7 @@ def join_zones(source: Floats, target: Floats) -> ZoneJoint:
     given = _complex(source)
     center, size = complex(given.mean()), float(np.abs(given - given.mean()).max()) or 1.0
     degree = min(HIGHEST_POWER, len(given) - 1)
-    design = _powers((given - center) / size, degree)
+    design = np.vander((given - center) / size, degree + 1, increasing=True)
     coefficients = np.asarray(np.linalg.lstsq(design, _complex(target), rcond=None)[0], np.complex128)
     return ZoneJoint(
         center=center,
@@ -57,10 +59,6 @@ def join_zones(source: Floats, target: Floats) -> ZoneJoint:
         residuals=_plane(design @ coefficients) - target,
         redundancy=2 * (len(given) - degree - 1),
     )
-
-
-def _powers(w: NDArray[np.complex128], degree: int) -> NDArray[np.complex128]:
-    return np.asarray(w[:, None] ** np.arange(degree + 1), np.complex128)
 
 
 def _complex(plane: Floats) -> NDArray[np.complex128]:

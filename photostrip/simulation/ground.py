@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.geodesy.curvature import meridian_radius, prime_vertical_radius
-from photostrip.geodesy.local_frame import geocentric_from_geodetic
+from photostrip.geodesy.curvature import mean_radius
+from photostrip.geodesy.local_frame import axes_matrix, geocentric_from_geodetic, local_axes_matrix
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.spec import Spec
 
@@ -58,17 +58,10 @@ class World:
 def world(spec: Spec, ellipsoid: tuple[float, float] | None) -> World:
     """Lay the world out around the middle of the strips; without semi-axes of an ellipsoid it is flat."""
     heading = np.radians(spec.flight.heading_deg)
-    sin, cos = np.sin(heading), np.cos(heading)
-    turn = np.array([[sin, cos, 0.0], [-cos, sin, 0.0], [0.0, 0.0, 1.0]])  # rows forward, left, up in east, north, up
     if ellipsoid is None:
-        return World(turn)
+        return World(local_axes_matrix(heading).T)
     lon, lat = np.radians(spec.ground.center_deg)
-    (sin_l, cos_l), (sin_b, cos_b) = ((np.sin(angle), np.cos(angle)) for angle in (lon, lat))
-    east_north_up = np.array(
-        [[-sin_l, cos_l, 0.0], [-sin_b * cos_l, -sin_b * sin_l, cos_b], [cos_b * cos_l, cos_b * sin_l, sin_b]]
-    )
-    radius = np.sqrt(meridian_radius(lat, ellipsoid) * prime_vertical_radius(lat, ellipsoid)) + spec.terrain.height
-    return World(turn @ east_north_up, ellipsoid, float(radius))
+    return World(axes_matrix(lat, lon, heading).T, ellipsoid, float(mean_radius(lat, ellipsoid)) + spec.terrain.height)
 
 
 @dataclass(frozen=True, eq=False)
