@@ -108,7 +108,7 @@ def _turns(values: ArrayLike, system: str) -> list[Floats]:
     axes, sign = AXES[system]
     return [
         _about(axis, angle)
-        for axis, angle in zip(axes, np.moveaxis(values * np.array([sign, 1, 1]), -1, 0), strict=True)
+        for axis, angle in zip(axes, np.moveaxis(np.asarray(values, float) * [sign, 1, 1], -1, 0), strict=True)
     ]
 
 
