@@ -45,8 +45,7 @@ from photostrip.planning.model.plan import (  # noqa: E402
     standard_zones,
 )
 from photostrip.planning.model.single_model import ModelControl, orientation_operator  # noqa: E402
-from photostrip.planning.strip.control_layout import ControlLayout, Spot, numbers_of, spots_of  # noqa: E402
-from photostrip.planning.strip.ideal_strip import StripGeometry, ideal_strip  # noqa: E402
+from photostrip.planning.strip.ideal_strip import ControlLayout, Spot, StripGeometry, ideal_strip, numbers_of, spots_of  # noqa: E402  # noqa: E402
 from photostrip.planning.strip.methods import (  # noqa: E402
     BUNDLE,
     DEGREES,
@@ -70,8 +69,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.planning.strip.control_layout import Spot as ControlSpot
     from photostrip.planning.strip.ideal_strip import IdealStrip
+    from photostrip.planning.strip.ideal_strip import Spot as ControlSpot
 
     Floats = NDArray[np.float64]
 

@@ -1,5 +1,5 @@
 """Errors of one oriented model.
 
-``single_model`` with ``element_errors``, ``adjustment`` and ``given_errors``: the theory [000]; ``closed_form`` the
-same as sums; ``deformation`` simple formulas and the paraboloid [003]; ``plan`` puts them together.
+``single_model`` with ``given_errors``: the theory [000]; ``closed_form`` the same as sums; ``deformation`` simple
+formulas and the paraboloid [003]; ``plan`` puts them together.
 """

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.planning.model.element_errors import influence, measured_covariance
+from photostrip.planning.model.single_model import influence, measured_covariance
 from photostrip.statistics import normal_quantile, t_p_value, t_quantile
 from photostrip.strip.relative_orientation import six_points
 

@@ -14,10 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photostrip.arrays import Floats
-from photostrip.planning.model.adjustment import AdjustedModel, adjust_model
 from photostrip.planning.model.deformation import base_frame_elements, parallax_error, surface_of_elements
-from photostrip.planning.model.element_errors import influence
-from photostrip.planning.model.single_model import ModelControl, orientation_operator, orientation_parameters
+from photostrip.planning.model.single_model import (
+    AdjustedModel,
+    ModelControl,
+    adjust_model,
+    influence,
+    orientation_operator,
+    orientation_parameters,
+)
 
 
 @dataclass(frozen=True, eq=False)

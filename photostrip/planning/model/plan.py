@@ -13,14 +13,6 @@ from numpy.typing import ArrayLike
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.planning.model import closed_form, deformation
-from photostrip.planning.model.adjustment import adjust_model
-from photostrip.planning.model.element_errors import (
-    ELEMENTS,
-    FREE,
-    element_covariance,
-    free_covariance,
-    measured_covariance,
-)
 from photostrip.planning.model.given_errors import (
     BentModel,
     ControlErrors,
@@ -31,10 +23,17 @@ from photostrip.planning.model.given_errors import (
     error_parts,
 )
 from photostrip.planning.model.single_model import (
+    ELEMENTS,
+    FREE,
     ExpectedErrors,
     ModelControl,
+    adjust_model,
+    element_covariance,
     expected_errors,
+    free_covariance,
+    influence,
     influence_after_orientation,
+    measured_covariance,
 )
 from photostrip.units import MILLIMETRES
 
@@ -322,7 +321,7 @@ def both_forms(spec: ModelSpec) -> BothForms:
     where, given = np.array([point.at for point in points]), control.points[:, :2]
     columns = [ELEMENTS.index(name) for name in closed_form.ORDER]
     level = _level(where, spec)
-    weights, through = influence_after_orientation(level, control, spec.base)
+    weights, through = influence_after_orientation(level, control, spec.base, influence)
     return BothForms(
         names=tuple(point.name for point in points),
         sums=closed_form.control_sums(given),

@@ -9,8 +9,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.planning.strip.control_layout import ControlLayout, Spot, spots_of
-from photostrip.planning.strip.ideal_strip import IdealStrip, StripGeometry, ideal_strip
+from photostrip.planning.strip.ideal_strip import ControlLayout, IdealStrip, Spot, StripGeometry, ideal_strip, spots_of
 from photostrip.planning.strip.methods import BUNDLE, METHODS, Accuracy, accuracy
 from photostrip.planning.strip.placement import BestPlaces, Demand, Placement, best_places, worst
 

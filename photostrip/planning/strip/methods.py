@@ -18,8 +18,7 @@ from photostrip.network import problem as bundle
 from photostrip.network.cofactors import cofactors_of as bundle_precision
 from photostrip.network.solve import solve
 from photostrip.notes import counted
-from photostrip.planning.strip.control_layout import USES, ControlLayout, Spot, Triple, numbers_of
-from photostrip.planning.strip.ideal_strip import IdealStrip
+from photostrip.planning.strip.ideal_strip import USES, ControlLayout, IdealStrip, Spot, Triple, numbers_of
 from photostrip.points import ControlPoints
 from photostrip.strip import absolute_orientation
 from photostrip.strip.error_propagation import control_errors

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.planning.strip.control_layout import ControlLayout, Spot, across, spots_of
-from photostrip.planning.strip.ideal_strip import IdealStrip
+from photostrip.planning.strip.ideal_strip import ControlLayout, IdealStrip, Spot, across, spots_of
 from photostrip.planning.strip.methods import Accuracy, accuracy
 
 WORTH = 0.01  # part of the score that a place must gain to be called better

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Annotated
 
 from photostrip.formats.text.findings import suggestion
-from photostrip.planning.strip.control_layout import LAYOUTS, USES, ControlLayout, Spot
 from photostrip.planning.strip.design import DesignReport, DesignTask, plan_strip
-from photostrip.planning.strip.ideal_strip import LEAST_PHOTOS, StripGeometry
+from photostrip.planning.strip.ideal_strip import LAYOUTS, LEAST_PHOTOS, USES, ControlLayout, Spot, StripGeometry
 from photostrip.planning.strip.methods import BUNDLE, METHODS
 from photostrip.planning.strip.placement import Demand, Placement
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan

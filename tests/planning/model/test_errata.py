@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.planning.model.closed_form import ORDER, coefficients, control_sums, kernels
-from photostrip.planning.model.element_errors import ELEMENTS, influence
-from photostrip.planning.model.single_model import ModelControl, orientation_operator
+from photostrip.planning.model.single_model import ELEMENTS, ModelControl, influence, orientation_operator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,9 +11,8 @@ import pytest
 
 from benchmarks.planning import Task, repetitions
 from photostrip.errors import GeometryError, InputError
-from photostrip.planning.strip.control_layout import ControlLayout, Spot, across, spots_of
 from photostrip.planning.strip.design import DesignTask, along_the_strip, bands_needed, outcome, plan_strip
-from photostrip.planning.strip.ideal_strip import StripGeometry, ideal_strip
+from photostrip.planning.strip.ideal_strip import ControlLayout, Spot, StripGeometry, across, ideal_strip, spots_of
 from photostrip.planning.strip.methods import BUNDLE, METHODS, SIMILARITY, accuracy
 from photostrip.planning.strip.placement import Demand, Placement, best_places, equal_ways, worst
 from photostrip.simulation import FILM, Points

@@ -10,7 +10,6 @@ from photostrip.arrays import Floats
 from photostrip.notes import Document
 from photostrip.planning.model.closed_form import ORDER
 from photostrip.planning.model.deformation import DEFORMATION_TERMS
-from photostrip.planning.model.element_errors import ELEMENTS, FREE
 from photostrip.planning.model.plan import (
     BothForms,
     Forecast,
@@ -20,7 +19,7 @@ from photostrip.planning.model.plan import (
     simple_accuracy,
     source_example,
 )
-from photostrip.planning.model.single_model import PARAMETERS
+from photostrip.planning.model.single_model import ELEMENTS, FREE, PARAMETERS
 from photostrip.result.numbers import GROUND, micrometres, rms, rounded, significant
 from photostrip.units import ARCSECONDS, MICROMETRES
 
