@@ -2,8 +2,8 @@
 
 In come image coordinates (x, z) and directions to points; out go the orientation of a photo (``orientation``), the
 accuracy that directions must have (``accuracy``), and displacements between epochs with their tests: ``normal_case``
-brings two photos of any orientation to the normal case, ``displacement`` compares two epochs, ``camera_motion`` finds
-cameras that turned, ``epochs`` walks through all of it to the time series of ``monitoring``, ``remarks`` say what is
-wrong with it. ``one_station`` does with photos of one station and known distances; ``forecast`` says beforehand how
-well displacements will be known. ``frame`` holds the geometry: how a camera looks at the ground.
+brings two photos of any orientation to the normal case and compares two epochs, ``camera_motion`` finds cameras that
+turned, ``monitoring`` walks through all of it to a time series. ``one_station`` does with photos of one station and
+known distances; ``forecast`` says beforehand how well displacements will be known. ``frame`` holds the geometry: how a
+camera looks at the ground.
 """

@@ -1,7 +1,7 @@
 """How well displacements will be known, before anything is photographed: by distance, and by place in the photo.
 
 With two stations nothing here has a theory of its own: points are put where both photos show them, measured without
-errors in two epochs, and taken through ``epochs``; what is planned is what a survey reports. With one station the
+errors in two epochs, and taken through ``monitoring``; what is planned is what a survey reports. With one station the
 distances of the points are known, and what is seen is the displacement across the ray.
 """
 
@@ -14,11 +14,9 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.statistics import noncentrality
-from photostrip.terrestrial.displacement import SPACE
-from photostrip.terrestrial.epochs import monitor
 from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo
-from photostrip.terrestrial.monitoring import MonitoringSettings, Series
-from photostrip.terrestrial.normal_case import StereoPair
+from photostrip.terrestrial.monitoring import MonitoringSettings, Series, monitor
+from photostrip.terrestrial.normal_case import SPACE, StereoPair
 
 HALVINGS = 60
 FARTHEST_ASIDE = 20.0  # of the distance: no photo shows more to the side

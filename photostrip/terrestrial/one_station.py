@@ -15,8 +15,8 @@ from photostrip.arrays import Flags, Floats
 from photostrip.errors import GeometryError
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.camera_motion import ImagePair, Turn, fit
-from photostrip.terrestrial.displacement import SPACE
 from photostrip.terrestrial.frame import rays, small_turn
+from photostrip.terrestrial.normal_case import SPACE
 
 DIFFERENCES = np.array([1e-4] * 4 + [1e-3] * 2 + [1e-6] * 3)  # of differences: mm, metres, radians
 ACROSS, COMPLETE = 2, 3  # components of a displacement

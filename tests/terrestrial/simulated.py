@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.epochs import monitor
-from photostrip.terrestrial.monitoring import MonitoringSettings, Series
+from photostrip.terrestrial.monitoring import MonitoringSettings, Series, monitor
 from photostrip.terrestrial.normal_case import StereoPair
 
 if TYPE_CHECKING:

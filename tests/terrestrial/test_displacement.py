@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.terrestrial.displacement import displacements, ellipses, limit, statistic
-from photostrip.terrestrial.normal_case import intersect
+from photostrip.terrestrial.normal_case import displacements, ellipses, intersect, limit, statistic
 from tests.vectors import cases
 
 if TYPE_CHECKING:

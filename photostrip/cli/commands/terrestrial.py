@@ -89,7 +89,7 @@ def displacement(  # noqa: PLR0913 (an argument for each option)
     from photostrip.formats.output.terrestrial_displacements import displacement_document, displacements_csv
     from photostrip.report.commands.terrestrial_displacements import displacement_report
     from photostrip.report.pictures.terrestrial import check_plot
-    from photostrip.terrestrial.epochs import monitor
+    from photostrip.terrestrial.monitoring import monitor
 
     if plot is not None:
         check_plot(str(plot))

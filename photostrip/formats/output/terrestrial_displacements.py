@@ -13,10 +13,9 @@ from photostrip.formats.output.terrestrial_directions import ARCSEC, IMAGE_UM, R
 from photostrip.notes import Document, Note
 from photostrip.result.numbers import natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile
-from photostrip.terrestrial.displacement import ellipses
 from photostrip.terrestrial.frame import Phototheodolite
 from photostrip.terrestrial.monitoring import REASONS, CameraState, Monitoring, Step
-from photostrip.terrestrial.normal_case import SIDES
+from photostrip.terrestrial.normal_case import SIDES, ellipses
 from photostrip.units import ARCSECONDS, MICROMETRES
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ import pytest
 
 from photostrip.cli.commands import terrestrial_directions
 from photostrip.cli.main import main
-from photostrip.terrestrial.epochs import monitor
+from photostrip.terrestrial.monitoring import monitor
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 from tests.terrestrial.files import TRUTH, coordinates, project, pseudo_parallaxes, write

@@ -12,7 +12,7 @@ import pytest
 from photostrip.errors import InputError
 from photostrip.project.terrestrial.cameras import own_presets, read_presets
 from photostrip.project.terrestrial.survey import load_survey
-from photostrip.terrestrial.epochs import monitor
+from photostrip.terrestrial.monitoring import monitor
 from tests.loops import nonempty
 from tests.terrestrial.files import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
 from tests.test_packaging import build
