@@ -1,7 +1,9 @@
 """A frame of ground coordinates, tied to the one Cartesian frame of a project.
 
 Coordinates are always in the internal order east, north, up (longitude, latitude, height; X, Y, Z). The user's order
-of columns is an attribute of the frame and is applied at the rim.
+of columns is an attribute of the frame and is applied at the rim. Directions of ground axes are orthogonal,
+right-handed unit vectors, rows of (n, 3, 3): east, north, up. What lies outside the domain of a projection, a geoid
+grid or a datum shift is named in messages.
 
 Source: [001] eq. 152, 153; directions of grid axes are derived.
 """
@@ -16,14 +18,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photostrip.arrays import Floats, pieces
-from photostrip.errors import GeometryError, PhotostripError
+from photostrip.arrays import Flags, Floats, pieces
+from photostrip.errors import Fault, GeometryError, InputError, PhotostripError
 from photostrip.geodesy.curvature import Ellipsoid, curvature_correction, meridian_radius, prime_vertical_radius
-from photostrip.geodesy.domain import finite_rows, named_rows, require_reached, require_rows
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind
-from photostrip.geodesy.ground_axes import axes_along_north, axes_between, true_axes
 from photostrip.geodesy.local_frame import geocentric_columns, geocentric_from_geodetic, geodetic_from_geocentric
 from photostrip.geodesy.proj_operation import DatumShift, ProjOperation, wrapped_longitude
+from photostrip.notes import named
 
 WGS84: Ellipsoid = (6378137.0, 6356752.314245179)
 """Semi-axes of WGS 84, metres: by definition a = 6378137 m, 1/f = 298.257223563 (NIMA TR8350.2)."""
@@ -32,6 +33,8 @@ _DERIVATIVE_STEP = 1e-4  # of the radius: 640 m on the Earth; truncation and rou
 _EXACT = 1e-7  # metres: some projections of PROJ (equal-area ones) come back to a millimetre only
 _COMES_BACK = 1.0  # metres: a point that misses itself by more was never in the domain of the projection
 _CENTRE = 0.1  # of the radius: nearer to the centre of the body, latitude means nothing
+_POLE = 1e-9  # radians: nearer to a pole, east and north are not defined
+_ROWS_NAMED = 8
 
 
 def plural(unit: str) -> str:
@@ -347,3 +350,64 @@ class GroundFrame:
             ends.append(self._cartesian_from_geodetic(there, None).reshape(-1, 3, 3))
         east, north, _ = np.moveaxis(ends[0] - ends[1], 1, 0)
         return axes_along_north(east, north)
+
+
+def true_axes(geodetic: Floats) -> Floats:
+    """East, north and the ellipsoid's normal at longitude, latitude (radians), in the geocentric frame."""
+    lon, lat = geodetic[:, 0], geodetic[:, 1]
+    pole = np.abs(lat) > math.pi / 2.0 - _POLE
+    if pole.any():
+        raise GeometryError(f"{named_rows(pole, None)}: at a pole there is no east and no north", code="pole")
+    (sin_l, cos_l), (sin_b, cos_b) = ((np.sin(angle), np.cos(angle)) for angle in (lon, lat))
+    east = np.stack([-sin_l, cos_l, np.zeros_like(lon)], axis=-1)
+    north = np.stack([-sin_b * cos_l, -sin_b * sin_l, cos_b], axis=-1)
+    up = np.stack([cos_b * cos_l, cos_b * sin_l, sin_b], axis=-1)
+    return np.stack([east, north, up], axis=1)
+
+
+def axes_between(east: Floats, north: Floats) -> Floats:
+    """Right angles, shared evenly between two directions; nothing moves where they cross at right angles."""
+    east, north = _unit(east), _unit(north)
+    up = _unit(np.cross(east, north))
+    east = _unit(east + np.cross(north, up))
+    return np.stack([east, np.cross(up, east), up], axis=1)
+
+
+def axes_along_north(east: Floats, north: Floats) -> Floats:
+    """Right angles, the second axis along a direction in the plane of two."""
+    up = _unit(np.cross(east, north))
+    north = _unit(north - np.einsum("nc,nc->n", north, up)[:, None] * up)
+    return np.stack([np.cross(north, up), north, up], axis=1)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def finite_rows(rows: Floats) -> Flags:
+    """Rows without an infinite number: PROJ marks what it cannot transform by infinity."""
+    return np.asarray(np.isfinite(rows).all(axis=1))
+
+
+def named_rows(bad: Flags, ids: Sequence[str] | None) -> str:
+    """Say which rows are meant, the first of them by name; without ids by number, counted from 0."""
+    rows = np.flatnonzero(bad)
+    if ids is None:
+        return named("row", [str(row) for row in rows], _ROWS_NAMED)
+    return named("point", [ids[int(row)] for row in rows], _ROWS_NAMED)
+
+
+def require_rows(good: Flags, trouble: str, ids: Sequence[str] | None) -> None:
+    """Refuse coordinates given by the user that cannot be used."""
+    if not good.all():
+        raise InputError(Fault(f"{named_rows(~good, ids)}: {trouble}", code="ground-domain", points=_ids(~good, ids)))
+
+
+def require_reached(good: Flags, trouble: str, ids: Sequence[str] | None) -> None:
+    """Refuse computed points that cannot be expressed in a frame."""
+    if not good.all():
+        raise GeometryError(f"{named_rows(~good, ids)}: {trouble}", points=_ids(~good, ids), code="ground-domain")
+
+
+def _ids(bad: Flags, ids: Sequence[str] | None) -> tuple[str, ...]:
+    return () if ids is None else tuple(ids[int(row)] for row in np.flatnonzero(bad))
