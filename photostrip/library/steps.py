@@ -21,8 +21,7 @@ from photostrip.geometry import plane
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.library.step_arguments import rows, same, sigma0_of
 from photostrip.library.steps_of_strips import Absolute, Bundle, Strip, absolute, bundle, polynomial, strip
-from photostrip.strip.image_coordinates.corrections import Bending, undistort
-from photostrip.strip.image_coordinates.refraction import refraction_constant
+from photostrip.strip.image_coordinates.corrections import Bending, refraction_constant, undistort
 from photostrip.strip.relative_orientation.orientation import orient_pairs
 from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS, Pairs
 from photostrip.strip.resection.closed_form import OrientedPhoto, space_resection

@@ -18,7 +18,7 @@ from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import corrections
 
 if TYPE_CHECKING:
-    from photostrip.strip.image_coordinates.mark_fit import InteriorOrientation
+    from photostrip.strip.image_coordinates.interior import InteriorOrientation
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from photostrip.strip.gross_errors.control.control_screening import ScreenedControl
     from photostrip.strip.gross_errors.pairs import screening
     from photostrip.strip.image_coordinates import corrections
-    from photostrip.strip.image_coordinates.mark_fit import InteriorOrientation
+    from photostrip.strip.image_coordinates.interior import InteriorOrientation
     from photostrip.strip.independent_models.formation import FormedModels
     from photostrip.strip.resection import resection as exterior
 

@@ -17,7 +17,7 @@ from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import FILM as CAMERA
 from photostrip.simulation.spec import Film, Flight, Image, Spec, Terrain
 from photostrip.strip.image_coordinates import corrections, interior
-from photostrip.strip.image_coordinates.refraction import refraction_constant
+from photostrip.strip.image_coordinates.corrections import refraction_constant
 from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
 
 if TYPE_CHECKING:

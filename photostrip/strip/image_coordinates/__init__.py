@@ -1,10 +1,9 @@
 """Image coordinates: from what is measured on a photo to ideal coordinates about the principal point.
 
 Comes in: measured points and fiducial marks, cameras. ``interior`` brings points into the system of the marks (checked
-in ``fiducial_marks``, fitted in ``mark_fit``, remarked on in ``mark_notes``, their calibration in ``certificate``),
-``film_deformation`` interpolates what the marks leave, ``corrections`` removes lens distortion (``lens_distortion``),
-``refraction`` and, where asked for, Earth curvature. Goes out: ``PhotoPoints`` for the pairs. ``settings`` say what is
-applied.
+in ``fiducial_marks``, their calibration in ``certificate``), ``corrections`` removes lens distortion
+(``lens_distortion``), refraction and, where asked for, Earth curvature. Goes out: ``PhotoPoints`` for the pairs.
+``settings`` say what is applied.
 
 Source: [Brown 1966], [Fraser 1997], [Kraus], [Saastamoinen 1972]; transformations are derived.
 """

@@ -17,8 +17,7 @@ from photostrip.camera import Camera, Distortion
 from photostrip.errors import GeometryError, InputError
 from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import corrections, lens_distortion
-from photostrip.strip.image_coordinates.corrections import Bending, Refined
-from photostrip.strip.image_coordinates.refraction import curvature_constant, refraction_constant
+from photostrip.strip.image_coordinates.corrections import Bending, Refined, curvature_constant, refraction_constant
 from photostrip.strip.image_coordinates.settings import ImageCorrectionSettings
 
 Floats = NDArray[np.float64]

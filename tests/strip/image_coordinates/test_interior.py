@@ -17,7 +17,7 @@ from photostrip.points import PhotoPoints
 from photostrip.strip.image_coordinates import interior
 from photostrip.strip.image_coordinates.fiducial_marks import WRONG_PATTERN, right_pattern
 from photostrip.strip.image_coordinates.fiducial_marks import Marks as MarksOfPhotos
-from photostrip.strip.image_coordinates.mark_fit import InteriorOrientation, linear_shape
+from photostrip.strip.image_coordinates.interior import InteriorOrientation, linear_shape
 from photostrip.strip.image_coordinates.settings import InteriorSettings
 from tests.loops import nonempty
 
