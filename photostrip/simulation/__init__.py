@@ -1,9 +1,9 @@
 """Strips of photos with known truth: what would be measured, and what it should give.
 
 In comes a ``Spec``, out go observations, control and truth, without rounding. ``draws`` gives random numbers that are
-the same on every machine; ``ground`` the world and its terrain, ``flight`` the photos, ``placement`` the
-points, ``imaging`` and ``film`` the photos that show them and image coordinates, ``plotter`` independent models,
-``control`` given points, ``gross`` gross errors, ``validation`` what cannot be simulated.
+the same on every machine; ``ground`` the world and its terrain, ``flight`` the photos and what they show,
+``placement`` the points, ``film`` its deformation, ``plotter`` independent models, ``control`` given points, ``gross``
+gross errors, ``validation`` what cannot be simulated.
 
 >>> from photostrip.simulation import Flight, Spec, simulate
 >>> simulation = simulate(Spec(flight=Flight(photos=5)))

@@ -9,9 +9,8 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.simulation.draws import Draws, Purpose
-from photostrip.simulation.flight import CUT_SIGMAS, Photos, position_sigma
+from photostrip.simulation.flight import CUT_SIGMAS, Photos, position_sigma, sees
 from photostrip.simulation.ground import Surface, World
-from photostrip.simulation.imaging import sees
 from photostrip.simulation.spec import Spec
 
 # Where a point is tried when its photos do not all show it at first: shift along, in half widths of the zone on three

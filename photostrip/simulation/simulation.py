@@ -18,10 +18,9 @@ from photostrip.points import ControlPoints, ModelPoints, PhotoPoints, PointTabl
 from photostrip.simulation.control import Roles, given_coordinates, roles
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.film import Sheets, sheets
-from photostrip.simulation.flight import Photos, fly
+from photostrip.simulation.flight import Photos, bent, fly, project
 from photostrip.simulation.gross import InjectedError, spoil_control, spoil_images
 from photostrip.simulation.ground import World, surface, world
-from photostrip.simulation.imaging import bent, project
 from photostrip.simulation.placement import Placed, place, shown
 from photostrip.simulation.plotter import TruePlaces, plotted
 from photostrip.simulation.spec import Spec

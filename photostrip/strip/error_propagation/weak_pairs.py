@@ -15,7 +15,7 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.points import take_rows
-from photostrip.strip.error_propagation.pair_errors import differentiate_pairs
+from photostrip.strip.error_propagation.strip_errors import differentiate_pairs
 from photostrip.strip.relative_orientation.orientation import BY_ROW, Orientation
 from photostrip.strip.relative_orientation.pairs import Pairs
 from photostrip.strip.relative_orientation.solution import (
