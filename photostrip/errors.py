@@ -15,6 +15,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from photostrip.notes import before
+
 if TYPE_CHECKING:
     from photostrip.notes import Finding
 
@@ -42,18 +44,12 @@ class Fault:
 
     def __str__(self) -> str:
         """Return the one-line form ``file:line:column: key: what, expected, fix``."""
-        place = self.file
-        if self.line:
-            place += f":{self.line}"
-            if self.column:
-                place += f":{self.column}"
-        head = [part for part in (place, self.key) if part]
-        text = self.message
+        text = before(self.file, self.line, self.column) + (f"{self.key}: " if self.key else "") + self.message
         if self.expected:
             text += f"; expected {self.expected}"
         if self.fix:
             text += f"; {self.fix}"
-        return ": ".join([*head, text])
+        return text
 
 
 class PhotostripError(Exception):

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.geodesy.curvature import Ellipsoid, eccentricity_squared, prime_vertical_radius
-from photostrip.geometry.rotation import rotation_y, rotation_z
+from photostrip.geometry.rotation import rotation_z
 
 _ITERATIONS = 10  # the Earth stops after 2 or 3, a body as flat as Saturn after a few more
 _CONVERGED = 1e-15  # radians, 6 nanometres on the Earth
@@ -79,7 +79,16 @@ def axes_matrix(lat: float, lon: float, azimuth: float) -> Floats:
 
     Source: [001] eq. 143, corrected.
     """
-    return rotation_z(lon) @ rotation_y(np.pi / 2 - lat) @ rotation_z(np.pi - azimuth)  # eq. 143; a2 and b1 corrected
+    sin_b, cos_b = np.sin(lat), np.cos(lat)
+    sin_l, cos_l = np.sin(lon), np.cos(lon)
+    sin_a, cos_a = np.sin(azimuth), np.cos(azimuth)
+    return np.array(  # eq. 143; a2 and b1 corrected
+        [
+            [-cos_l * sin_b * cos_a - sin_l * sin_a, -cos_l * sin_b * sin_a + sin_l * cos_a, cos_l * cos_b],
+            [-sin_l * sin_b * cos_a + cos_l * sin_a, -sin_l * sin_b * sin_a - cos_l * cos_a, sin_l * cos_b],
+            [cos_b * cos_a, cos_b * sin_a, sin_b],
+        ]
+    )
 
 
 def local_axes_matrix(azimuth: float) -> Floats:
@@ -87,7 +96,8 @@ def local_axes_matrix(azimuth: float) -> Floats:
 
     A rotation about the vertical: columns as in ``axes_matrix``.
     """
-    return rotation_z(np.pi / 2 - azimuth)
+    sin_a, cos_a = np.sin(azimuth), np.cos(azimuth)
+    return np.array([[sin_a, -cos_a, 0.0], [cos_a, sin_a, 0.0], [0.0, 0.0, 1.0]])
 
 
 def mean_position(lat: ArrayLike, lon: ArrayLike, height: ArrayLike) -> tuple[float, float, float]:

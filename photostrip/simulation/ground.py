@@ -15,7 +15,8 @@ import numpy as np
 
 from photostrip.arrays import Floats
 from photostrip.geodesy.curvature import mean_radius
-from photostrip.geodesy.local_frame import axes_matrix, geocentric_from_geodetic, local_axes_matrix
+from photostrip.geodesy.ground_frame import true_axes
+from photostrip.geodesy.local_frame import geocentric_from_geodetic, local_axes_matrix
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.spec import Spec
 
@@ -58,10 +59,12 @@ class World:
 def world(spec: Spec, ellipsoid: tuple[float, float] | None) -> World:
     """Lay the world out around the middle of the strips; without semi-axes of an ellipsoid it is flat."""
     heading = np.radians(spec.flight.heading_deg)
+    turn = local_axes_matrix(heading).T  # rows forward, left, up in east, north, up
     if ellipsoid is None:
-        return World(local_axes_matrix(heading).T)
-    lon, lat = np.radians(spec.ground.center_deg)
-    return World(axes_matrix(lat, lon, heading).T, ellipsoid, float(mean_radius(lat, ellipsoid)) + spec.terrain.height)
+        return World(turn)
+    center = np.radians(spec.ground.center_deg)
+    radius = float(mean_radius(center[1], ellipsoid)) + spec.terrain.height
+    return World(turn @ true_axes(center[None])[0], ellipsoid, radius)
 
 
 @dataclass(frozen=True, eq=False)

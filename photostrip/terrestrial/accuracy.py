@@ -75,11 +75,6 @@ def supported(
     return np.stack([horizontal / unit.horizontal, vertical / unit.vertical], axis=-1)
 
 
-def of_rounds(sigma: float, rounds: int) -> float:
-    """Return the standard deviation of the mean of several rounds, each measured in both faces."""
-    return float(sigma / np.sqrt(rounds))
-
-
 def rounds_for(sigma: float, wanted: float) -> int:
     """Return the number of rounds, each in both faces with `sigma`, whose mean has the standard deviation wanted."""
     return max(1, ceil((sigma / wanted) ** 2 - 1e-9))  # exactly four times is not more than four times

@@ -14,7 +14,6 @@ from photostrip.terrestrial.accuracy import (
     EXAMPLES,
     as_printed,
     grid,
-    of_rounds,
     required,
     rounds_for,
     supported,
@@ -112,8 +111,7 @@ def test_required_accuracy_is_that_of_simulated_measurements() -> None:
 
 
 def test_two_seconds_and_four_rounds() -> None:
-    mean = of_rounds(2.0, 4)
-    assert mean == 1.0
+    mean = 2.0 / np.sqrt(4)  # of four rounds
     image = supported([80.0, 60.0], 100.0, mean / ARCSECONDS, mean / ARCSECONDS, LEVEL)
     assert image[0] == pytest.approx(np.sqrt(2 * (100**2 + 80**2)) / 206264.806, rel=1e-6)  # 0.88 um
     assert image[1] == pytest.approx(np.sqrt(100**2 + 80**2 + 60**2) / 206264.806, rel=1e-6)  # 0.69 um
@@ -133,7 +131,7 @@ def test_what_is_supported_is_what_requires_it(
 @pytest.mark.parametrize(("sigma", "wanted", "rounds"), [(2, 1, 4), (2, 0.99, 5), (2, 2, 1), (2, 5, 1), (3, 1, 9)])
 def test_rounds(sigma: float, wanted: float, rounds: int) -> None:
     assert rounds_for(sigma, wanted) == rounds
-    assert of_rounds(sigma, rounds) <= wanted
+    assert sigma / np.sqrt(rounds) <= wanted
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -154,7 +155,7 @@ def theodolite_accuracy(
     """
     xz = _grid_points(grid)
     horizontal, vertical, rounds = theodolite
-    means = [accuracy.of_rounds(each, rounds) for each in (horizontal, vertical)]
+    means = [each / sqrt(rounds) for each in (horizontal, vertical)]
     by = (means[0] / ARCSECONDS, means[1] / ARCSECONDS)
     image = accuracy.supported(xz, camera.principal_distance, *by, attitude.rotation) * MICROMETRES
     document = _oriented_head("theodolite-accuracy", camera, attitude)

@@ -87,40 +87,20 @@ def accuracy(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], 
     if plan < 2 or height < 3:
         message = f"{counted(plan, 'control point')} in plan and {height} in height cannot orient a strip"
         raise GeometryError(message, code="plan-control")
-    fit = _oriented(strip, np.array(numbers_of(strip, spots), np.intp), control)
-    return _fitted(strip, fit, method)
+    return _fitted(strip, np.array(numbers_of(strip, spots), np.intp), control, method)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Absolute orientation of the strip as a run would do it."""
+def _fitted(strip: IdealStrip, numbers: Numbers, control: ControlPoints, method: str) -> Accuracy:
+    """Similarity, and polynomials of a fixed degree as far as the control carries them, as a run would fit them.
 
-    numbers: Numbers  # (c,): points that are control
-    control: ControlPoints
-    targets: absolute_orientation.Targets  # the same from the intermediate frame
-    weight: Floats  # (c, 3): weights of its coordinates
-    xyz: Floats  # (q, 3): all points in the intermediate frame, metres
-
-
-def _oriented(strip: IdealStrip, numbers: Numbers, control: ControlPoints) -> _Fit:
-    """Orient the strip on its control, which refuses control that leaves it a motion."""
+    The absolute orientation refuses control that leaves the strip a motion.
+    """
     frames, _ = tie_frames([FrameSpec("local", ("east", "north", "up"))])
     intermediate = IntermediateFrame.at_local_centre(strip.xyz[numbers[control.use[:, 0]]], np.pi / 2)
     targets = absolute_orientation.Targets(control, frames, intermediate)
     weight = absolute_orientation.weights(control, _precision(strip))
     absolute_orientation.lay(strip.formed.xyz[numbers], targets, weight, strip.formed.xyz)
-    return _Fit(
-        numbers=numbers,
-        control=control,
-        targets=targets,
-        weight=weight,
-        xyz=intermediate.intermediate_from_cartesian(strip.xyz),
-    )
-
-
-def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
-    """Similarity, and polynomials of a fixed degree as far as the control carries them."""
-    numbers, targets, weight, xyz = ground.numbers, ground.targets, ground.weight, ground.xyz
+    xyz = intermediate.intermediate_from_cartesian(strip.xyz)
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
         breadth = max(np.quantile(np.abs(xyz[:, 1]), 0.95), 1e-6)
@@ -128,9 +108,8 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
             xyz=xyz[numbers], targets=targets, weight=weight, spacing=strip.geometry.base, breadth=breadth
         )
         terms = [axis.terms for axis in correction.fit(problem, correction.PolynomialSettings(DEGREES[method])).axes]
-    axes = targets.axes(xyz[numbers])
-    found = control_errors.misclosures(ground.control, numbers, axes)
-    shift = targets.intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
+    found = control_errors.misclosures(control, numbers, targets.axes(xyz[numbers]))
+    shift = intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
     fit = control_errors.fit_operator(found, weight, xyz[numbers], terms, shift)
     fitted = FittedStrip(errors=strip.errors, control=found, fit=fit, xyz=xyz, factor=1.0)
     covariance = fitted.covariances_of_points(np.arange(len(xyz)))

@@ -27,7 +27,7 @@ from photostrip.arrays import Floats, Numbers, pieces
 from photostrip.geometry.rotation import angle_rates, cross_matrix, from_alpha_omega_kappa
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, Similarity, similarity_derivatives
 from photostrip.strip.relative_orientation.orientation import Orientation
-from photostrip.strip.relative_orientation.solution import normal_matrices
+from photostrip.strip.relative_orientation.solution import linearised_parallaxes
 from photostrip.strip.strip_formation.strip import FormedStrip
 
 ELEMENTS = 5  # of a pair
@@ -208,7 +208,7 @@ def differentiate_strip(
     stated = sigma[orientation.rows].reshape(-1, 4)
     width = 2 * len(images) + models
     used, row = np.flatnonzero(orientation.used), np.arange(len(columns))[:, None]
-    by_parallax = elements_by_parallax(orientation, pairs.parallax_by_elements)[used, :, None]
+    by_parallax = elements_by_parallax(orientation)[used, :, None]
     by_image = (pairs.parallax_by_image * stated)[used, None]
     places = entries_of(orientation.pairs.pair[used], COMPONENTS)[:, :SCALE]
     elements = blocks(places, row[used], by_parallax, (COMPONENTS * models, len(row)))
@@ -337,8 +337,7 @@ class PairErrors:
     rotation_by_elements: Floats  # (p, 3, 5): small rotation of the right photo
     point_by_elements: Floats  # (m, 3, 5): metres per radian
     point_by_image: Floats  # (m, 3, 4): the elements held fast, metres per mm
-    parallax_by_elements: Floats  # (5, m): y parallax in the base frame, mm per radian
-    parallax_by_image: Floats  # (m, 4): without unit
+    parallax_by_image: Floats  # (m, 4): y parallax in the base frame, without unit
     point: Floats  # (m, 3): model point from the left perspective centre, metres
     base: Floats  # (p, 3): right from left perspective centre, metres
 
@@ -358,7 +357,7 @@ def differentiate_pairs(
     turn = np.concatenate([-left.rates, right.rates], axis=2)
     held, count = to_ground @ left.rates / scale[:, None, None], len(pairs.pair)
     point, by_elements, by_image = np.empty((count, 3)), np.empty((count, 3, 5)), np.empty((count, 3, 4))
-    parallax_by_elements, parallax_by_image = np.empty((5, count)), np.empty((count, 4))
+    parallax_by_image = np.empty((count, 4))
     for rows in pieces(count, ROWS):
         pair = pairs.pair[rows]
         of_row = _by_row(to_ground, pair)
@@ -378,7 +377,6 @@ def differentiate_pairs(
                 in_ground = _product(of_row, by_level)
                 by_elements[rows, :, elements] = _product(in_ground, level.by_elements).transpose(2, 0, 1)
                 by_image[rows, :, image] = _product(in_ground, level.by_image).transpose(2, 0, 1)
-                parallax_by_elements[elements, rows] = sign * level.by_elements[1]
                 parallax_by_image[rows, image] = sign * level.by_image[1].T
             # in the frame of the left photo, which is held: (p x) turned to the ground
             point[rows] = (of_row * met).sum(axis=1).T
@@ -390,7 +388,6 @@ def differentiate_pairs(
         rotation_by_elements=to_ground @ turn / scale[:, None, None],
         point_by_elements=by_elements,
         point_by_image=by_image,
-        parallax_by_elements=parallax_by_elements,
         parallax_by_image=parallax_by_image,
         point=point,
         base=to_ground[:, :, 0],
@@ -427,16 +424,12 @@ class _Level(NamedTuple):
     by_image: Floats  # (2, 2, m)
 
 
-def elements_by_parallax(orientation: Orientation, jacobian: Floats) -> Floats:
-    """Elements by the y parallax of each row, (m, 5), radians per mm, 0 if not used: -(J^T W J)^-1 J^T W (eq. 1).
-
-    jacobian: (5, m), y parallaxes by the elements.
-    """
-    pairs = orientation.pairs
+def elements_by_parallax(orientation: Orientation) -> Floats:
+    """Elements by the y parallax of each row, (m, 5), radians per mm, 0 if not used: -(J^T W J)^-1 J^T W (eq. 1)."""
+    pairs, found = orientation.pairs, np.zeros((len(orientation.point), ELEMENTS))
     with np.errstate(all="ignore"):
-        cofactors = np.linalg.inv(normal_matrices(jacobian, pairs))
-        found = np.zeros(jacobian.shape[::-1])
-        for row, weighted in zip(cofactors.transpose(1, 0, 2), jacobian * pairs.weight, strict=True):
+        jacobian = linearised_parallaxes(orientation.elements, pairs).jacobian
+        for row, weighted in zip(orientation.cofactors.transpose(1, 0, 2), jacobian * pairs.weight, strict=True):
             found -= row[pairs.pair] * weighted[:, None]
     found[~orientation.used] = 0.0
     return found
