@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,3 @@ PIECE = 4096
 def pieces(count: int, most: int = PIECE) -> Iterator[slice]:
     """Cut rows into pieces: what is worked out of one fits into the processor's cache, and goes before the next."""
     return (slice(start, min(start + most, count)) for start in range(0, count, most))
-
-
-def runs_of(number: Numbers) -> Iterator[tuple[int, slice]]:
-    """Go through equal numbers that stand one after the other: the number, and its places."""
-    begins = np.flatnonzero(np.diff(number, prepend=-1)).tolist()
-    for start, stop in pairwise([*begins, len(number)]):
-        yield int(number[start]), slice(start, stop)

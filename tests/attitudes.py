@@ -6,10 +6,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geometry.rotation import about
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from photostrip.arrays import Floats
+
+
+def rotation_x(angle: ArrayLike) -> Floats:
+    return about(0, angle)
+
+
+def rotation_y(angle: ArrayLike) -> Floats:
+    return about(1, angle)
+
+
+def rotation_z(angle: ArrayLike) -> Floats:
+    return about(2, angle)
 
 
 def angle_between(first: ArrayLike, second: ArrayLike) -> Floats:

@@ -62,7 +62,7 @@ class GroundFrame:
     _plane: ProjOperation | None = None  # grid -> longitude, latitude of the same datum
     _vertical: ProjOperation | None = None  # heights above the geoid -> above the ellipsoid
     _geoid: str = ""  # what these heights refer to
-    _shift: DatumShift | None = None  # own datum -> datum of the Cartesian frame
+    shift: DatumShift | None = None  # own datum -> datum of the Cartesian frame
     _cartesian: Ellipsoid = WGS84  # ellipsoid of the Cartesian frame
 
     @property
@@ -103,7 +103,7 @@ class GroundFrame:
             return self._bent(points, -1.0)
         if self.kind == "geocentric":
             xyz = points * self.plan_factor
-            if self._shift is None:
+            if self.shift is None:
                 return xyz
             return self._cartesian_from_geodetic(geodetic_from_geocentric(xyz, self._datum_ellipsoid), ids)
         plan = self._lonlat(points[:, :2], ids)
@@ -122,7 +122,7 @@ class GroundFrame:
         points = np.array(xyz, dtype=np.float64).reshape(-1, 3)
         if self.kind == "local":
             return self._bent(points, 1.0)
-        if self.kind == "geocentric" and self._shift is None:
+        if self.kind == "geocentric" and self.shift is None:
             return points / self.plan_factor
         geodetic = self.geodetic(points)
         if self.kind == "geocentric":
@@ -148,8 +148,8 @@ class GroundFrame:
                 code="ground-domain",
             )
         geodetic = geodetic_from_geocentric(points, self._cartesian)
-        if self._shift is not None:
-            geodetic = self._shift.inverse(geodetic)
+        if self.shift is not None:
+            geodetic = self.shift.inverse(geodetic)
             require_reached(finite_rows(geodetic), f"no datum shift is known there to {self.spec.name}", None)
         return geodetic
 
@@ -168,11 +168,11 @@ class GroundFrame:
         points = np.asarray(xyz, dtype=np.float64).reshape(-1, 3)
         if self.kind in {"geocentric", "local"}:
             return np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
-        if ground is not None and self.kind == "projected" and self._shift is None:
+        if ground is not None and self.kind == "projected" and self.shift is None:
             return self._grid_axes(ground[:, :2])
         geodetic = self.geodetic(points)
         axes = true_axes(geodetic) if self.kind == "geographic" else self._grid_axes(self._plan(geodetic))
-        return axes if self._shift is None else self._shifted_axes(geodetic, axes)
+        return axes if self.shift is None else self._shifted_axes(geodetic, axes)
 
     def level_axes_at(self, xyz: ArrayLike, ground: Floats | None = None) -> Floats:
         """Directions as ``axes_at`` gives them, but true east, north and the normal for ``geocentric``."""
@@ -213,22 +213,17 @@ class GroundFrame:
     @property
     def datum_shift(self) -> str:
         """Datum shift between the frame and the Cartesian frame, in PROJ's words; empty where there is none."""
-        return "" if self._shift is None else str(self._shift.operation)
+        return "" if self.shift is None else str(self.shift.operation)
 
     @property
     def datum_accuracy(self) -> float | None:
         """Accuracy that is stated for the datum shift, metres: 0 without one, None when it is not known."""
-        return 0.0 if self._shift is None else self._shift.operation.accuracy
-
-    @property
-    def datum_change(self) -> DatumShift | None:
-        """Datum shift to the Cartesian frame; None where there is none."""
-        return self._shift
+        return 0.0 if self.shift is None else self.shift.operation.accuracy
 
     @property
     def grids(self) -> tuple[str, ...]:
         """Paths of the grid files that are read for the heights and the datum shift; known after the first use."""
-        shift = None if self._shift is None else self._shift.operation
+        shift = None if self.shift is None else self.shift.operation
         operations = [each for each in (self._plane, self._vertical, shift) if each is not None]
         return tuple(dict.fromkeys(grid for operation in operations for grid in operation.grids))
 
@@ -247,7 +242,7 @@ class GroundFrame:
             text += f" ({self._geoid})"
         if self.spec.curvature_radius is not None:
             text += f", curvature correction with R = {self.spec.curvature_radius:.0f} m"
-        if self._shift is not None and self.datum_accuracy != 0.0:
+        if self.shift is not None and self.datum_accuracy != 0.0:
             text += f"; datum shift: {self.datum_shift}"
         return text
 
@@ -304,8 +299,8 @@ class GroundFrame:
 
     def _cartesian_from_geodetic(self, geodetic: Floats, ids: Sequence[str] | None) -> Floats:
         """Cartesian coordinates from longitude, latitude (radians) and height of the frame's own datum."""
-        if self._shift is not None:
-            geodetic = self._shift.forward(geodetic)
+        if self.shift is not None:
+            geodetic = self.shift.forward(geodetic)
             require_rows(finite_rows(geodetic), f"no datum shift from {self.spec.name} is known there", ids)
         return geocentric_from_geodetic(geodetic, self._cartesian)
 

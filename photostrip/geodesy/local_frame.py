@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.geodesy.curvature import Ellipsoid, eccentricity_squared, prime_vertical_radius
-from photostrip.geometry.rotation import rotation_z
+from photostrip.geometry.rotation import about
 
 _ITERATIONS = 10  # the Earth stops after 2 or 3, a body as flat as Saturn after a few more
 _CONVERGED = 1e-15  # radians, 6 nanometres on the Earth
@@ -156,7 +156,7 @@ class IntermediateFrame:
 
     def with_azimuth(self, azimuth: float) -> Self:
         """Turn the frame about Z, so that X runs in another azimuth."""
-        return type(self)(self.origin, self.axes @ rotation_z(self.azimuth - azimuth), azimuth)
+        return type(self)(self.origin, self.axes @ about(2, self.azimuth - azimuth), azimuth)
 
     def intermediate_from_cartesian(self, xyz: ArrayLike) -> Floats:
         """Points (..., 3) from the project's Cartesian frame into this frame. Source: [001] eq. 144."""

@@ -140,7 +140,7 @@ def _frame(
         _plane=plane,
         _vertical=vertical,
         _geoid=crs.vertical,
-        _shift=shift,
+        shift=shift,
         _cartesian=cartesian,
     )
 

@@ -23,22 +23,8 @@ SYSTEMS = tuple(AXES)
 GIMBAL_LIMIT = 1e-12  # 1 - |sine of the middle angle| below which the other two are not separable
 
 
-def rotation_x(angle: ArrayLike) -> Floats:
-    """Rotation about the x axis by angles (...), right-hand rule."""
-    return _about(0, angle)
-
-
-def rotation_y(angle: ArrayLike) -> Floats:
-    """Rotation about the y axis, right-hand rule; see ``rotation_x``."""
-    return _about(1, angle)
-
-
-def rotation_z(angle: ArrayLike) -> Floats:
-    """Rotation about the z axis, right-hand rule; see ``rotation_x``."""
-    return _about(2, angle)
-
-
-def _about(axis: int, angle: ArrayLike) -> Floats:
+def about(axis: int, angle: ArrayLike) -> Floats:
+    """Rotation about the axis x (0), y (1) or z (2) by angles (...), right-hand rule."""
     t, first, second = np.asarray(angle, float), (axis + 1) % 3, (axis + 2) % 3
     matrix = np.zeros((*t.shape, 3, 3))
     matrix[..., axis, axis] = 1.0
@@ -122,7 +108,7 @@ def _turns(values: ArrayLike, system: str) -> list[Floats]:
     """Give the three turns whose product is a rotation."""
     axes, sign = AXES[system]
     return [
-        _about(axis, angle)
+        about(axis, angle)
         for axis, angle in zip(axes, np.moveaxis(np.asarray(values, float) * [sign, 1, 1], -1, 0), strict=True)
     ]
 

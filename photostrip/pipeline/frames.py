@@ -118,7 +118,7 @@ def datum_notes(inputs: Inputs, ground: GroundFrames) -> Iterator[Note]:
         if frame is not None and given is not None:
             frames[key], sigma_of[key] = frame, given.sigma
     for key, frame in frames.items():
-        shift = frame.datum_change
+        shift = frame.shift
         if shift is None:
             continue
         operation, title = shift.operation, f"{frame.title} to {ground.output.title}"

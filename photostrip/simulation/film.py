@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.geometry.rotation import rotation_z
+from photostrip.geometry.rotation import about
 from photostrip.simulation.draws import Draws, Purpose
 from photostrip.simulation.spec import Spec
 
@@ -45,7 +45,7 @@ def sheets(spec: Spec, count: int) -> Sheets | None:
     stretch = np.zeros((count, 2, 2))
     stretch[:, 0, 0], stretch[:, 1, 1] = 1.0 + film.scale_ppm * 1e-6 * normal[:, :2].T
     stretch[:, 0, 1] = film.shear_ppm * 1e-6 * normal[:, 2]
-    turn = rotation_z(np.radians(film.rotation_deg) * normal[:, 3])[:, :2, :2]
+    turn = about(2, np.radians(film.rotation_deg) * normal[:, 3])[:, :2, :2]
     number = 2.0 * np.pi / (max(spec.format) * np.asarray(LENGTHS))
     direction = np.stack([np.cos(uniform[..., 0]), np.sin(uniform[..., 0])], axis=-1)
     return Sheets(

@@ -167,22 +167,13 @@ class _Turns:
     """
 
     values: Floats  # (n, 6)
-    common: Floats  # (6, m, 4): how the turns follow the measured coordinates of the m stable points
-    stable: Floats  # (m, 6, m, 4): the same for each stable point
+    influence: Floats  # (n, 6, m, 4): how they follow the measured coordinates of the m stable points
     known: Flags  # (n,): False where a turn follows the point's own coordinates
 
-    def between(self, other: _Turns, variances: Floats, stable: Flags) -> Floats:
+    def between(self, other: _Turns, variances: Floats) -> Floats:
         """Covariance of the turns of two epochs, for errors of the stable points that both share, shape (n, 6, 6)."""
         spread = np.nan_to_num(variances)
-        whole = np.empty((len(stable), 6, 6))
-        whole[:] = np.einsum("ajk,jk,bjk->ab", self.common, spread, other.common)
-        whole[stable] = np.einsum("najk,jk,nbjk->nab", self.stable, spread, other.stable)
-        return whole
-
-    def along(self, gradient: Floats, variances: Floats, stable: Flags) -> Floats:
-        """Variance of what follows the turns with a gradient (n, 6), shape (n,)."""
-        between = self.between(self, variances, stable)
-        return np.asarray(np.einsum("na,nab,nb->n", gradient, between, gradient), float)
+        return np.asarray(np.einsum("najk,jk,nbjk->nab", self.influence, spread, other.influence), float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,13 +276,7 @@ def _states(number: int, motion: Motion | None, settings: MonitoringSettings) ->
 
 def _no_turns(series: Series) -> _Turns:
     points, stable = len(series.points), int(series.stable.sum())
-    shape = (6, stable, 4)
-    return _Turns(
-        values=np.zeros((points, 6)),
-        common=np.zeros(shape),
-        stable=np.zeros((stable, *shape)),
-        known=np.ones(points, bool),
-    )
+    return _Turns(np.zeros((points, 6)), np.zeros((points, 6, stable, 4)), np.ones(points, bool))
 
 
 def _turns(series: Series, motion: Motion | None, removed: tuple[bool, ...]) -> _Turns:
@@ -306,8 +291,7 @@ def _turns(series: Series, motion: Motion | None, removed: tuple[bool, ...]) -> 
         angles, columns = TURNS_OF_PHOTOS[camera], COLUMNS[camera]
         weighted = turn.design * turn.weights[:, :, None]
         result.values[:, angles] = turn.values
-        result.common[angles, :, columns] = np.einsum("jk,mik->jmi", turn.covariance, weighted)
-        result.stable[:, angles, :, columns] = result.common[angles, :, columns]
+        result.influence[:, angles, :, columns] = np.einsum("jk,mik->jmi", turn.covariance, weighted)
         rows = np.flatnonzero(turn.weights.any(axis=1))
         values, normal, known = turn.predict(rows)
         result.known[stable[rows[~known]]] = False
@@ -315,8 +299,7 @@ def _turns(series: Series, motion: Motion | None, removed: tuple[bool, ...]) -> 
         result.values[stable[rows], angles] = values
         influence = np.einsum("rjk,mik->rjmi", np.linalg.inv(normal), weighted)
         influence[range(len(rows)), :, rows] = 0.0
-        for number, each in zip(rows, influence, strict=True):
-            result.stable[number, angles, :, columns] = each
+        result.influence[stable[rows], angles, :, columns] = influence
     return result
 
 
@@ -371,7 +354,7 @@ def _from_turns(series: Series, epochs: list[_Epoch], one: int, two: int) -> Flo
     """Covariance that comes from the turns: stable points have errors too, those of the first epoch in all turns."""
     first, second = epochs[one], epochs[two]
     variances = series.of_epoch[0, series.stable] + (series.of_epoch[one, series.stable] if one == two else 0.0)
-    between = first.turns.between(second.turns, variances, series.stable)
+    between = first.turns.between(second.turns, variances)
     return np.asarray(first.by_turn @ between @ second.by_turn.transpose(0, 2, 1))
 
 
@@ -416,7 +399,8 @@ def _parallax_precision(series: Series, epochs: list[_Epoch]) -> tuple[Floats, F
     turned = np.zeros_like(alone)
     for number, each in enumerate(epochs[1:], 1):
         variances = series.of_epoch[0, series.stable] + series.of_epoch[number, series.stable]
-        turned[number] = each.turns.along(each.normal.parallax_by_turn, variances, series.stable)
+        gradient, between = each.normal.parallax_by_turn, each.turns.between(each.turns, variances)
+        turned[number] = np.einsum("na,nab,nb->n", gradient, between, gradient)
         turned[number, ~each.turns.known] = np.nan
     change = alone + alone[0] + common + turned
     change[0] = np.nan

@@ -19,11 +19,8 @@ from photostrip.geometry.rotation import (
     from_alpha_omega_kappa,
     from_angles,
     from_vector,
-    rotation_x,
-    rotation_y,
-    rotation_z,
 )
-from tests.attitudes import angle_between
+from tests.attitudes import angle_between, rotation_x, rotation_y, rotation_z
 from tests.vectors import cases, section
 
 if TYPE_CHECKING:

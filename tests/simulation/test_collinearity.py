@@ -9,8 +9,8 @@ import pytest
 from pyproj import CRS, Proj, Transformer
 
 from photostrip.camera import Distortion
-from photostrip.geometry.rotation import rotation_x, rotation_y, rotation_z
 from photostrip.simulation import DIGITAL, FILM, Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
+from tests.attitudes import rotation_x, rotation_y, rotation_z
 
 NANOMETRE = 1e-6  # mm
 FREE = Spec(image=Image(sigma_um=0.0), control=Control(noise=(0.0, 0.0, 0.0)))
