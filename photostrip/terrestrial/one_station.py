@@ -65,32 +65,31 @@ def one_station(
     Source: derived; [004c] eq. 1, 2 with distances in place of parallaxes.
     """
     turn = _turn(measured, principal_distance)
-    values = np.empty((len(measured.points), SPACE))
-    covariance = np.empty((len(measured.points), SPACE, SPACE))
-    components, statistic = [], np.empty(len(measured.points))
-    stable = np.cumsum(measured.stable) - 1
-    for row in range(len(measured.points)):
-        turned, spread = _known_turn(turn, int(stable[row]) if measured.stable[row] else None)
-        quantities = np.concatenate([measured.first[row], measured.change[row], measured.distances[row], turned])
-        complete = bool(np.isfinite(quantities[5]))
-        variances = np.zeros((len(quantities), len(quantities)))
-        sigmas = [measured.sigma[row]] * 2 + [measured.sigma_change[row]] * 2 + [measured.sigma_distance[row]] * 2
-        variances[range(6), range(6)] = np.square(sigmas)
-        variances[6:, 6:] = spread
-        values[row], ray = _displacement(quantities, principal_distance, rotation)
-        slope = _slope(quantities, principal_distance, rotation)
-        covariance[row] = slope @ variances @ slope.T
-        components.append(COMPLETE if complete else ACROSS)
-        # without a second distance the ray itself is a direction in which nothing is seen
-        seen = np.eye(SPACE) if complete else np.linalg.svd(ray[None])[2][1:]
-        moved = seen @ values[row]
-        statistic[row] = moved @ np.linalg.solve(seen @ covariance[row] @ seen.T, moved)
+    turned, spread = _known_turns(turn, measured.stable)
+    quantities = np.column_stack([measured.first, measured.change, measured.distances, turned])
+    sigmas = np.repeat(np.column_stack([measured.sigma, measured.sigma_change, measured.sigma_distance]), 2, axis=1)
+    variances = np.zeros((len(turned), 9, 9))
+    variances[:, range(6), range(6)] = sigmas**2
+    variances[:, 6:, 6:] = spread
+    values, ray = _displacement(quantities, principal_distance, rotation)
+    slope = _slope(quantities, principal_distance, rotation)
+    covariance = slope @ variances @ slope.transpose(0, 2, 1)
+    components = np.where(np.isfinite(measured.distances[:, 1]), COMPLETE, ACROSS)
+    statistic = np.empty(len(values))
+    # without a second distance the ray itself is a direction in which nothing is seen
+    axes = np.where((components == COMPLETE)[:, None, None], np.eye(SPACE), np.linalg.svd(ray[:, None])[2])
+    for number in (ACROSS, COMPLETE):
+        some = components == number
+        seen = axes[some, SPACE - number :]
+        moved = seen @ values[some, :, None]
+        weighted = np.linalg.solve(seen @ covariance[some] @ seen.transpose(0, 2, 1), moved)
+        statistic[some] = (moved * weighted).sum(axis=(1, 2))
     return OneStationResult(
         values=values,
         covariance=covariance,
-        components=tuple(components),
+        components=tuple(components.tolist()),
         statistic=statistic,
-        limit=np.array([chi2_quantile(1 - significance, number) for number in components]),
+        limit=np.array([chi2_quantile(1 - significance, number) for number in components.tolist()]),
         turn=turn,
     )
 
@@ -114,34 +113,32 @@ def _undetermined(points: tuple[str, ...]) -> GeometryError:
     return GeometryError(message, points=points, code="undetermined")
 
 
-def _known_turn(turn: Turn | None, number: int | None) -> tuple[Floats, Floats]:
-    """Turn with its covariance; for a stable point that of the others, because it must not testify for itself."""
-    if turn is None:
-        return np.zeros(SPACE), np.zeros((SPACE, SPACE))
-    if number is None:
-        return turn.values, turn.covariance
-    values, normal, known = turn.predict(np.array([number]))
-    if not known.all():
-        raise _undetermined(())
-    return values[0], np.asarray(np.linalg.inv(normal[0]), float)
+def _known_turns(turn: Turn | None, stable: Flags) -> tuple[Floats, Floats]:
+    """Give each point the turn with its covariance; a stable one that of the others: it must not testify for itself."""
+    values, spread = np.zeros((len(stable), SPACE)), np.zeros((len(stable), SPACE, SPACE))
+    if turn is not None:
+        values[:], spread[:] = turn.values, turn.covariance
+        values[stable], normal, known = turn.predict(np.arange(stable.sum()))
+        if not known.all():
+            raise _undetermined(())
+        spread[stable] = np.linalg.inv(normal)
+    return values, spread
 
 
 def _displacement(quantities: Floats, principal_distance: float, rotation: Floats) -> tuple[Floats, Floats]:
-    """Displacement on the ground, and the direction of the second ray.
+    """Displacements on the ground, and the directions of the second rays.
 
     quantities: (..., 9): x, z, dx, dz in mm, both distances in metres, the turn of the camera in radians.
     """
-    q = np.asarray(quantities, float)
-    ray = rays(np.stack([q[..., :2], q[..., :2] + q[..., 2:4]]), principal_distance)
+    image, change, first, later, turn = np.split(quantities, [2, 4, 5, 6], axis=-1)
+    ray = rays(np.stack([image, image + change]), principal_distance)
     ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
-    second = (rotation @ small_turn(q[..., 6:]) @ ray[1, ..., None])[..., 0]
-    first = q[..., 4, None]
-    later = np.where(np.isfinite(q[..., 5, None]), q[..., 5, None], first)
-    return later * second - first * (ray[0] @ rotation.T), second
+    second = (rotation @ small_turn(turn) @ ray[1, ..., None])[..., 0]
+    return np.where(np.isfinite(later), later, first) * second - first * (ray[0] @ rotation.T), second
 
 
 def _slope(quantities: Floats, principal_distance: float, rotation: Floats) -> Floats:
-    """Differentiate the displacement, (3, 9), by differences; zero by a second distance that is not known."""
-    steps = np.diag(DIFFERENCES)
-    ahead, behind = (_displacement(quantities + step, principal_distance, rotation)[0] for step in (steps, -steps))
-    return np.asarray((ahead - behind).T / (2 * DIFFERENCES), float)
+    """Differentiate displacements, (n, 3, 9), by differences; zero by a second distance that is not known."""
+    steps, at = np.diag(DIFFERENCES), quantities[:, None]
+    ahead, behind = (_displacement(at + step, principal_distance, rotation)[0] for step in (steps, -steps))
+    return np.asarray((ahead - behind).transpose(0, 2, 1) / (2 * DIFFERENCES), float)
