@@ -204,30 +204,14 @@ def _radial(radius: Floats, distortion: Distortion) -> _Radial:
 
 def _spline(radius: Floats, distortion: Distortion) -> _Radial:
     """Evaluate the cubic spline through a table; the first interval is odd, so that its division by r is exact."""
+    from scipy.interpolate import CubicSpline
+
     nodes, values = np.array(distortion.radius, float), np.array(distortion.distortion, float)
     if nodes[0] > 0:
         nodes, values = np.append(0.0, nodes), np.append(0.0, values)
-    width, curvature = np.diff(nodes), _curvatures(nodes, values)
-    linear = np.diff(values) / width - width * (2 * curvature[:-1] + curvature[1:]) / 6
-    cubic = np.diff(curvature) / (6 * width)
-    i = np.clip(np.searchsorted(nodes, radius, side="right") - 1, 0, len(width) - 1)
-    t = radius - nodes[i]
-    value = values[i] + t * (linear[i] + t * (curvature[i] / 2 + t * cubic[i]))
-    derivative = linear[i] + t * (curvature[i] + t * 3 * cubic[i])
-    inner = i == 0
+    spline = CubicSpline(nodes, values, bc_type=("natural", "not-a-knot"))
+    cubic, _, linear, _ = spline.c[:, 0]
+    inner = radius < nodes[1]
     safe = np.where(inner, 1.0, radius)
-    factor = np.where(inner, linear[0] + radius**2 * cubic[0], value / safe)
-    return _Radial(factor, np.where(inner, 2 * cubic[0], (derivative - factor) / safe**2))
-
-
-def _curvatures(nodes: Floats, values: Floats) -> Floats:
-    """Second derivatives in the nodes: zero in the middle, third derivative continuous at the last but one."""
-    n = len(nodes)
-    width, slope = np.diff(nodes), np.diff(values) / np.diff(nodes)
-    matrix, right = np.eye(n), np.zeros(n)
-    for i in range(1, n - 1):
-        matrix[i, i - 1 : i + 2] = width[i - 1], 2 * (width[i - 1] + width[i]), width[i]
-        right[i] = 6 * (slope[i] - slope[i - 1])
-    if n > 2:
-        matrix[-1, -3:] = 1 / width[-2], -1 / width[-2] - 1 / width[-1], 1 / width[-1]
-    return np.asarray(np.linalg.solve(matrix, right), np.float64)
+    factor = np.where(inner, linear + radius**2 * cubic, spline(radius) / safe)
+    return _Radial(factor, np.where(inner, 2 * cubic, (spline(radius, 1) - factor) / safe**2))
