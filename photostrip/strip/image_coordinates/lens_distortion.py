@@ -209,7 +209,7 @@ def _spline(radius: Floats, distortion: Distortion) -> _Radial:
     nodes, values = np.array(distortion.radius, float), np.array(distortion.distortion, float)
     if nodes[0] > 0:
         nodes, values = np.append(0.0, nodes), np.append(0.0, values)
-    spline = CubicSpline(nodes, values, bc_type=((2, np.zeros(())), "not-a-knot"))
+    spline = CubicSpline(nodes, values, bc_type=("natural", "not-a-knot"))
     cubic, _, linear, _ = spline.c[:, 0]
     inner = radius < nodes[1]
     safe = np.where(inner, 1.0, radius)
