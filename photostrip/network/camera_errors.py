@@ -1,6 +1,7 @@
 """What may be wrong with a camera beside what is given: asked before single observations are thrown out.
 
-Lens distortion, stretched film, principal point and principal distance are shared by all photos of a camera. Each is one hypothesis
+Lens distortion, stretched film, principal point and principal distance are shared by all photos of a camera.
+Each is one hypothesis
 of few unknowns: what the sum of squares would fall by with it, linearised at a solution, has a probability, with the
 number of hypotheses counted, that is compared with that of the worst single observation. Camera positions that all lie
 elsewhere are a rival. Source: derived, see docs/sources.md.

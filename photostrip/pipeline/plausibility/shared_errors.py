@@ -121,8 +121,8 @@ def _film(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
     percent, sigma, turned = -100.0 * affinity.value, 100.0 * affinity.sigma, float(np.degrees(shear.value))
     message = (
         f"photos of camera {affinity.camera} agree with each other and with what is given where the film is "
-        f"{abs(percent):.3f} % (standard deviation {sigma:.3f} %) {'longer' if percent > 0 else 'shorter'} along x than "
-        f"along y, its axes {abs(turned):.3f}° from a right angle. {CONTINUED}"
+        f"{abs(percent):.3f} % (standard deviation {sigma:.3f} %) {'longer' if percent > 0 else 'shorter'} along x "
+        f"than along y, its axes {abs(turned):.3f}° from a right angle. {CONTINUED}"
     )
     fix = (
         "measure the fiducial marks of the photos, or scan or print them anew along both axes; "
