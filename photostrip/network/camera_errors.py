@@ -1,6 +1,7 @@
 """What may be wrong with a camera beside what is given: asked before single observations are thrown out.
 
-Lens distortion, principal point and principal distance are shared by all photos of a camera. Each is one hypothesis
+Lens distortion, stretched film, principal point and principal distance are shared by all photos of a camera.
+Each is one hypothesis
 of few unknowns: what the sum of squares would fall by with it, linearised at a solution, has a probability, with the
 number of hypotheses counted, that is compared with that of the worst single observation. Camera positions that all lie
 elsewhere are a rival. Source: derived, see docs/sources.md.
@@ -20,6 +21,7 @@ from photostrip.network.calibration import values_of
 from photostrip.network.common_errors import (
     ALL,
     DISTANCE,
+    FILM,
     LEAST_SHARE,
     LENS,
     OF_CAMERAS,
@@ -62,7 +64,7 @@ def most_likely(problem: BundleProblem, solution: BundleSolution, unit: float) -
     """
     cameras, given = problem.cameras, not datum.is_free(problem)
     may_be_off = _may_be_off(problem.positions)
-    asked = [LENS] if may_be_off else [LENS, POINT, DISTANCE]  # the others are much like an offset: ``common_errors``
+    asked = [LENS, FILM] if may_be_off else [LENS, FILM, POINT, DISTANCE]  # the others are much like an offset
     known, used = cameras.unknown >= 0, np.unique(cameras.of_photo)
     candidates = [
         CommonError(kind, of="each", number=int(camera))

@@ -20,7 +20,7 @@ from scipy.sparse import csr_array
 
 from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
-from photostrip.network.calibration import PRINCIPAL_DISTANCE, values_of
+from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, values_of
 from photostrip.network.cofactors import coordinates_of, joint_cofactors
 from photostrip.network.problem import BundleCameras, BundleProblem
 from photostrip.network.reliability import Limit
@@ -32,11 +32,12 @@ from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 
 OFFSET, DRIFT, LIST = "offset", "drift", "control list"
-LENS, POINT, DISTANCE = "lens distortion", "principal point", "principal distance"
+LENS, POINT, DISTANCE, FILM = "lens distortion", "principal point", "principal distance", "film"
 OF_CAMERAS = {
     LENS: [list(CALIBRATION).index("k1")],
     POINT: [list(CALIBRATION).index("x0"), list(CALIBRATION).index("y0")],
     DISTANCE: [PRINCIPAL_DISTANCE],
+    FILM: AFFINE,
 }
 """What may be wrong with a camera, with the columns of its parameters."""
 ALL = "all"  # positions of all groups share one error

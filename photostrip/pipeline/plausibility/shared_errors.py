@@ -11,6 +11,7 @@ from photostrip.network.common_errors import (
     ALL,
     DISTANCE,
     DRIFT,
+    FILM,
     LENS,
     LIST,
     OFFSET,
@@ -35,13 +36,14 @@ CONTINUED = "The adjustment continued with it; `processing.self_calibration` con
 
 
 def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
-    """Name what a group of observations shares (P105, P107, P110, P111, P208, P404, P407)."""
+    """Name what a group of observations shares (P105, P107, P110, P111, P112, P208, P404, P407)."""
     shared = bundle.screened.common
     yield from (_list(each, inputs) for each in shared if each.kind == LIST)
     if any(each.kind == DISTANCE for each in shared):
         yield from (_distance(each, inputs) for each in bundle.parameters if _is_distance(each))
     yield from (_lens(each, bundle, inputs) for each in shared if each.kind == LENS)
     yield from (_point(each, bundle, inputs) for each in shared if each.kind == POINT)
+    yield from (_film(each, bundle, inputs) for each in shared if each.kind == FILM)
     of_positions = [each for each in shared if each.kind in {OFFSET, DRIFT}]
     if of_positions:
         yield from _positions(bundle, inputs, of_positions[-1])
@@ -111,6 +113,24 @@ def _point(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
     fix = f"look at the principal point and the origin of the image coordinates; {_decision(['principal_point'])}"
     numbers: Evidence = {"x_mm": x.value, "y_mm": y.value, "standard_deviation_mm": max(x.sigma, y.sigma)}
     return found("P111", message, fix, numbers, strips=_strips_of(x.camera, inputs), key="processing.self_calibration")
+
+
+def _film(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
+    (affinity,), (shear,) = (_parameters(error, bundle, name) for name in ("affinity", "shear"))
+    # b1 is what x must be stretched by: the film is shorter along x by as much
+    percent, sigma, turned = -100.0 * affinity.value, 100.0 * affinity.sigma, float(np.degrees(shear.value))
+    message = (
+        f"photos of camera {affinity.camera} agree with each other and with what is given where the film is "
+        f"{abs(percent):.3f} % (standard deviation {sigma:.3f} %) {'longer' if percent > 0 else 'shorter'} along x "
+        f"than along y, its axes {abs(turned):.3f}° from a right angle. {CONTINUED}"
+    )
+    fix = (
+        "measure the fiducial marks of the photos, or scan or print them anew along both axes; "
+        f"{_decision(['affinity', 'shear'])}"
+    )
+    numbers: Evidence = {"x_over_y_percent": percent, "standard_deviation_percent": sigma, "shear_deg": turned}
+    strips = _strips_of(affinity.camera, inputs)
+    return found("P112", message, fix, numbers, strips=strips, key="processing.self_calibration")
 
 
 def _strips_of(camera: str, inputs: Inputs) -> list[str]:

@@ -77,6 +77,21 @@ def test_an_unstated_lens_is_named_and_costs_nothing(seed: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [25, 26])
+def test_film_that_shrank_one_way_is_named_and_no_control_is_doubted(seed: int) -> None:
+    sound = simulate(strip(seed, 12))
+    inputs = inputs_of(sound)
+    shrunk = replace(inputs, observations=replace(inputs.observations, xy=inputs.observations.xy * [0.998, 1.0]))
+    result = triangulate(shrunk, settings_of(sound))
+    (finding,) = result.findings
+    assert finding.code == "P112"
+    assert "[affinity, shear]" in finding.fix
+    assert finding.evidence["x_over_y_percent"] == pytest.approx(-0.2, abs=0.01)
+    assert control_lost(result) == 0
+    assert up(sound, result) < 1.1 * up(sound, triangulate(inputs, settings_of(sound)))
+
+
+@pytest.mark.slow
 def test_gross_errors_are_no_error_of_a_camera() -> None:
     for seed in range(31, 35):
         wrong = (GrossError("image", count=8, size_um=150.0), GrossError("control", count=2, size_m=3.0))
