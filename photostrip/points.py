@@ -30,6 +30,14 @@ def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None
     return array
 
 
+def frozen_alike(values: ArrayLike, dtype: type, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Do the same for a column that mostly holds one value: where all rows are equal, the first stands for all."""
+    array = np.asarray(values, dtype).reshape(shape)
+    if len(array) > 1 and (array[0] == array[-1]).all() and (array == array[0]).all():
+        return np.broadcast_to(array[0].copy(), shape)
+    return frozen(array, dtype)
+
+
 def take_rows(table: T, rows: Sequence[int] | Numbers | Flags, columns: Iterable[str]) -> T:
     """Select rows of a frozen table of columns, by number or by flag.
 
@@ -92,7 +100,7 @@ class PhotoPoints:
             object.__setattr__(self, name, frozen(getattr(self, name), dtype=np.intp))
         n = len(self.photo)
         object.__setattr__(self, "xy", frozen(self.xy, shape=(n, 2)))
-        object.__setattr__(self, "sigma", frozen(self.sigma, shape=(n, 2)))
+        object.__setattr__(self, "sigma", frozen_alike(self.sigma, float, (n, 2)))
 
     @classmethod
     def naming(cls, point_ids: tuple[str, ...]) -> Self:
@@ -131,9 +139,9 @@ class ControlPoints:
         object.__setattr__(self, "enu", frozen(self.enu, shape=(n, 3)))
         object.__setattr__(self, "use", frozen(self.use, dtype=np.bool_, shape=(n, 3)))
         object.__setattr__(self, "check", frozen(self.check, dtype=np.bool_, shape=(n,)))
-        object.__setattr__(self, "sigma", frozen(self.sigma, shape=(n, 3)))
+        object.__setattr__(self, "sigma", frozen_alike(self.sigma, float, (n, 3)))
         frame = self.frame if len(self.frame) else np.zeros(n, np.intp)
-        object.__setattr__(self, "frame", frozen(frame, dtype=np.intp))
+        object.__setattr__(self, "frame", frozen_alike(frame, np.intp, (n,)))
 
     def __len__(self) -> int:
         return len(self.ids)

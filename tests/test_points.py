@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.points import ControlPoints, PhotoPoints, PointTable, frozen, locate, located
+from photostrip.points import ControlPoints, PhotoPoints, PointTable, frozen, frozen_alike, locate, located
 
 
 def table(ids: list[str] | tuple[str, ...]) -> PointTable:
@@ -42,6 +42,17 @@ def test_frozen_arrays_cannot_be_written() -> None:
     with pytest.raises(ValueError, match="read-only"):
         frozen(np.zeros(3))[0] = 5
     assert frozen(array) is array  # nothing is copied twice
+
+
+@pytest.mark.parametrize("rows", [[[0.1, 0.2]] * 4, [[0.1, 0.2]] * 3 + [[0.1, 0.3]], [[np.nan, 1.0]] * 2, [], [[1, 2]]])
+def test_a_column_of_one_value_is_held_once(rows: list[list[float]]) -> None:
+    held = frozen_alike(rows, float, (len(rows), 2))
+    assert np.array_equal(held, np.reshape(rows, (-1, 2)), equal_nan=True)
+    assert not held.flags.writeable
+    assert (held.strides[0] == 0) == (rows == [[0.1, 0.2]] * 4)
+    assert held[np.array([0, len(rows) - 1])].flags.c_contiguous if rows else not len(held)
+    assert frozen_alike([3, 3], np.intp, (2,)).dtype == np.intp
+    assert frozen_alike([3, 4], np.intp, (2,)).dtype == np.intp
 
 
 def test_frozen_leaves_the_caller_his_array() -> None:

@@ -53,13 +53,20 @@ def alpha_omega_kappa(matrix: ArrayLike) -> Floats:
     return angles(matrix, "alpha-omega-kappa")
 
 
+def _axes_of(system: str) -> tuple[tuple[int, int, int], float]:
+    if system not in AXES:
+        msg = f"unknown system of angles {system!r}"
+        raise ValueError(msg)
+    return AXES[system]
+
+
 def angles(matrix: ArrayLike, system: str) -> Floats:
     """Angles (..., 3) of rotations, photo to object, in a system of ``SYSTEMS`` and in the order of its name.
 
     Raises GeometryError when the middle angle is +-90 degrees: the others cannot be separated.
     """
     a = np.asarray(matrix, float)
-    (i, j, k), sign = AXES[system]
+    (i, j, k), sign = _axes_of(system)
     hand = 1.0 if (i + 1) % 3 == j else -1.0
     sine = hand * a[..., i, k]
     if np.any(1 - np.abs(sine) < GIMBAL_LIMIT):
@@ -73,7 +80,7 @@ def angles(matrix: ArrayLike, system: str) -> Floats:
 
 def from_angles(values: ArrayLike, system: str) -> Floats:
     """Rotations from angles (..., 3) in a system of ``SYSTEMS``; the inverse of ``angles``."""
-    (i, _, _), sign = AXES[system]
+    (i, _, _), sign = _axes_of(system)
     if i == 1:
         return from_alpha_omega_kappa(*np.moveaxis(np.asarray(values, float) * [-sign, 1, 1], -1, 0))
     first, middle, last = _turns(values, system)
@@ -86,7 +93,7 @@ def angle_rates(values: ArrayLike, system: str) -> Floats:
     ``exp([theta]) R`` is the rotation of the changed angles; theta refers to the axes of the object. D is singular
     where the middle angle is 90 degrees.
     """
-    axes, sign = AXES[system]
+    axes, sign = _axes_of(system)
     first, middle, _ = _turns(values, system)
     fixed = np.broadcast_to(sign * np.eye(3)[axes[0]], first.shape[:-1])
     return np.stack([fixed, first[..., axes[1]], (first @ middle)[..., axes[2]]], axis=-1)
@@ -94,7 +101,7 @@ def angle_rates(values: ArrayLike, system: str) -> Floats:
 
 def _turns(values: ArrayLike, system: str) -> list[Floats]:
     """Give the three turns whose product is a rotation."""
-    axes, sign = AXES[system]
+    axes, sign = _axes_of(system)
     return [
         about(axis, angle)
         for axis, angle in zip(axes, np.moveaxis(np.asarray(values, float) * [sign, 1, 1], -1, 0), strict=True)

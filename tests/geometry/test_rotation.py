@@ -200,3 +200,10 @@ def test_close_to_ninety_degrees_is_not_refused() -> None:
     for system in SYSTEMS:
         turn = [0.3, np.radians(89.99), 0.2]
         assert np.allclose(angles(from_angles(turn, system), system), turn, rtol=0, atol=1e-9)
+
+
+def test_an_unknown_system_is_named() -> None:
+    with pytest.raises(ValueError, match="unknown system of angles 'kappa-phi-omega'"):
+        angles(np.eye(3), "kappa-phi-omega")
+    with pytest.raises(ValueError, match="unknown system of angles 'kappa-phi-omega'"):
+        from_angles([0, 0, 0], "kappa-phi-omega")

@@ -14,7 +14,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.notes import counted
-from photostrip.points import PhotoPoints, take_rows
+from photostrip.points import PhotoPoints, frozen_alike, take_rows
 
 MINIMUM_POINTS = 5  # as many as elements
 BY_ROW = ("pair", "left", "right", "weight", "point", "rows")
@@ -99,7 +99,7 @@ def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float
         pair=pair,
         left=left,
         right=right,
-        weight=2 * np.median(observations.sigma[inside]) ** 2 / of_parallax,
+        weight=frozen_alike(2 * np.median(observations.sigma[inside]) ** 2 / of_parallax, float, (len(rows),)),
         focal=focal,
         point=observations.point[rows[:, 0]],
         rows=rows,
