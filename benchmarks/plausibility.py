@@ -378,6 +378,13 @@ def lens(case: Case) -> Planted | None:
     return replace(case.inputs, observations=replace(o, xy=bent)), NOBODY
 
 
+def film(case: Case) -> Planted | None:
+    """Let the film shrink or grow by 0.1 to 0.3 % along one image axis."""
+    o, factor = case.inputs.observations, np.ones(2)
+    factor[case.rng.integers(2)] += float(case.rng.choice([-1.0, 1.0])) * float(case.rng.uniform(0.001, 0.003))
+    return replace(case.inputs, observations=replace(o, xy=o.xy * factor)), NOBODY
+
+
 def principal_point(case: Case) -> Planted | None:
     """Shift all images by half a millimetre to a millimetre."""
     o = case.inputs.observations
@@ -1109,6 +1116,7 @@ MISTAKES = (
     Mistake("principal distance off by 1 to 3 %", distance_by_percents, ("P107", "P105")),
     Mistake("principal distance of one strip off by 10 %", distance_of_one_strip, ("P105",), block, "bundle"),
     Mistake("lens distortion that is not stated, bundle", lens, ("P110",), adjustment="bundle"),
+    Mistake("film that shrank one way, bundle", film, ("P112",), adjustment="bundle"),
     Mistake("principal point elsewhere, bundle", principal_point, ("P111",), block, "bundle"),
     Mistake("two neighbours exchanged in the list", pair_exchanged, ("P201",)),
     Mistake("a photo listed elsewhere", moved, ("P201",)),

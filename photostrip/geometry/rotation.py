@@ -42,7 +42,19 @@ def from_alpha_omega_kappa(alpha: ArrayLike, omega: ArrayLike, kappa: ArrayLike)
 
     Source: [001] eq. 127, 132, 133.
     """
-    return about(1, -np.asarray(alpha, float)) @ about(0, omega) @ about(2, kappa)
+    al, om, ka = np.broadcast_arrays(*(np.asarray(a, float) for a in (alpha, omega, kappa)))
+    sa, ca, so, co, sk, ck = np.sin(al), np.cos(al), np.sin(om), np.cos(om), np.sin(ka), np.cos(ka)
+    matrix = np.empty((*al.shape, 3, 3))
+    matrix[..., 0, 0] = ca * ck - sa * so * sk
+    matrix[..., 0, 1] = -ca * sk - sa * so * ck
+    matrix[..., 0, 2] = -sa * co
+    matrix[..., 1, 0] = co * sk
+    matrix[..., 1, 1] = co * ck
+    matrix[..., 1, 2] = -so
+    matrix[..., 2, 0] = sa * ck + ca * so * sk
+    matrix[..., 2, 1] = -sa * sk + ca * so * ck
+    matrix[..., 2, 2] = ca * co
+    return matrix
 
 
 def alpha_omega_kappa(matrix: ArrayLike) -> Floats:
