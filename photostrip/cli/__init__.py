@@ -1,7 +1,6 @@
 """What a user types: a file for each command in ``commands``, and ``main``, which finds and calls them.
 
 - ``command_table``: all commands, and ``photostrip --help``; ``options``: options that several commands share;
-- ``declared``: typer where options are declared; ``plain_line``: command lines that are read without it;
 - ``stdout``: what is printed, in which form; ``stderr``: what is said meanwhile;
 - ``failures``: which exit code a failure has, and how it is reported;
 - ``option_groups``, ``section_option``, ``typed_values``, ``documents``, ``whole_program``: what options and answers of

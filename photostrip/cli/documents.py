@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.stdout import Document, print_json, print_sections
 from photostrip.visible import visible
 

@@ -11,7 +11,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.stdout import Format, ascii_only
 from photostrip.errors import EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
 from photostrip.visible import visible, visible_json

@@ -13,7 +13,6 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib import import_module
-from types import FunctionType
 from typing import TYPE_CHECKING, TextIO, cast
 
 from photostrip import __version__
@@ -121,24 +120,13 @@ def _call(name: str, arguments: list[str]) -> int:
         if not each or (each.startswith("--") and each.find("=") == len(each) - 1):
             _complain(f"argument {place} of '{name}' is empty: is a variable of the shell not set?")
             return EXIT_USAGE
-    from photostrip.cli.plain_line import plain_arguments
-
-    target = getattr(import_module(COMMANDS[name].module), name)
-    given = plain_arguments(target, arguments) if isinstance(target, FunctionType) else None
-    try:
-        code = _by_typer(name, target, arguments) if given is None else target(**given)
-    except Exception as error:
-        if "typer" not in sys.modules:
-            raise
+    command = _parser(name, getattr(import_module(COMMANDS[name].module), name))
+    try:  # not command.main(), which has exit codes of its own for interrupts and closed pipes
+        with command.make_context(f"photostrip {name}", arguments) as context:
+            code = command.invoke(context)
+    except Exception as error:  # noqa: BLE001 (what is not typer's is raised again)
         return _told_by_typer(error, name)
     return code if isinstance(code, int) else 0
-
-
-def _by_typer(name: str, target: Callable[..., object], arguments: list[str]) -> object:
-    # not command.main(), which has exit codes of its own for interrupts and closed pipes
-    command = _parser(name, target)
-    with command.make_context(f"photostrip {name}", arguments) as context:
-        return command.invoke(context)
 
 
 def _told_by_typer(error: Exception, name: str) -> int:
@@ -161,13 +149,12 @@ def _parser(name: str, target: Callable[..., object]) -> Command:
     """Let typer make what reads the arguments of a command."""
     import typer
 
-    from photostrip.cli.declared import for_typer
     from photostrip.cli.typed_values import read_plainly
 
     app = target
     if not isinstance(app, typer.Typer):
         app = typer.Typer(add_completion=False, rich_markup_mode=None)
-        app.command(name, context_settings=HELP_NAMES)(for_typer(target))
+        app.command(name, context_settings=HELP_NAMES)(target)
     command = typer.main.get_command(app)
     read_plainly(command)
     command.epilog = f"\b\nExample:\n  {COMMANDS[name].example}"  # \b: typer keeps the line breaks

@@ -12,7 +12,6 @@ from typing import Any, get_type_hints
 import typer
 
 from photostrip.cli.command_table import HELP_NAMES
-from photostrip.cli.declared import option_for_typer
 from photostrip.cli.failures import failures_as
 
 Command = Callable[..., None]
@@ -60,4 +59,4 @@ def _options_of(group: type) -> list[Parameter]:
 
 
 def _option(name: str, default: object, annotation: object) -> Parameter:
-    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=option_for_typer(annotation))
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.stdout import Format
 from photostrip.report.sections.accuracy_report import SectionName
 

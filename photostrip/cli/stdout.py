@@ -8,7 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from photostrip.cli.declared import typer
+import typer
 
 if TYPE_CHECKING:
     from photostrip.report.page.parts import Section

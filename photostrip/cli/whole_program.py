@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from photostrip.cli.command_table import COMMANDS, HELP_NAMES
-from photostrip.cli.declared import for_typer
 
 
 def whole_program(*, completing: bool = False) -> typer.Typer:
@@ -30,5 +29,5 @@ def whole_program(*, completing: bool = False) -> typer.Typer:
         if isinstance(target, typer.Typer):
             app.add_typer(target, name=name)
         else:
-            app.command(name, context_settings=HELP_NAMES)(for_typer(target))
+            app.command(name, context_settings=HELP_NAMES)(target)
     return app

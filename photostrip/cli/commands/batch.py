@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.options import Assignments, Quiet, Rule, Strict, Verbose, Width, require_target
 from photostrip.cli.stdout import BatchFormat
 

@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.options import Assignments, Quiet, Shape, Verbose, Width
 from photostrip.cli.stdout import Format
 

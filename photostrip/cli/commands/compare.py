@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.options import Quiet, Verbose, Width
 from photostrip.cli.stdout import CompareFormat, Format, print_json, print_sections
 

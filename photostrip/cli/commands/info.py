@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import typer
+
 from photostrip.cli import documents
-from photostrip.cli.declared import typer
 from photostrip.cli.failures import failures_as
 from photostrip.cli.stdout import Format
 

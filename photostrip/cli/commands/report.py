@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.options import Plots, Quiet, Saved, Strict, Target, Width
 from photostrip.cli.section_option import Sections, Verbose, refuse_sections
 from photostrip.cli.stdout import Format, Parts, form_of, print_result, report_text

@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.options import Assignments, Plots, Quiet, Rule, Shape, Strict, Width, require_target
 from photostrip.cli.section_option import Sections, Verbose, refuse_sections
 from photostrip.cli.stdout import Format, Parts, form_of, print_result

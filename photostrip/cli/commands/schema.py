@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from photostrip.cli.declared import typer
+import typer
 
 
 def schema(

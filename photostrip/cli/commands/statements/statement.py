@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.options import Quiet, Saved, Target, Width
 from photostrip.cli.stdout import Document, Format, StatementFormat, form_of, print_json, print_sections
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from photostrip.cli.declared import typer
+import typer
+
 from photostrip.cli.options import Quiet, Saved, Width
 from photostrip.cli.stdout import Format, StatementFormat, print_json, print_sections
 
