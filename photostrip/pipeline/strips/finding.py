@@ -175,17 +175,19 @@ class Way(NamedTuple):
 
 def _continued(run: Run, ways: Mapping[int, Mapping[int, Way]], free: AbstractSet[int]) -> Run:
     """Go on at the end of a run as long as a photo lies ahead."""
+    left = free - set(run)
     while True:
         before, last = run[-2:]
         forward = -ways[last][before].direction
         ahead: list[tuple[float, int]] = []
         for other, way in ways[last].items():
             cosine = (way.direction * forward.conjugate()).real
-            if cosine > AHEAD and other in free and other not in run:
+            if cosine > AHEAD and other in left:
                 ahead.append((way.points * cosine, -other))
         if not ahead:
             return run
         run = (*run, -max(ahead)[1])
+        left -= {run[-1]}
 
 
 def _cut(run: Run, place_of_refusal: Callable[[Run], int]) -> Iterator[Run]:

@@ -12,6 +12,7 @@ from photostrip.errors import Fault
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.pipeline.inputs import AUTO, BUNDLE
+from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.yaml.tree import NO_FILES, Node, Path, fault_at
 
 LEAST_MARKS = 2
@@ -86,7 +87,8 @@ OF_PHOTOS = ("photos", "observations", "fiducial_measurements", "camera_position
 
 def _lacks(root: Node, name: str) -> bool:
     """Whether a file has no such key, not even misspelled, which the schema tells."""
-    return not root.has(name) and not any(suggestion(each, [name]) for each in root.entries)
+    misspelled = (each for each in root.entries if each not in ProjectFile.keys)
+    return not root.has(name) and not any(suggestion(each, [name]) for each in misspelled)
 
 
 def _only_photos(root: Node) -> Iterator[Fault]:
