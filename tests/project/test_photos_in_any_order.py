@@ -10,6 +10,7 @@ import pytest
 from photostrip.cli.main import main
 from photostrip.project.loading import load_project
 from tests.project.samples import FILES, OBSERVATIONS, PROJECT, Sample, sample
+from tests.results import spec, write_project
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -150,3 +151,17 @@ def test_check_counts_photos_in_no_order_and_names_one_that_hangs_on_nothing(
     assert fault["message"].startswith("photo 2002 has 2 points of the control or of other photos")
     assert main(["check", str(tmp_path / "project.yaml")]) == 2
     assert "2 in 1 strip, 2 in no given order" in capsys.readouterr().out
+
+
+def test_a_folder_of_photos_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """On the command line: two lines of five photos, of which the report tells what was found."""
+    project = write_project(tmp_path, spec(strips=2))
+    text = project.read_text(encoding="utf-8")
+    strips = text[text.index("strips:") : text.index("observations:")]
+    project.write_text(text.replace(strips, "photos: {camera: film}\n"), encoding="utf-8")
+    assert main(["run", str(project), "-o", str(tmp_path / "out"), "--html"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "10 in 2 strips, 8 models" in printed
+    assert "10 photos in no given order: 2 strips found among them, 1001-1005 (5 photos), 2001-2005" in printed
+    photos = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))["photos"]
+    assert [photo["strip"] for photo in photos] == ["1001-1005"] * 5 + ["2001-2005"] * 5

@@ -133,25 +133,6 @@ def start_values(pairs: Pairs) -> Floats:
     return start
 
 
-def turned_start_values(pairs: Pairs) -> Floats:
-    """Elements (0, kappa1, 0, 0, kappa2) of photos turned as a plane similarity of their points says.
-
-    With complex coordinates z and weighted means removed its turn is that of sum(conj(z_left) z_right); the parallax of
-    the means, the right photo turned back and brought to the scale of the left one, runs along x.
-    """
-    total = pairs.sums(pairs.weight)
-    left, right = (xy @ np.array([1.0, 1j]) for xy in (pairs.left, pairs.right))
-    mean = [pairs.sums(pairs.weight * z) / total for z in (left, right)]
-    away = [z - middle[pairs.pair] for z, middle in zip((left, right), mean, strict=True)]
-    slope = pairs.sums(pairs.weight * np.conj(away[0]) * away[1])
-    slope /= np.maximum(pairs.sums(pairs.weight * np.abs(away[0]) ** 2), RIDGE)
-    start = np.zeros((pairs.size, 5))
-    with np.errstate(all="ignore"):
-        start[:, 1] = -np.angle(mean[0] - np.where(slope == 0, mean[1], mean[1] / slope))
-    start[:, 4] = start[:, 1] - np.angle(slope)
-    return start
-
-
 def iterate_elements(
     elements: Floats, pairs: Pairs, watch: Callable[[Numbers, Floats, Floats, Floats], None] | None = None
 ) -> Solved:
@@ -209,10 +190,9 @@ def _distances(left: Floats, right: Floats) -> tuple[Floats, Floats]:
 def solve_elements(pairs: Pairs) -> Solved:
     """Elements of all pairs from nothing: start values, iteration, retries from other azimuths.
 
-    A pair is tried again when it does not converge, a point comes out behind a camera, or the y parallaxes stay large:
-    with its photos turned against each other, where their points say so by more than the first azimuth below, then with
-    its start azimuth turned by 15 to 180 degrees: with tilts beyond 10 degrees there are false minima with all points
-    in front. Of the solutions found, the one with most points in front and then the smallest sum of squares is
+    A pair is tried again with its start azimuth turned by 15 to 180 degrees when it does not converge, a point comes
+    out behind a camera, or the y parallaxes stay large: with tilts beyond 10 degrees there are false minima with all
+    points in front. Of the solutions found, the one with most points in front and then the smallest sum of squares is
     taken.
     """
     start = start_values(pairs)
@@ -220,20 +200,13 @@ def solve_elements(pairs: Pairs) -> Solved:
     best, rays = _facing(best, pairs)
     share, squares = _score(rays, converged, pairs)
     tolerable = (RETRY_RMS * pairs.focal) ** 2 * pairs.sums(pairs.weight)
-    for turn in (None, *RETRY_AZIMUTHS):
+    for turn in RETRY_AZIMUTHS:
         todo = np.flatnonzero((share < 1) | (squares > tolerable))
         if not len(todo):
             break
         part = pairs.take(todo)
-        if turn is None:
-            turned = turned_start_values(part)
-            apart = np.abs(reduced_angles(turned[:, 4] - turned[:, 1])) > RETRY_AZIMUTHS[0]
-            if not apart.any():
-                continue
-            todo, part, turned = todo[apart], part.take(np.flatnonzero(apart)), turned[apart]
-        else:
-            turned = start[todo]
-            turned[:, [1, 4]] += turn
+        turned = start[todo]
+        turned[:, [1, 4]] += turn
         elements, success, count = iterate_elements(turned, part)
         elements, rays = _facing(elements, part)
         new_share, new_squares = _score(rays, success, part)
