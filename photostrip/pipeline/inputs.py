@@ -35,6 +35,7 @@ class Strip:
     first: FirstPhoto = NOTHING_GIVEN  # frame and scale of the strip as long as it has no control
     # parameters of its camera that a bundle adjustment estimates, of ``bundle.settings.ASKED``
     calibrate: tuple[str, ...] = ()
+    listed: bool = True  # as one strip in the project; otherwise found among photos in no given order, or one of them
 
     def positions(self, observations: PhotoPoints) -> Numbers:
         """Place in the strip of the photo of every image point; -1 for photos of other strips."""
@@ -120,6 +121,12 @@ class Inputs:
     @property
     def flights(self) -> tuple[Strip | ModelStrip, ...]:
         return self.strips if self.models is None else self.models.strips
+
+    @property
+    def lines(self) -> tuple[Strip | ModelStrip, ...]:
+        """The flights without single photos that are listed in no order."""
+        alone = {strip.id for strip in self.strips if not strip.listed and len(strip.photos) == 1}
+        return tuple(flight for flight in self.flights if flight.id not in alone)
 
 
 @dataclass(frozen=True)

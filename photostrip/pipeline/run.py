@@ -54,7 +54,7 @@ def triangulate(
         require_whole(inputs, ground.control)
         # 1 interior orientation
         photo = orient_interior(inputs, settings)
-        result = _walk_by_any_method(inputs, settings, ground, photo)
+        result = _walk_of_any_order(inputs, settings, ground, photo)
     except (InputError, GeometryError) as error:
         error.findings = gate.of_failure(inputs, settings, directory, photo, ground)
         raise
@@ -64,6 +64,23 @@ def triangulate(
         unsolvable.findings = gate.of_failure(inputs, settings, directory, photo, ground)
         raise unsolvable from error
     return replace(result, findings=gate.of_result(result, directory))
+
+
+def _walk_of_any_order(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates) -> Result:
+    """Walk from each of the starts that photos which are listed in no order have, until one leads to the end."""
+    if all(strip.listed for strip in inputs.strips):
+        return _walk_by_any_method(inputs, settings, ground, photo)
+    from photostrip.pipeline.strips import finding  # strips that are listed need none of it
+
+    refused: list[GeometryError] = []
+    for start in finding.starts(inputs, photo, settings):
+        try:
+            result = _walk_by_any_method(start.inputs, settings, ground, photo)
+        except GeometryError as error:
+            refused.append(error)
+        else:
+            return replace(result, notes=(*finding.notes(start, refused), *result.notes))
+    raise finding.refusal(inputs, refused[0]) from refused[0]
 
 
 def _walk_by_any_method(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates) -> Result:

@@ -5,6 +5,7 @@ Here the user's units, axes and directions end: inside there are millimetres wit
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", bound="DataclassInstance")
 PER_MILLIMETRE = {"mm": 1.0, "um": 1e3, "0.1um": 1e4}
+_NUMBERED = re.compile(r"([^0-9]*)([0-9]*)")
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of angles
 
 
@@ -94,21 +96,35 @@ def distortion_of(given: Distortion) -> camera.Distortion:
 
 
 def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[Strip, ...]:
-    asked = project.processing.self_calibration
-    usual = [] if isinstance(asked, str) else asked
-    return tuple(
+    """Return the strips, then every photo of `photos` by itself, by their ids, however they are listed."""
+    found = [
         Strip(
             id=str(each.id),
             camera=known[each.camera],
             photos=tuple(map(str, each.photos)),
             first=_first_photo(each.first_photo),
-            calibrate=tuple(
-                dict.fromkeys(usual if (wanted := project.cameras[each.camera].self_calibration) is None else wanted)
-            ),
+            calibrate=_calibrated(project, each.camera),
         )
         for each in project.strips
         if each.camera is not None
-    )
+    ]
+    singles = [
+        Strip(name, known[each.camera], (name,), calibrate=_calibrated(project, each.camera), listed=False)
+        for each in project.photos
+        for name in map(str, each.photos or [])
+    ]
+    return (*found, *sorted(singles, key=lambda each: _by_number(each.id)))
+
+
+def _calibrated(project: ProjectFile, name: str) -> tuple[str, ...]:
+    """Parameters of a camera that the project asks for."""
+    asked, own = project.processing.self_calibration, project.cameras[name].self_calibration
+    return tuple(dict.fromkeys(([] if isinstance(asked, str) else asked) if own is None else own))
+
+
+def _by_number(name: str) -> tuple[list[tuple[str, int]], str]:
+    """Order ids as people count: 9 before 10."""
+    return [(text, int(digits or -1)) for text, digits in _NUMBERED.findall(name)], name
 
 
 def _first_photo(given: FirstPhoto | None) -> strip.FirstPhoto:

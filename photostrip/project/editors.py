@@ -8,7 +8,7 @@ from inspect import getdoc
 from types import EllipsisType
 from typing import Annotated, Any, get_args, get_origin
 
-from photostrip.project.schema.sections import Key, Length, Read, Section, bare, types
+from photostrip.project.schema.sections import Key, Length, OneOrMany, Read, Section, bare, types
 from photostrip.project.schema.values import AUTO
 
 KINDS = {  # where the keys of each kind of file stand, and its title
@@ -22,7 +22,12 @@ KINDS = {  # where the keys of each kind of file stand, and its title
     "displacement": ("plans.displacement", "DisplacementPlanFile", "photostrip plan displacement"),
     "screening": ("plans.screening", "ScreeningPlanFile", "photostrip plan screening"),
 }
-MEASURED = {"anyOf": [{"required": ["cameras", "observations"]}, {"required": ["models"]}]}  # in a project
+MEASURED = {  # in a project
+    "allOf": [
+        {"anyOf": [{"required": ["cameras", "observations"]}, {"required": ["models"]}]},
+        {"anyOf": [{"required": ["strips"]}, {"required": ["photos"]}]},
+    ]
+}
 
 
 def schema_of(kind: str) -> dict[str, Any]:
@@ -74,6 +79,8 @@ def _value(annotation: Any, blocks: dict[str, Any]) -> dict[str, Any]:  # noqa: 
             if isinstance(each, Length):
                 kind = "Items" if found["type"] == "array" else "Properties"
                 found |= {f"min{kind}": each.least, **({f"max{kind}": each.most} if each.most else {})}
+        if any(isinstance(each, OneOrMany) for each in inner.__metadata__):
+            found = {"anyOf": [found["items"], found]}
         return found
     if isinstance(inner, type) and issubclass(inner, Section):
         if inner.__name__ not in blocks:

@@ -90,7 +90,7 @@ CONDITIONS = (  # of several that a key has, the first that fails is told
 
 def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
     """Explain every row and every definition that is not used: a note for each kind in each file."""
-    photos = {str(photo) for strip in project.strips for photo in strip.photos}
+    photos = set(project.camera_of)
     yield from _unused_cameras(project, root)
     yield from _without_effect(project, root)
     for name, camera in project.cameras.items():
@@ -177,7 +177,7 @@ def _cameras_not_used(
 
 
 def _unused_cameras(project: ProjectFile, root: Node) -> Iterator[Note]:
-    used = {strip.camera for strip in project.strips}
+    used = {each.camera for each in project.groups}
     unused = [name for name in project.cameras if name not in used]
     if unused:
         verb = "belongs" if len(unused) == 1 else "belong"

@@ -33,7 +33,7 @@ from photostrip.project.schema.ground import CameraPositions as CameraPositionsB
 from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
 from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.schema.sections import read_section
-from photostrip.project.tables import Tables, check_tables, in_one_zone, read_tables
+from photostrip.project.tables import Tables, check_tables, in_one_zone, measured_photos, read_tables
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.references import check_references
 from photostrip.project.yaml.tree import NO_FILES, Node, at_own_key
@@ -42,7 +42,7 @@ from photostrip.project.yaml.validation import valid_section
 if TYPE_CHECKING:
     from photostrip.pipeline.results import Result
 
-OF_IMAGES = ("photostrip", "cameras", "strips", "observations", "fiducial_measurements", "accept")
+OF_IMAGES = ("photostrip", "cameras", "strips", "photos", "observations", "fiducial_measurements", "accept")
 __all__ = ["Project", "adjust_project", "load_project", "read_project"]
 
 
@@ -149,7 +149,7 @@ def read_project(path: Path, overrides: Sequence[str] = ()) -> tuple[Project, Ta
     findings.add(*_check_certificates(root, checked))
     tied = _tied_frames(root, checked, grid_folder, findings)
     try:
-        project = completed(reading.complete(checked), root, reading.file)
+        project = completed(reading.complete(checked), root, reading.file, measured_photos(tables))
         inputs, notes = _inputs(project, tables, root, placed_models)
     except InputError as error:
         error.findings = _units_of_images(reading, tables)
@@ -236,11 +236,11 @@ def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
 
     root, measured = reading.root, tables.observations
     given = read_section(ProjectFile, {name: root.entries[name].plain for name in OF_IMAGES if root.has(name)}, [])
-    if given is None or measured is None or {strip.camera for strip in given.strips} - set(given.cameras):
+    if given is None or measured is None or {each.camera for each in given.groups} - set(given.cameras):
         return ()
     read = Tables(observations=_whole(measured), fiducials=tables.fiducials and _whole(tables.fiducials), control=[])
     try:
-        inputs, _ = _inputs(completed(given, root, reading.file), read, root, {})
+        inputs, _ = _inputs(completed(given, root, reading.file, measured_photos(read)), read, root, {})
         if not np.isfinite(inputs.observations.xy).all():
             return ()  # the size of a pixel, or the format, is what is missing
         findings = image_evidence.of_units(inputs, conversion.settings(given))
@@ -261,7 +261,7 @@ def _inputs(
 ) -> tuple[Inputs, list[Note]]:
     """Turn a project without faults into what the pipeline takes."""
     known, derived = with_pixel_sizes(project, tables.fiducials, conversion.cameras(project), root)
-    photos = {str(photo): known[strip.camera] for strip in project.strips if strip.camera for photo in strip.photos}
+    photos = {photo: known[camera] for photo, camera in project.camera_of.items() if camera}
     control = [read for read in tables.control if read is not None]
     if len(control) != len(project.control):
         raise InputError("a table of the project is missing")

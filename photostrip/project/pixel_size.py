@@ -37,7 +37,7 @@ def with_pixel_sizes(
     if observations.unit != PIXELS or (given.unit or PIXELS) != PIXELS:
         return found, notes
     for name, camera in known.items():
-        photos = {str(photo) for strip in project.strips if strip.camera == name for photo in strip.photos}
+        photos = {photo for photo, owner in project.camera_of.items() if owner == name}
         if camera.pixel_size is not None or not camera.fiducials or not photos:
             continue
         sizes = _sizes(marks, camera, photos)

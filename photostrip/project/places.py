@@ -42,7 +42,8 @@ def places_of(
             yield replace(each, file=row[0], line=row[1])
             continue
         else:
-            path = _listed(each, strips)
+            path = _listed(each, strips[: len(tree.list_at("strips"))])
+            path = path or (("photos",) if each.photos or each.strips else ())
             key = ""
         if not path or not tree.has(*path[:1]):
             yield each

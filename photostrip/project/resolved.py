@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +42,10 @@ LONGEST_LINE = 110
 _NOT_PRINTED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
-def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
+def completed(project: ProjectFile, root: Node, path: str, measured: Sequence[str] = ()) -> ProjectFile:
     """Fill in the defaults that depend on other keys, and make paths relative to the project's folder.
+
+    measured: photos on which points are measured.
 
     Only keys for which nothing stands in are left empty.
     """
@@ -89,9 +91,13 @@ def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
         epoch=spec.epoch,
         ellipsoid=ellipsoid,
     )
+    listed = project.camera_of
+    rest = [Text(name) for name in dict.fromkeys(measured) if name not in listed]
+    photos = [each.changed(photos=rest) if each.photos is None else each for each in project.photos]
     return project.changed(
         name=project.name or Text(Path(path).stem),
         extends=None,
+        photos=photos,
         observations=observations,
         models=models,
         fiducial_measurements=marks,

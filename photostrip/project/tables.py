@@ -127,7 +127,7 @@ def _height_column(node: Node) -> int:
 
 def check_tables(root: Node, tables: Tables) -> Iterator[Fault]:
     """Return what does not fit between the tables and the project file."""
-    photos = list(listed_photos(root))
+    photos = list(listed_photos(root, measured_photos(tables)))
     if tables.observations is not None:
         yield from _every_photo(root, photos, tables.observations, "no point")
     if tables.fiducials is not None:
@@ -136,6 +136,27 @@ def check_tables(root: Node, tables: Tables) -> Iterator[Fault]:
     for section, read in (("camera_positions", tables.positions), ("orientations", tables.orientations)):
         if read is not None:
             yield from _some_photo(root, photos, section, read)
+    strips = {strip.word("id") for strip in root.list_at("strips")}
+    for photo in photos:
+        if photo.path[0] == "photos" and photo.id in strips:  # it may become a strip of its own
+            message, fix = f"photo {photo.id} has the id of a strip", "give the strip another id"
+            yield fault_at(root, photo.path, message, "duplicate-strip", fix=fix)
+    if tables.positions is not None and root.word("camera_positions", "correction") == "drift":
+        yield from _times(root, photos, tables.positions)
+
+
+def measured_photos(tables: Tables) -> Sequence[str]:
+    """Photos on which points are measured."""
+    return () if tables.observations is None else tables.observations.photo_ids
+
+
+def _times(root: Node, photos: list[ListedPhoto], read: PositionTable) -> Iterator[Fault]:
+    """Refuse a drift of photos in no given order without times: their numbers stand for none."""
+    free = {photo.id for photo in photos if photo.path[0] == "photos"}
+    if any(name in free for name in read.ids) and not np.isfinite(read.time).all():
+        message = f"a drift of photos in no given order needs times, and {read.table.file} lacks some"
+        fix = "fill its column time, or write `correction: offset`"
+        yield fault_at(root, ("camera_positions", "correction"), message, "no-time", fix=fix)
 
 
 def _some_photo(
@@ -163,12 +184,13 @@ def _every_photo(root: Node, photos: list[ListedPhoto], read: Measurements, noth
     if len(missing) == len(known) > 1:
         message = f"{file} has {nothing} on any photo of the strips; its photos are {listed(strangers, 4)}"
         fix = "write the ids of the photos the same way in both files"
-        yield fault_at(root, ("strips",), message, "not-measured", fix=fix)
+        yield fault_at(root, missing[0].path[:1], message, "not-measured", fix=fix)
         return
     near = alike([photo.id for photo in missing], strangers)
     for photo in missing:
         twin = near.get(photo.id)
-        fix = meant(photo.id, twin) if twin else "measure it, or remove it from the strip"
+        of_strip = photo.path[0] == "strips"
+        fix = meant(photo.id, twin) if twin else f"measure it, or remove it{' from the strip' if of_strip else ''}"
         message = f"{file} has {nothing} on photo {photo.id}"
         yield fault_at(root, photo.path, message, "not-measured", fix=fix)
 

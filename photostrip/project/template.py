@@ -32,6 +32,7 @@ strips:
   - id: A
     camera: camera-1
     photos: []                      # ids in flight order, as in observations.csv: [1001, 1002, 1003]
+# photos: {{camera: camera-1}}        # in place of strips: all measured photos, in no given order
 
 observations:                       # points measured on photos
   file: observations.csv            # photo,point,x,y and, where rows differ, sx,sy

@@ -44,7 +44,7 @@ def counts_of(result: Result, measurements: int) -> Document:
         used = int(bundle.screened.selection.images.sum())
     out = [] if bundle is None else [each for each in bundle.screened.rejections if not each.readmitted]
     return {
-        "strips": len(result.inputs.flights),
+        "strips": len(result.inputs.lines),
         "photos": sum(len(strip.photos) for strip in result.inputs.flights),
         "models": sum(len(strip.strip.photos) - 1 for strip in result.strips),
         "points": len(roles),

@@ -39,13 +39,16 @@ processing: {adjustment: bundle, bundle: {screening: none}}
 
 @pytest.fixture(scope="module")
 def strasbourg(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    return five_photos(tmp_path_factory.mktemp("sxb"), PROJECT)
+
+
+def five_photos(folder: Path, project: str) -> Result:
     """The published run: five photos, 14 control points, everything measured takes part."""
-    folder: Path = tmp_path_factory.mktemp("sxb")
     rows = (SAMPLES / "sxb-strasbourg" / "observations.csv").read_text(encoding="utf-8")
     more = (DATA / "observations.csv").read_text(encoding="utf-8").split("\n", 1)[1]
     (folder / "observations.csv").write_text(rows + more, encoding="utf-8")
     (folder / "control.csv").write_bytes((DATA / "control.csv").read_bytes())
-    (folder / "project.yaml").write_text(PROJECT, encoding="utf-8")
+    (folder / "project.yaml").write_text(project, encoding="utf-8")
     loaded = load_project(folder / "project.yaml")
     return triangulate(loaded.inputs, loaded.settings)
 
@@ -75,6 +78,18 @@ def test_the_published_orientations_and_their_standard_deviations(strasbourg: Re
             assert [sigma[a] for a in "xyz"] == pytest.approx([float(row[f"sigma_{a}"]) for a in "xyz"], rel=0.01)
             angles = [float(row[f"sigma_{name}_deg"]) for name in ("omega", "phi", "kappa")]
             assert sigma["angles"] == pytest.approx(angles, rel=0.01)
+
+
+def test_the_published_orientations_without_strips(tmp_path: Path) -> None:
+    """The photos of two flight lines in no order, flown to and fro."""
+    strips = PROJECT[PROJECT.index("strips:") : PROJECT.index("observations:")]
+    result = five_photos(tmp_path, PROJECT.replace(strips, "photos: {camera: sxb}\n"))
+    assert [strip.id for strip in result.inputs.strips] == ["8811-9111", "8936-8938"]
+    photos = {photo["id"]: photo for photo in document_of(result)["photos"]}
+    with (DATA / "published.csv").open(encoding="utf-8", newline="") as file:
+        for row in nonempty(csv.DictReader(file)):
+            published = [float(row[f"{axis}_m"]) for axis in "XYZ"]
+            assert [photos[row["photo"]][axis] for axis in "xyz"] == pytest.approx(published, abs=0.001)
 
 
 def test_the_published_residuals_at_check_points(strasbourg: Result) -> None:

@@ -30,8 +30,11 @@ OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustme
 
 
 def notes(bundle: Bundle) -> tuple[Note, ...]:
-    """Collect the notes on the strips that still mean something, and on the adjustment."""
-    of_strips = (note for strip in bundle.start.strips for note in strip.notes)
+    """Collect the notes on the strips that still mean something, and on the adjustment.
+
+    A strip that was found among photos in no order is a start, and no pair of it the user's.
+    """
+    of_strips = (note for strip in bundle.start.strips if strip.of_photos.strip.listed for note in strip.notes)
     return (*(note for note in of_strips if note.code not in OF_THE_STRIP_METHOD), *_of_adjustment(bundle))
 
 

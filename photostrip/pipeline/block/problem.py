@@ -58,7 +58,6 @@ def build(
     given, control_rows = control_observations(control, ground.control, observations, start, origin)
     positions = _positions(inputs, ground.positions, ground.orientations, start, origin)
     attitudes = _attitudes(inputs.orientations, ground.orientations, start)
-    in_block = inputs.positions is not None and inputs.positions.group == BLOCK
     geocentric = ground.positions is not None and ground.positions.kind == "geocentric"
     problem = BundleProblem(
         images=images,
@@ -70,7 +69,7 @@ def build(
         photo_ids=start.photos,
         point_ids=observations.point_ids,
         camera_ids=tuple(dict.fromkeys(strip.camera.name for strip in inputs.strips)),
-        group_ids=("of the block",) if in_block else tuple(strip.id for strip in inputs.strips),
+        group_ids=tuple(dict.fromkeys(_groups(inputs))),
         position_axes=CARTESIAN_AXES if geocentric else GROUND_AXES,
     )
     level = {
@@ -192,7 +191,9 @@ def _measured(
     near = start.centers[photo] + np.einsum("nij,nj->ni", start.rotations[photo], lever)
     ids = [f"of photo {name}" for name in positions.photos]
     xyz, axes, sigma = given_positions(positions.enu, positions.use, positions.sigma, frame, near, ids)
-    group, count = _groups(inputs, positions)[photo], 1 if positions.group == BLOCK else len(inputs.strips)
+    names = _groups(inputs)
+    of_photo = [name for name, strip in zip(names, inputs.strips, strict=True) for _ in strip.photos]
+    group, count = locate(of_photo, tuple(dict.fromkeys(names)))[photo], len(set(names))
     time = positions.time if np.isfinite(positions.time).all() else photo.astype(float)
     # only a coordinate that is in use somewhere has an offset; a drift needs two of them
     members = np.zeros((count, 3), np.intp)
@@ -213,10 +214,11 @@ def _measured(
     )
 
 
-def _groups(inputs: Inputs, positions: CameraPositions) -> Numbers:
-    """Return the number of the group of each photo, whose positions share offset and drift."""
-    strips = np.repeat(np.arange(len(inputs.strips)), [len(strip.photos) for strip in inputs.strips])
-    return np.zeros_like(strips) if positions.group == BLOCK else strips
+def _groups(inputs: Inputs) -> list[str]:
+    """Name the group of each strip, whose positions share offset and drift; photos listed in no order are one."""
+    if inputs.positions is not None and inputs.positions.group == BLOCK:
+        return ["of the block"] * len(inputs.strips)
+    return [strip.id if strip.listed else "of the photos in no order" for strip in inputs.strips]
 
 
 def _level_positions(

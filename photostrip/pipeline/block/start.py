@@ -38,7 +38,7 @@ from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility.photos.tied_strips import odd_ties
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
-from photostrip.strip.resection.closed_form import approximate
+from photostrip.strip.resection.closed_form import LEAST_POINTS, approximate
 from photostrip.strip.resection.collinearity import KnownPhotos
 from photostrip.strip.resection.ray_intersection import intersect_points
 from photostrip.strip.resection.resection import resect
@@ -178,6 +178,8 @@ def _together(
             observations.photo[np.isfinite(points[observations.point, 0])], minlength=len(observations.photo_ids)
         )
         photo = max(singles, key=lambda each: seen[observations.photo_index[each]])
+        if rough and seen[observations.photo_index[photo]] < LEAST_POINTS and photo not in known.orientations:
+            points = _rest(inputs, observations, oriented, points)  # nothing better is left
         center, rotation, solved = _single(photo, singles.pop(photo), points, observations, known)
         oriented[photo] = center, rotation
         if solved:  # its rays give the next photos their points
@@ -263,7 +265,7 @@ def _single(photo: str, focal: float, points: Floats, observations: PhotoPoints,
         begin = approximate(xy, xyz, focal)
     except GeometryError as error:
         message = (
-            f"photo {photo}, a strip of its own, cannot be oriented on points known from the other photos: {error}; "
+            f"photo {photo}, which is in no strip, cannot be oriented on points known from the other photos: {error}; "
             "list photos that overlap as one strip, or give its orientation roughly (orientations, role: approximate)"
         )
         raise GeometryError(message, photos=(photo,), code="strip-not-tied") from error

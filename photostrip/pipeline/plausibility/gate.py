@@ -43,6 +43,9 @@ if TYPE_CHECKING:
 STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give
 OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 OF_SLIPS = "P406"  # findings on single digits of given coordinates
+# findings on photos and bases that do not go on as those before them, on points that strips put at two places
+OF_STRIPS = ("P201", "P202", "P206", "P207", "P301", "P304")
+OF_HEIGHTS = "P205"  # findings on perspective centres above the others, given or, without a key, of a strip
 OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
 
 
@@ -57,7 +60,7 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     control = _given_control(inputs, directory)
     findings += _of_control(control, images, images.strips, unformed, tried={})
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
-    return accepted(findings, settings.accept)
+    return _told(findings, inputs, settings)
 
 
 def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
@@ -119,7 +122,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         findings, predicted, inputs.control.ids
     ):
         findings += shared_control.find_shifted_checks(result)
-    return accepted(findings, settings.accept)
+    return _told(findings, inputs, settings)
 
 
 def of_failure(
@@ -154,9 +157,20 @@ def of_failure(
         findings += _of_ids(broken, images)
         for strip in broken:
             findings += flight_order.find_other_scale(images.observations, strip.id, strip.photos)
-        return accepted(findings, settings.accept)
+        return _told(findings, inputs, settings)
     except (GeometryError, InputError, np.linalg.LinAlgError):
         return ()  # the failure itself is what must be reported
+
+
+def _told(findings: Iterable[Finding], inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
+    """Leave out what strips say of themselves that were found among photos in no order: they only start a bundle."""
+    found = {strip.id for strip in inputs.strips if not strip.listed}
+    told = (each for each in findings if found.isdisjoint(each.strips) or not _of_strip_alone(each))
+    return accepted(told, settings.accept)
+
+
+def _of_strip_alone(finding: Finding) -> bool:
+    return finding.code in OF_STRIPS or (finding.code == OF_HEIGHTS and not finding.key)
 
 
 def _given_control(inputs: Inputs, directory: Path | None, frames: Sequence[GroundFrame] = ()) -> GivenControl | None:

@@ -28,7 +28,11 @@ def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings) -
     """Form the strips of photos; a single photo, which only a bundle adjustment can orient, forms nothing."""
     overruling.require(settings.relative, observations)
     overruling.require_weighted(settings.formation, observations)
-    whole = [strip for strip in inputs.strips if len(strip.photos) > 1 or not settings.together]
+    whole = [strip for strip in inputs.strips if len(strip.photos) > 1]
+    if len(whole) < len(inputs.strips) and not settings.together:
+        alone = next(strip.photos for strip in inputs.strips if len(strip.photos) == 1)
+        msg = f"photo {alone[0]} is no strip: only a bundle adjustment can orient it"
+        raise GeometryError(msg, photos=alone, code="one-photo")
     return [form_strip(strip, observations, settings) for strip in whole]
 
 
@@ -53,7 +57,8 @@ def as_single_photos(inputs: Inputs, settings: Settings, refused: GeometryError)
         return None
 
     def cut(strip: Strip) -> list[Strip]:
-        singles = [replace(strip, id=f"{strip.id}/{photo}", photos=(photo,)) for photo in strip.photos]
+        names = [f"{strip.id}/{photo}" if strip.listed else photo for photo in strip.photos]
+        singles = [replace(strip, id=name, photos=(photo,)) for name, photo in zip(names, strip.photos, strict=True)]
         return singles if strip in several else [strip]
 
     return replace(inputs, strips=tuple(chain(*map(cut, inputs.strips))))

@@ -42,6 +42,7 @@ from photostrip.project.yaml.tree import fault_at
 from photostrip.strip.image_coordinates import corrections
 from photostrip.units import MILLIMETRES
 
+LEAST_SHARED = 4  # points that orient a photo
 LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
 
 
@@ -85,6 +86,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     notes += _image_coordinates(project, faults)
     used = observations_used(inputs) if models is None else np.zeros(0, np.intp)
     faults += _neighbours(project) if models is None else links_of_models(project, models)
+    faults += _alone(project)
     # strips of a block may hang on others, or on cameras
     hung = len(inputs.strips) > 1 or inputs.positions is not None or inputs.orientations is not None
     if project.settings.adjustment != BUNDLE and not (project.settings.together and models is None and hung):
@@ -181,6 +183,24 @@ def _pairs(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
             yield fault_at(project.tree, path, message, "too-few-common-points", expected=expected, fix=fix)
 
 
+def _alone(project: Project) -> Iterator[Fault]:
+    """Refuse photos in no order that nothing orients: no orientation, too few points of control or other photos."""
+    inputs, seen = project.inputs, project.inputs.observations
+    given = () if inputs.orientations is None else inputs.orientations.photos
+    times = np.bincount(seen.point, minlength=len(seen.point_ids))
+    times[np.flatnonzero(locate(seen.point_ids, inputs.control.ids) >= 0)] += 1
+    shared = np.bincount(seen.photo[times[seen.point] > 1], minlength=len(seen.photo_ids))
+    counts = dict(zip(seen.photo_ids, shared.tolist(), strict=True))
+    for strip in inputs.strips:
+        if strip.listed or strip.id in given or counts[strip.id] >= LEAST_SHARED:
+            continue
+        number = counted(counts[strip.id], "point")
+        message = f"photo {strip.id} has {number} of the control or of other photos"
+        fix = "measure more, or give its orientation roughly (orientations, role: approximate)"
+        expected = f"at least {LEAST_SHARED}, better 12"
+        yield fault_at(project.tree, ("photos",), message, "photo-not-tied", expected=expected, fix=fix)
+
+
 def _junctions(project: Project, common: Sequence[Numbers]) -> Iterator[Fault]:
     """Refuse three photos in a row without a common point: nothing would carry the scale on."""
     for i, (strip, count) in enumerate(zip(project.inputs.strips, common, strict=True)):
@@ -214,7 +234,8 @@ def _counts(project: Project, used: Numbers) -> Document:
     given, shown = inputs.control, locate(inputs.control.ids, measured) >= 0
     return {
         "files": len(project.files),
-        "strips": len(inputs.flights),
+        "strips": len(inputs.lines),
+        "in_no_order": sum(not strip.listed for strip in inputs.strips),
         "photos": sum(len(strip.photos) for strip in inputs.flights),
         **({} if inputs.models is None else counts_of_models(inputs.models)),
         "image_points": len(inputs.observations),

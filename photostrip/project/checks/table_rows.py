@@ -65,6 +65,8 @@ def gaps_of(inputs: Inputs, used: Numbers) -> list[str]:
     observations = inputs.observations
     paired = np.zeros(len(observations.point_ids), bool)
     paired[observations.point[used >= 0]] = True
+    free = tuple(strip.id for strip in inputs.strips if not strip.listed)
+    paired[observations.point[observations.places(free) >= 0]] = True  # neighbours are yet to be found
     count = np.bincount(observations.point, minlength=len(observations.point_ids))
     return [observations.point_ids[code] for code in np.flatnonzero(~paired & (count > 1))]
 

@@ -1,4 +1,4 @@
-"""The blocks `cameras` and `strips` of a project."""
+"""The blocks `cameras`, `strips` and `photos` of a project."""
 
 from typing import Annotated
 
@@ -123,4 +123,13 @@ class Strip(Section):
     )
     first_photo: FirstPhoto | None = key(
         "Angles of the first photo and length of the first base, for strip coordinates as in a textbook", None
+    )
+
+
+class Photos(Section):
+    """Photos of one camera in any order, among which a run finds the strips."""
+
+    camera: Id = key("Camera of all these photos, a key of `cameras`")
+    photos: Annotated[list[Id], Length(1)] | None = key(
+        "Their ids, in any order. Default: all measured photos that are listed nowhere else", None
     )

@@ -5,11 +5,11 @@ from typing import Annotated
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.plausibility import KINDS
-from photostrip.project.schema.cameras import Camera, Strip
+from photostrip.project.schema.cameras import Camera, Photos, Strip
 from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
 from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
 from photostrip.project.schema.processing import Processing
-from photostrip.project.schema.sections import Before, Length, Read, Section, key, wrong
+from photostrip.project.schema.sections import Before, Length, OneOrMany, Read, Section, key, wrong
 from photostrip.project.schema.values import Positive, Words, if_empty, schema_number, single, text
 
 SCHEMA_NUMBER = 1
@@ -57,7 +57,12 @@ class ProjectFile(Section):
     cameras: Annotated[dict[str, Camera], Before(if_empty), Length(1)] = key(
         "Cameras by name; needed with `observations`", {}
     )
-    strips: Annotated[list[Strip], Length(1)] = key("Strips")
+    strips: Annotated[list[Strip], Length(1)] = key(
+        "Strips: photos in flight order; beside or in place of `photos`", []
+    )
+    photos: Annotated[list[Photos], OneOrMany(), Length(1)] = key(
+        "Photos in no given order, for the bundle adjustment: `{camera: name}`, or a list of `{camera, photos}`", []
+    )
     observations: Observations | None = key("Points measured on photos; or `models`", None)
     models: Models | None = key("Independent models measured on a plotter, in place of `observations`", None)
     fiducial_measurements: FiducialMeasurements | None = key("Fiducial marks measured on photos", None)
@@ -73,3 +78,13 @@ class ProjectFile(Section):
         "Findings that were looked at and are accepted: codes, or `code/id` for one photo, point or strip",
         [],
     )
+
+    @property
+    def camera_of(self) -> dict[str, str | None]:
+        """Camera of every photo that is listed: of the strips, then of `photos`."""
+        return {str(photo): group.camera for group in self.groups for photo in group.photos or []}
+
+    @property
+    def groups(self) -> list[Strip | Photos]:
+        """Photos with a camera in common: of the strips, then of `photos`."""
+        return [*self.strips, *self.photos]

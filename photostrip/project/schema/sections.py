@@ -89,6 +89,11 @@ class Length:
     most: int | None = None
 
 
+@dataclass(frozen=True)
+class OneOrMany:
+    """In an annotation of a list of sections: a single one may stand without the list."""
+
+
 class Rule(NamedTuple):
     """A method of a section that raises what is wrong with its values together."""
 
@@ -208,6 +213,8 @@ def _reader(annotation: Any) -> Reader:  # noqa: ANN401 (a type)
         for each in inner.__metadata__:
             if isinstance(each, Read):
                 reader = _guarded(each.function)
+            elif isinstance(each, OneOrMany):
+                reader = _one_or_many(inner.__origin__)
             elif isinstance(each, Before | After | Length):
                 reader = _changed(each, reader or _reader(inner.__origin__))
         return reader or _reader(inner.__origin__)
@@ -266,6 +273,13 @@ def _list(entry: Reader) -> Reader:
         return [entry(each, (*path, number), problems) for number, each in enumerate(value)]
 
     return read
+
+
+def _one_or_many(annotation: Any) -> Reader:  # noqa: ANN401 (a type)
+    many, one = _reader(annotation), _reader(get_args(annotation)[0])
+    return lambda value, path, problems: (
+        [one(value, path, problems)] if isinstance(value, dict) else many(value, path, problems)
+    )
 
 
 def _tuple(*entries: Reader) -> Reader:

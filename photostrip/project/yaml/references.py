@@ -5,13 +5,14 @@ All checks look at the tree, not at the validated project, so that they also run
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from photostrip.errors import Fault
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.pipeline.inputs import AUTO, BUNDLE
+from photostrip.project.schema.project_file import ProjectFile
 from photostrip.project.yaml.tree import NO_FILES, Node, Path, fault_at
 
 LEAST_MARKS = 2
@@ -19,20 +20,41 @@ LEAST_MARKS = 2
 
 @dataclass(frozen=True)
 class ListedPhoto:
-    """One photo of one strip: its id, where it stands, and the camera of its strip."""
+    """One photo of a strip or of `photos`: its id, where it stands, and its camera."""
 
     id: str
     path: Path
     camera: str
 
 
-def listed_photos(root: Node) -> Iterator[ListedPhoto]:
-    """Return every photo of every strip."""
-    for i, strip in enumerate(root.list_at("strips")):
-        camera = strip.word("camera")
-        for j, photo in enumerate(strip.list_at("photos")):
+def groups_of_photos(root: Node) -> Iterator[tuple[Path, Node]]:
+    """Return the entries of `photos` and where they stand."""
+    node = root.find("photos")
+    if node is not None and node.entries:
+        yield ("photos",), node
+    elif node is not None:
+        yield from ((("photos", i), each) for i, each in enumerate(node.elements))
+
+
+def listed_photos(root: Node, measured: Sequence[str] = ()) -> Iterator[ListedPhoto]:
+    """Return every photo of every strip and of `photos`.
+
+    measured: photos that are measured; an entry of `photos` without a list has those that stand nowhere else.
+    """
+    strips = [(("strips", i), strip) for i, strip in enumerate(root.list_at("strips"))]
+    listed: set[str] = set()
+    others: list[tuple[Path, Node]] = []
+    for path, group in (*strips, *groups_of_photos(root)):
+        for j, photo in enumerate(group.list_at("photos")):
             if photo.text:
-                yield ListedPhoto(id=photo.text, path=("strips", i, "photos", j), camera=camera)
+                listed.add(photo.text)
+                yield ListedPhoto(id=photo.text, path=(*path, "photos", j), camera=group.word("camera"))
+        if path[0] == "photos" and not group.has("photos"):
+            others.append((path, group))
+    for path, group in others[:1]:
+        for name in dict.fromkeys(measured):
+            if name not in listed:
+                yield ListedPhoto(id=name, path=(*path, "camera"), camera=group.word("camera"))
 
 
 def check_references(root: Node) -> Iterator[Fault]:
@@ -40,6 +62,7 @@ def check_references(root: Node) -> Iterator[Fault]:
     for check in (
         _only_models if root.has("models") else _only_photos,
         _strips,
+        _photos_in_any_order,
         _photos,
         _cameras,
         _system_of_coordinates,
@@ -59,12 +82,13 @@ NEEDS_IMAGES = {
     "earth_curvature": (("image",), "auto, model or none"),
     "refraction": (("true", "yes", "on"), "false"),
 }
-OF_PHOTOS = ("observations", "fiducial_measurements", "camera_positions", "orientations")
+OF_PHOTOS = ("photos", "observations", "fiducial_measurements", "camera_positions", "orientations")
 
 
 def _lacks(root: Node, name: str) -> bool:
     """Whether a file has no such key, not even misspelled, which the schema tells."""
-    return not root.has(name) and not any(suggestion(each, [name]) for each in root.entries)
+    misspelled = (each for each in root.entries if each not in ProjectFile.keys)
+    return not root.has(name) and not any(suggestion(each, [name]) for each in misspelled)
 
 
 def _only_photos(root: Node) -> Iterator[Fault]:
@@ -102,33 +126,57 @@ def _only_models(root: Node) -> Iterator[Fault]:
 
 
 def _strips(root: Node) -> Iterator[Fault]:
-    """Refuse strips of the same name and cameras that do not exist."""
-    known = list(root.mapping_at("cameras"))
+    """Ask for photos, and refuse strips of the same name and cameras that do not exist."""
+    if _lacks(root, "strips") and (root.has("models") or _lacks(root, "photos")):
+        expected = "strips" if root.has("models") else "photos in flight order by strips; or `photos`, in any order"
+        yield fault_at(root, ("strips",), "`strips` is missing", "missing-key", expected=expected)
     first: dict[str, int] = {}
     for number, strip in enumerate(root.list_at("strips")):
-        name, camera = strip.word("id"), strip.word("camera")
+        name = strip.word("id")
         if name and first.setdefault(name, number) != number:
             line = root.place_of(("strips", first[name], "id")).line
             message = f"strip {shown(name)} already exists" + (f", in line {line}" if line else "")
             yield fault_at(root, ("strips", number, "id"), message, "duplicate-strip", fix="give it another id")
-        if camera and known and camera not in known:
-            message = f"there is no camera `{shown(camera)}`"
-            expected, fix = f"one of {', '.join(known)}", suggestion(camera, known)
-            path = ("strips", number, "camera")
-            yield fault_at(root, path, message, "unknown-camera", expected=expected, fix=fix)
+        yield from _known_camera(root, ("strips", number), strip)
+
+
+def _known_camera(root: Node, path: Path, group: Node) -> Iterator[Fault]:
+    known, camera = list(root.mapping_at("cameras")), group.word("camera")
+    if camera and known and camera not in known:
+        message = f"there is no camera `{shown(camera)}`"
+        expected, fix = f"one of {', '.join(known)}", suggestion(camera, known)
+        yield fault_at(root, (*path, "camera"), message, "unknown-camera", expected=expected, fix=fix)
+
+
+def _photos_in_any_order(root: Node) -> Iterator[Fault]:
+    """Refuse in `photos` what only strips can have, and a second entry for all that is listed nowhere."""
+    others: list[Path] = []
+    for path, group in groups_of_photos(root):
+        yield from _known_camera(root, path, group)
+        if group.entries and not group.has("photos"):
+            others.append(path)
+    for path in others[1:]:
+        message = "a second entry without a list: the photos that are listed nowhere have one camera"
+        yield fault_at(root, path, message, "second-rest", fix="list its photos")
+    asked = root.word("processing", "adjustment")
+    if root.has("photos") and not root.has("models") and asked not in {"", AUTO, BUNDLE}:
+        message = f"photos in no given order need the bundle adjustment; `adjustment: {shown(asked)}` takes strips"
+        path, fix = ("processing", "adjustment"), "or list the photos in flight order in `strips`"
+        yield fault_at(root, path, message, "photo-without-strip", expected="auto or bundle", fix=fix)
 
 
 def _photos(root: Node) -> Iterator[Fault]:
-    """Refuse a photo that is listed twice, in one strip or in two."""
+    """Refuse a photo that is listed twice, in one place or in two."""
     first: dict[str, Path] = {}
     for photo in listed_photos(root):
         before = first.setdefault(photo.id, photo.path)
         if before == photo.path:
             continue
-        strip = root.word("strips", before[1], "id") or str(before[1])
+        strip = "" if before[0] == "photos" else root.word("strips", before[1], "id") or str(before[1])
         place = root.place_of(before)
         where = f"{place.file}:{place.line}:{place.column}" if place.line else place.file
-        message = f"photo {shown(photo.id)} is already listed, in strip {shown(strip)} ({where})"
+        among = f"in strip {shown(strip)}" if strip else "in `photos`"
+        message = f"photo {shown(photo.id)} is already listed, {among} ({where})"
         yield fault_at(root, photo.path, message, "duplicate-photo", fix="list every photo once")
 
 
@@ -140,7 +188,8 @@ def marks_of(camera: Node) -> Node | None:
 
 def _cameras(root: Node) -> Iterator[Fault]:
     """Ask cameras for what their photos need: marks to orient by, the size of a pixel."""
-    used = {strip.word("camera") for strip in root.list_at("strips")}
+    used = {group.word("camera") for group in root.list_at("strips")}
+    used |= {group.word("camera") for _, group in groups_of_photos(root)}
     pixels = "px" in {root.word("observations", "unit"), root.word("fiducial_measurements", "unit")}
     marked = root.has("fiducial_measurements")
     units = {root.word("observations", "unit"), root.word("fiducial_measurements", "unit") or "px"}

@@ -38,12 +38,18 @@ def _contents(document: Document) -> Section:
     models = document.get("model_sigma")
     rows = [
         ("project", document["name"]),
-        ("photos", f"{counts['photos']} in {counted(counts['strips'], 'strip')}"),
+        ("photos", _in_strips(counts)),
         _measured(counts),
         ("given and measured", f"{control.format(**counts)} in height"),
         ("model sigma" if models else "image sigma", _image_sigma(models or document["image_sigma"])),
     ]
     return Section("Contents", (Facts(tuple(rows)),))
+
+
+def _in_strips(counts: Document) -> str:
+    in_strips = counts["photos"] - counts["in_no_order"]
+    parts = [f"{in_strips} in {counted(counts['strips'], 'strip')}"] if in_strips else []
+    return ", ".join([*parts, *([f"{counts['in_no_order']} in no given order"] if counts["in_no_order"] else [])])
 
 
 def _measured(counts: Document) -> tuple[str, str]:

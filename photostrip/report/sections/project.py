@@ -161,7 +161,8 @@ def counts_section(document: Document) -> Section:
 def counts_rows(document: Document) -> Iterator[tuple[str, str]]:
     """Count photos, points and measurements; scale, height and base."""
     counts, strips = document["counts"], document["strips"]
-    yield "photos", f"{counts['photos']} in {counted(counts['strips'], 'strip')}, {counted(counts['models'], 'model')}"
+    flown = counted(counts["strips"], "strip") if counts["strips"] else "no strip"
+    yield "photos", f"{counts['photos']} in {flown}, {counted(counts['models'], 'model')}"
     by_role = (
         f"{counts['points']}: {counts['new_points']} new, {counts['control_points']} control "
         f"({counts['control_plan']} in plan, {counts['control_height']} in height), {counts['check_points']} check"

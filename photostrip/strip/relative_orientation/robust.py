@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photostrip.arrays import Floats
 from photostrip.strip.relative_orientation import solution
@@ -29,12 +30,39 @@ class RobustElements(NamedTuple):
 
 
 def start_values(pairs: Pairs) -> Floats:
-    """Elements to start from that single wrong points do not turn: the median parallax runs along x."""
-    shift, counts = pairs.left - pairs.right, (pairs.weight > 0).astype(float)
+    """Elements to start from that single wrong points do not turn: the median parallax runs along x.
+
+    Where the points say so, by more than the first azimuth that is tried again, the right photo is turned beforehand.
+    """
+    slope = _slopes(pairs)
+    slope[np.abs(np.angle(slope)) < solution.RETRY_AZIMUTHS[0]] = 1.0
+    back = (pairs.right @ np.array([1.0, 1j])) / slope[pairs.pair]
+    shift, counts = pairs.left - np.column_stack([back.real, back.imag]), (pairs.weight > 0).astype(float)
     middle = [medians(shift[:, axis], counts, pairs.pair, pairs.size) for axis in (0, 1)]
     start = np.zeros((pairs.size, 5))
-    start[:, 1] = start[:, 4] = -np.arctan2(middle[1], middle[0])
+    start[:, 1] = -np.arctan2(middle[1], middle[0])
+    start[:, 4] = start[:, 1] - np.angle(slope)
     return start
+
+
+def _slopes(pairs: Pairs) -> NDArray[np.complex128]:
+    """Turn and scale from the left to the right photo of each pair, as complex numbers.
+
+    They are those of a plane similarity z_right = slope z_left + shift, with weights that fall with the residual.
+    """
+    left, right = (xy @ np.array([1.0, 1j]) for xy in (pairs.left, pairs.right))
+    weight = pairs.weight
+    slope = np.ones(pairs.size, complex)
+    for _ in range(ROBUST_ITERATIONS):
+        total = np.maximum(pairs.sums(weight), solution.RIDGE)
+        off = [z - (pairs.sums(weight * z) / total)[pairs.pair] for z in (left, right)]
+        slope = pairs.sums(weight * np.conj(off[0]) * off[1])
+        slope /= np.maximum(pairs.sums(weight * np.abs(off[0]) ** 2), solution.RIDGE)
+        size = np.abs(off[1] - slope[pairs.pair] * off[0])
+        scale = np.maximum(scales(size, pairs.weight, pairs.pair, pairs.size), solution.RIDGE)
+        weight = pairs.weight * falling_weights(size / scale[pairs.pair])
+    slope[slope == 0] = 1.0
+    return slope
 
 
 def solve(start: Floats, pairs: Pairs, sigma: Floats) -> RobustElements:

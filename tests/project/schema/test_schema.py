@@ -56,8 +56,13 @@ def test_units_stand_in_the_description_and_by_themselves() -> None:
 def test_editors_are_told_what_is_read() -> None:
     schema = schema_of("project")
     definitions = schema["$defs"]
-    assert schema["required"] == ["photostrip", "strips"]
-    assert schema["anyOf"] == [{"required": ["cameras", "observations"]}, {"required": ["models"]}]
+    assert schema["required"] == ["photostrip"]
+    assert schema["allOf"] == [
+        {"anyOf": [{"required": ["cameras", "observations"]}, {"required": ["models"]}]},
+        {"anyOf": [{"required": ["strips"]}, {"required": ["photos"]}]},
+    ]
+    one, many = schema["properties"]["photos"]["anyOf"]
+    assert one == many["items"] == {"$ref": "#/$defs/Photos"}
     assert schema["additionalProperties"] is False
     assert [name for name, each in definitions.items() if each.get("additionalProperties") is not False] == []
     assert definitions["Relative"]["properties"]["parallax_limit"]["default"] == "auto"
@@ -164,6 +169,7 @@ def test_the_model_is_the_contract() -> None:
         "extends",
         "cameras",
         "strips",
+        "photos",
         "observations",
         "models",
         "fiducial_measurements",

@@ -1,0 +1,288 @@
+"""Photos that are listed in no order come out as their strips do, whatever starts them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.camera import Camera
+from photostrip.errors import GeometryError
+from photostrip.geometry.rotation import from_vector
+from photostrip.pipeline.inputs import AUTO
+from photostrip.pipeline.run import triangulate
+from photostrip.result.document import document_of
+from photostrip.simulation import Control, Flight, Gnss, Image, Points, Spec, Terrain
+from tests.pipeline.blocks import adjusted, corners, errors, orientations, positions, simulate, with_control
+from tests.simulated import inputs_of, settings_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from photostrip.pipeline.inputs import GivenOrientations, Inputs
+    from photostrip.pipeline.results import Result
+    from photostrip.simulation import Simulation
+
+ROUNDING = 1e-9  # metres
+SAME_MINIMUM = 1e-6  # metres, by which two starts of one adjustment end apart
+SENSOR = Camera("uav", 8.8, format=(13.2, 8.8), pixel_size=0.0024)
+FLOWN = Flight(
+    photos=4,
+    strips=4,
+    alternate=True,
+    end_lap_percent=80,
+    side_lap_percent=60,
+    scale=None,
+    flying_height=100,
+    attitude_sigma_deg=(2, 2, 3),
+    position_sigma=(0.5, 0.5, 0.3),
+)
+UAV = Spec(
+    camera=SENSOR,
+    flight=FLOWN,
+    terrain=Terrain(relief=5, wavelength=60),
+    points=Points(rows=3, extra_per_model=12),
+    control=Control(layout="corners", sigma=(0.01, 0.01, 0.015)),
+    image=Image(sigma_um=1.2),
+    gnss=Gnss(sigma=(0.03, 0.03, 0.05)),
+)
+
+
+def block(**flight: object) -> Simulation:
+    return simulate(replace(UAV, flight=replace(FLOWN, **flight)))  # type: ignore[arg-type]
+
+
+def in_no_order(inputs: Inputs, strips: Sequence[str] = ()) -> Inputs:
+    """Take the photos of all strips out of their order, but of some."""
+    kept = [strip for strip in inputs.strips if strip.id in strips]
+    others = [strip for strip in inputs.strips if strip.id not in strips]
+    singles = [replace(s, id=name, photos=(name,), listed=False) for s in others for name in s.photos]
+    return replace(inputs, strips=(*kept, *singles))
+
+
+def three_corners(simulation: Simulation, noise: float = 0.03) -> Inputs:
+    """Three control points, and GNSS."""
+    inputs = with_control(simulation, corners(simulation)[:3])
+    rng = np.random.default_rng(4)
+    n = sum(len(strip.photos) for strip in inputs.strips)
+    return replace(inputs, positions=positions(simulation, sigma=noise, noise=rng.normal(0.0, noise, (n, 3))))
+
+
+def five_points(simulation: Simulation) -> Inputs:
+    names = [name for name, check in zip(simulation.control.ids, simulation.control.check, strict=True) if not check]
+    return with_control(simulation, [*corners(simulation), names[len(names) // 2]])
+
+
+def turned(inputs: Inputs, degrees: Sequence[float]) -> Inputs:
+    """Photos turned about their axes, as a camera is held in one way or another."""
+    points = inputs.observations
+    angle = np.radians(np.resize(degrees, len(points.photo_ids)))[points.photo]
+    cosine, sine = np.cos(angle), np.sin(angle)
+    x, y = points.xy.T
+    xy = np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
+    square = replace(inputs.strips[0].camera, format=(16.0, 16.0))
+    strips = tuple(replace(strip, camera=square) for strip in inputs.strips)
+    return replace(inputs, strips=strips, observations=replace(points, xy=xy))
+
+
+def rough(simulation: Simulation, degrees: float, metres: float) -> GivenOrientations:
+    """Orientations as a consumer drone has them."""
+    given, rng = orientations(simulation, observed=False), np.random.default_rng(5)
+    return replace(
+        given,
+        enu=given.enu + rng.normal(0.0, metres, given.enu.shape),
+        angles=given.angles + rng.normal(0.0, np.radians(degrees), given.angles.shape),
+    )
+
+
+def rms(simulation: Simulation, result: Result) -> float:
+    return float(np.sqrt((errors(simulation, result) ** 2).sum(axis=1).mean()))
+
+
+def told(result: Result) -> str:
+    (note,) = [note.message for note in result.notes if note.code == "photos-in-no-order"]
+    return note
+
+
+def apart(one: Result, other: Result) -> float:
+    """Largest distance of a point between two results, metres."""
+    ids = [[each.refined.observations.point_ids[n] for n in each.points.number] for each in (one, other)]
+    assert sorted(ids[0]) == sorted(ids[1])
+    place = {name: row for row, name in enumerate(ids[1])}
+    return float(np.abs(one.points.cartesian - other.points.cartesian[[place[name] for name in ids[0]]]).max())
+
+
+@pytest.mark.parametrize("given", [three_corners, five_points])
+def test_sixteen_photos_come_out_as_their_strips_do(given: Callable[[Simulation], Inputs]) -> None:
+    """Four lines flown to and fro; GNSS and three control points, or five control points alone."""
+    simulation = block()
+    inputs = given(simulation)
+    result = adjusted(simulation, in_no_order(inputs))
+    assert told(result) == (
+        "16 photos in no given order: 4 strips found among them, 1001-1004 (4 photos), 2001-2004 (4 photos), 3001-3004 "
+        "(4 photos), 4001-4004 (4 photos)"
+    )
+    assert apart(result, adjusted(simulation, inputs)) < SAME_MINIMUM
+    assert rms(simulation, result) < 0.05
+    assert result.findings == ()
+    assert document_of(result)["counts"]["strips"] == 4
+
+
+def test_neither_the_list_nor_the_table_decides() -> None:
+    simulation = block()
+    inputs = in_no_order(five_points(simulation))
+    points, rng = inputs.observations, np.random.default_rng(6)
+    order = rng.permutation(len(points.photo_ids))
+    rows = np.argsort(np.argsort(order)[points.photo], kind="stable")
+    mixed = replace(
+        points,
+        photo_ids=tuple(points.photo_ids[n] for n in order),
+        photo=np.argsort(order)[points.photo][rows],
+        point=points.point[rows],
+        xy=points.xy[rows],
+        sigma=points.sigma[rows],
+    )
+    one, other = adjusted(simulation, inputs), adjusted(simulation, replace(inputs, observations=mixed))
+    assert told(one) == told(other)
+    assert apart(one, other) < ROUNDING
+
+
+@pytest.mark.parametrize("degrees", [(0, 90, 180, 270), (17, 203, 81, 340, 122)])
+def test_photos_are_turned_in_any_way(degrees: tuple[float, ...]) -> None:
+    simulation = block()
+    straight = adjusted(simulation, five_points(simulation))
+    result = adjusted(simulation, turned(in_no_order(five_points(simulation)), degrees))
+    assert "4 strips found" in told(result)
+    assert rms(simulation, result) < 1.05 * rms(simulation, straight)
+
+
+def with_wrong_rays(inputs: Inputs, share: float) -> Inputs:
+    """Move some of the image points by 0.05 to 0.5 mm in x and y."""
+    points, rng = inputs.observations, np.random.default_rng(8)
+    wrong = rng.random(len(points)) < share
+    off = rng.uniform(0.05, 0.5, points.xy.shape) * rng.choice([-1.0, 1.0], points.xy.shape)
+    return replace(inputs, observations=replace(points, xy=np.where(wrong[:, None], points.xy + off, points.xy)))
+
+
+@pytest.mark.parametrize("degrees", [(0, 0, 0), (0, 180, 95)])
+def test_wrong_points_are_found_whatever_way_the_photos_are_turned(degrees: tuple[float, ...]) -> None:
+    """In a strip that is listed: two photos head to tail, with a twentieth of their points wrong."""
+    simulation = block(strips=1, photos=6)
+    result = adjusted(simulation, with_wrong_rays(turned(inputs_of(simulation), degrees), 0.05))
+    assert rms(simulation, result) < 0.1
+
+
+def test_photos_beside_strips_start_together() -> None:
+    simulation = block()
+    inputs = five_points(simulation)
+    result = adjusted(simulation, in_no_order(inputs, ("A", "C")))
+    assert [strip.id for strip in result.inputs.strips] == ["A", "C", "2001-2004", "4001-4004"]
+    assert apart(result, adjusted(simulation, inputs)) < SAME_MINIMUM
+
+
+def test_photos_start_from_their_given_orientations() -> None:
+    """To three degrees and three metres; no strip is looked for then."""
+    simulation = block()
+    inputs = three_corners(simulation)
+    given = replace(in_no_order(inputs), orientations=rough(simulation, 3.0, 3.0))
+    result = adjusted(simulation, given)
+    assert told(result) == "16 photos in no given order start from their given orientations"
+    assert document_of(result)["counts"]["strips"] == 0
+    assert apart(result, adjusted(simulation, inputs)) < SAME_MINIMUM
+
+
+def test_where_given_orientations_lead_nowhere_strips_start() -> None:
+    simulation = block()
+    inputs = three_corners(simulation)
+    given = rough(simulation, 0.0, 0.0)
+    mixed = np.random.default_rng(7).permutation(len(given.photos))
+    wrong = replace(given, angles=given.angles[mixed] + 1.0, enu=given.enu[mixed])
+    result = adjusted(simulation, replace(in_no_order(inputs), orientations=wrong))
+    assert "4 strips found" in told(result)
+    (other,) = [note.message for note in result.notes if note.code == "start-refused"]
+    assert other.startswith("another start of the photos in no given order led nowhere: ")
+    assert apart(result, adjusted(simulation, inputs)) < SAME_MINIMUM
+
+
+def test_oblique_photos_start_from_their_orientations() -> None:
+    """Looking aside by 45 degrees, side by side and head to tail."""
+    simulation = block()
+    truth = simulation.truth
+    lean = np.stack([from_vector([0.0, side * np.pi / 4, 0.0]) for side in np.resize([1, -1], len(truth.rotations))])
+    rotations = truth.rotations @ lean
+    leaning = replace(simulation, truth=replace(truth, rotations=rotations))
+    inputs, points = five_points(simulation), simulation.observations
+    seen = np.einsum(
+        "nij,nj->ni", lean.transpose(0, 2, 1)[points.photo], np.column_stack([points.xy, -8.8 + 0 * points.xy[:, 0]])
+    )
+    xy = -8.8 * seen[:, :2] / seen[:, 2:]
+    kept = np.abs(xy).max(axis=1) < 20.0
+    wide = replace(inputs.strips[0].camera, format=(40.0, 40.0))
+    table = replace(points, photo=points.photo[kept], point=points.point[kept], xy=xy[kept], sigma=points.sigma[kept])
+    strips = tuple(replace(strip, camera=wide) for strip in inputs.strips)
+    inputs = in_no_order(replace(inputs, strips=strips, observations=table))
+    result = adjusted(simulation, replace(inputs, orientations=rough(leaning, 1.0, 1.0)))
+    assert rms(simulation, result) < 0.1
+
+
+def test_a_photo_that_no_strip_takes_is_resected_on_the_points_of_its_neighbours() -> None:
+    simulation = block()
+    inputs = five_points(simulation)
+    points = inputs.observations
+    lost = points.photo_ids.index("2002")
+    rows = np.flatnonzero(points.photo == lost)
+    gone = rows[np.argsort(np.abs(points.xy[rows, 0] + points.xy[rows, 1]))[:-4]]  # of it four points are left
+    left = np.setdiff1d(np.arange(len(points)), gone)
+    table = replace(
+        points, photo=points.photo[left], point=points.point[left], xy=points.xy[left], sigma=points.sigma[left]
+    )
+    result = adjusted(simulation, in_no_order(replace(inputs, observations=table)))
+    assert told(result).endswith("1 photo is oriented one by one, 2002")
+    assert rms(simulation, result) < 0.05
+
+
+def with_points_of_their_own(inputs: Inputs, photos: Sequence[str]) -> Inputs:
+    """Rename the points on some photos, so that these share none with the others."""
+    points = inputs.observations
+    own = np.isin(points.photo, [points.photo_ids.index(name) for name in photos])
+    names = (*points.point_ids, *(f"own {name}" for name in points.point_ids))
+    table = replace(points, point=np.where(own, points.point + len(points.point_ids), points.point), point_ids=names)
+    return replace(inputs, observations=table)
+
+
+def test_a_photo_that_hangs_on_nothing_is_refused_by_name() -> None:
+    simulation = block()
+    inputs = with_points_of_their_own(five_points(simulation), ["3003"])
+    with pytest.raises(GeometryError, match=r"photo 3003, which is in no strip, .*give its orientation roughly"):
+        adjusted(simulation, in_no_order(inputs))
+
+
+def test_what_is_too_much_for_a_start_says_what_to_give() -> None:
+    simulation = block()
+    inputs = with_points_of_their_own(five_points(simulation), ["3001", "3002", "3003", "3004"])
+    with pytest.raises(GeometryError, match=r"strip 3001-3004: .* give their orientations roughly .* COLMAP"):
+        adjusted(simulation, in_no_order(inputs))
+
+
+def test_positions_of_photos_in_no_order_share_one_offset() -> None:
+    simulation = block()
+    inputs = replace(five_points(simulation), positions=positions(simulation, 0.03, shift=1.5, correction="offset"))
+    result = adjusted(simulation, in_no_order(inputs))
+    assert result.bundle is not None
+    names = [name for name in result.bundle.block.problem.common_names() if "offset" in name]
+    assert len(names) == 3
+    assert all("photos in no order" in name for name in names)
+    assert rms(simulation, result) < 0.05
+
+
+def test_single_photos_are_no_strips_for_polynomials() -> None:
+    """`auto` that finds no bundle says why, and does not fall over single photos."""
+    simulation = block()
+    given = rough(simulation, 0.0, 0.0)
+    far = replace(given, angles=given.angles + 1.5)
+    inputs = in_no_order(five_points(simulation))
+    listed = replace(inputs, strips=tuple(replace(strip, listed=True) for strip in inputs.strips), orientations=far)
+    with pytest.raises(GeometryError, match=r"determine|converge"):
+        triangulate(listed, replace(settings_of(simulation), adjustment=AUTO))
