@@ -56,6 +56,7 @@ class ModelStrip:
     id: str
     photos: tuple[str, ...]  # photos in flight order
     models: tuple[str, ...]  # models in flight order; model i shows photos i and i + 1
+    listed = True  # as a strip in the project
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +126,7 @@ class Inputs:
     @property
     def lines(self) -> tuple[Strip | ModelStrip, ...]:
         """The flights without single photos that are listed in no order."""
-        alone = {strip.id for strip in self.strips if not strip.listed and len(strip.photos) == 1}
-        return tuple(flight for flight in self.flights if flight.id not in alone)
+        return tuple(flight for flight in self.flights if flight.listed or len(flight.photos) > 1)
 
 
 @dataclass(frozen=True)

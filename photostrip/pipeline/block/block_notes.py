@@ -34,7 +34,7 @@ def notes(bundle: Bundle) -> tuple[Note, ...]:
 
     A strip that was found among photos in no order is a start, and no pair of it the user's.
     """
-    of_strips = (note for strip in bundle.start.strips if strip.of_photos.strip.listed for note in strip.notes)
+    of_strips = (note for strip in bundle.start.strips if strip.strip.listed for note in strip.notes)
     return (*(note for note in of_strips if note.code not in OF_THE_STRIP_METHOD), *_of_adjustment(bundle))
 
 

@@ -86,7 +86,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     notes += _image_coordinates(project, faults)
     used = observations_used(inputs) if models is None else np.zeros(0, np.intp)
     faults += _neighbours(project) if models is None else links_of_models(project, models)
-    faults += _alone(project)
+    faults += [] if models is not None else _alone(project)
     # strips of a block may hang on others, or on cameras
     hung = len(inputs.strips) > 1 or inputs.positions is not None or inputs.orientations is not None
     if project.settings.adjustment != BUNDLE and not (project.settings.together and models is None and hung):

@@ -60,6 +60,7 @@ def listed_photos(root: Node, measured: Sequence[str] = ()) -> Iterator[ListedPh
 def check_references(root: Node) -> Iterator[Fault]:
     """Return what refers wrongly to something else in the project file."""
     for check in (
+        _flown,
         _only_models if root.has("models") else _only_photos,
         _strips,
         _photos_in_any_order,
@@ -89,6 +90,13 @@ def _lacks(root: Node, name: str) -> bool:
     """Whether a file has no such key, not even misspelled, which the schema tells."""
     misspelled = (each for each in root.entries if each not in ProjectFile.keys)
     return not root.has(name) and not any(suggestion(each, [name]) for each in misspelled)
+
+
+def _flown(root: Node) -> Iterator[Fault]:
+    """Ask for photos."""
+    if _lacks(root, "strips") and (root.has("models") or _lacks(root, "photos")):
+        expected = "strips" if root.has("models") else "photos in flight order by strips; or `photos`, in any order"
+        yield fault_at(root, ("strips",), "`strips` is missing", "missing-key", expected=expected)
 
 
 def _only_photos(root: Node) -> Iterator[Fault]:
@@ -126,10 +134,7 @@ def _only_models(root: Node) -> Iterator[Fault]:
 
 
 def _strips(root: Node) -> Iterator[Fault]:
-    """Ask for photos, and refuse strips of the same name and cameras that do not exist."""
-    if _lacks(root, "strips") and (root.has("models") or _lacks(root, "photos")):
-        expected = "strips" if root.has("models") else "photos in flight order by strips; or `photos`, in any order"
-        yield fault_at(root, ("strips",), "`strips` is missing", "missing-key", expected=expected)
+    """Refuse strips of the same name and cameras that do not exist."""
     first: dict[str, int] = {}
     for number, strip in enumerate(root.list_at("strips")):
         name = strip.word("id")
