@@ -91,7 +91,7 @@ def test_another_shell_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_keys_are_those_of_the_project_file() -> None:
     found = keys("processing.relative.")
     assert {"processing.relative.screening=", "processing.relative.grubbs_alpha="} <= set(found)
-    assert "output.crs=" in keys("")
+    assert {"output.crs=", "photos.camera="} <= set(keys(""))
     assert keys("nothing") == []
 
 

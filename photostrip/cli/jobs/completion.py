@@ -43,7 +43,7 @@ def _paths(schema: dict[str, object], part: object, path: str = "") -> list[str]
         return [
             each for name, inner in properties.items() for each in _paths(schema, inner, f"{path}.{name}".strip("."))
         ]
-    leaf = path and part.get("type") not in {"array", "object"}
+    leaf = path and part.get("type") not in ("array", "object")
     return [path] if leaf else []
 
 
