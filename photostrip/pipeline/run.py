@@ -73,7 +73,7 @@ def _walk_of_any_order(inputs: Inputs, settings: Settings, ground: GroundFrames,
     from photostrip.pipeline.strips import finding  # strips that are listed need none of it
 
     refused: list[GeometryError] = []
-    for start in finding.starts(inputs, photo, settings):
+    for start in finding.starts(inputs, photo.observations, settings):
         try:
             result = _walk_by_any_method(start.inputs, settings, ground, photo)
         except GeometryError as error:

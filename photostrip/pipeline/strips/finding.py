@@ -18,7 +18,6 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.notes import Note, counted, listed
-from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.inputs import Inputs, Settings, Strip
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.plausibility.photos import mosaic
@@ -38,7 +37,7 @@ class Start(NamedTuple):
     note: Note
 
 
-def starts(inputs: Inputs, photo: PhotoCoordinates, settings: Settings) -> Iterator[Start]:
+def starts(inputs: Inputs, measured: PhotoPoints, settings: Settings) -> Iterator[Start]:
     """Give the ways in which photos that are listed in no order may start, the likeliest first.
 
     With all their orientations given they start from these, whatever their arrangement; otherwise from strips that are
@@ -48,7 +47,7 @@ def starts(inputs: Inputs, photo: PhotoCoordinates, settings: Settings) -> Itera
     as_given = Start(inputs, _of_given(sum(oriented), len(oriented)))
     if all(oriented):
         yield as_given
-    yield _with_strips_found(inputs, photo, settings)
+    yield _with_strips_found(inputs, measured, settings)
     if any(oriented) and not all(oriented):
         yield as_given
 
@@ -82,7 +81,7 @@ def _of_given(oriented: int, photos: int) -> Note:
     return Note("photos-in-no-order", f"{counted(photos, 'photo')} in no given order start from {of_all}", "note")
 
 
-def _with_strips_found(inputs: Inputs, photo: PhotoCoordinates, settings: Settings) -> Start:
+def _with_strips_found(inputs: Inputs, measured: PhotoPoints, settings: Settings) -> Start:
     """Put strips in the place of photos that are listed in no order, as far as some are found among them.
 
     A strip has one camera. Photos that join none stay what they are, strips of their own.
@@ -90,7 +89,7 @@ def _with_strips_found(inputs: Inputs, photo: PhotoCoordinates, settings: Settin
     singles = [strip for strip in inputs.strips if not strip.listed]
     # refraction and curvature need heights, and bend rays by less than a tilt does
     plain = replace(settings.refinement, refraction=False, earth_radius=None)
-    observations = corrections.refine(photo.observations, inputs.cameras, plain).observations
+    observations = corrections.refine(measured, inputs.cameras, plain).observations
     taken = {strip.id for strip in inputs.strips}
     found: list[Strip] = []
     for camera in dict.fromkeys(strip.camera.name for strip in singles):
