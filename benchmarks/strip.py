@@ -123,14 +123,14 @@ BLOCK = Spec(
 DENSE, SPARSE = strip_spec(1000, 5), strip_spec(1000, 200)
 LIDAR = {count: strip_spec(300, 60, check=count, extra=extra) for count, extra in ((10_000, 40), (50_000, 180))}
 ROWS = {
-    "short": Row("20 photos", strip_spec(20, 5), 1.8),
-    "dense": Row("1000 photos, band every 5 models, polynomial", DENSE, 6.0, 200.0),
-    "sparse": Row("1000 photos, band every 200 models, polynomial", SPARSE, 6.0, 200.0),
-    "dense-bundle": Row("1000 photos, every 5, bundle", DENSE, 8.0, 210.0, adjustment="bundle"),
-    "sparse-bundle": Row("1000 photos, every 200, bundle", SPARSE, 8.0, 210.0, adjustment="bundle"),
-    "long": Row("3000 photos, band every 600 models", strip_spec(3000, 600), 16.0, 400.0),
+    "short": Row("20 photos", strip_spec(20, 5), 5.0),
+    "dense": Row("1000 photos, band every 5 models, polynomial", DENSE, 8.0, 200.0),
+    "sparse": Row("1000 photos, band every 200 models, polynomial", SPARSE, 8.0, 200.0),
+    "dense-bundle": Row("1000 photos, every 5, bundle", DENSE, 12.0, 210.0, adjustment="bundle"),
+    "sparse-bundle": Row("1000 photos, every 200, bundle", SPARSE, 12.0, 210.0, adjustment="bundle"),
+    "long": Row("3000 photos, band every 600 models", strip_spec(3000, 600), 20.0, 400.0),
     "block": Row("bundle block 10 x 40 with GNSS", BLOCK, adjustment="bundle"),
-    "check": Row("check of 1000 photos", DENSE, 2.0, command="check"),
+    "check": Row("check of 1000 photos", DENSE, 4.0, command="check"),
     **{
         f"lidar-{count}-{method}": Row(f"300 photos, {count} check points, {method}", spec, adjustment=method)
         for method in ("polynomial", "auto")
