@@ -63,11 +63,8 @@ class BundleSolution:
     def factored(self) -> FactoredEquations:
         """The normal equations at the solution in factors; ``bundle-rank`` where they are singular."""
         equations = self.equations or equations_at(self.prepared, self.state)
-        anchor = None
-        if self.free and self.rough:
-            anchor = datum.held_everywhere(equations.unreduced)
-        elif self.free:
-            anchor = datum.anchor(equations.unreduced, self.prepared.rank, self.state)
+        held = datum.anchors if self.rough else datum.anchor
+        anchor = held(equations.unreduced, self.prepared.rank, self.state) if self.free else None
         found = factored(equations, anchor)
         if found is None:
             raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
