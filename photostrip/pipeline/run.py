@@ -102,7 +102,7 @@ def _walk_by_any_method(inputs: Inputs, settings: Settings, ground: GroundFrames
 def _walk_from_orientations(
     inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates
 ) -> Result:
-    """Walk, and again with single photos at their given orientations in the place of a strip that cannot be formed."""
+    """Walk, and again with single photos in the place of a strip that cannot be formed."""
     try:
         return _walk(inputs, settings, ground, photo)
     except GeometryError as error:
@@ -113,7 +113,8 @@ def _walk_from_orientations(
             result = _walk_from_orientations(cut, settings, ground, photo)
         except GeometryError:
             raise error from None
-        text = f"{error}; all photos of the strip start from their given orientations in its place"
+        starts = "from their given orientations" if inputs.orientations is not None else "on points of the other strips"
+        text = f"{error}; all photos of the strip start {starts} in its place"
         note = Note("not-formed", text, photos=error.photos)
         return replace(result, notes=(note, *result.notes))
 

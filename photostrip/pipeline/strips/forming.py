@@ -37,19 +37,20 @@ def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings) -
 
 
 def as_single_photos(inputs: Inputs, settings: Settings, refused: GeometryError) -> Inputs | None:
-    """Cut the strip that a refusal is about into single photos, which a bundle starts from their given orientations.
+    """Cut the strip that a refusal is about into single photos, to start from given orientations or on others' points.
 
     A bundle that diverges names none: then all strips are cut.
 
-    None where orientations are not given for all photos, the bundle rejects nothing, or positions of a strip share an
-    error.
+    None where orientations are not given for all photos and no strip is left beside them, the bundle rejects nothing,
+    or positions of a strip share an error.
     """
     positions, named = inputs.positions, set(refused.photos)
     known = set() if inputs.orientations is None else set(inputs.orientations.photos)
     several = [strip for strip in inputs.strips if len(strip.photos) > 1 and named <= set(strip.photos)]
     if not several or not (named or refused.code == "bundle-diverged"):
         return None
-    if not all(known.issuperset(strip.photos) for strip in several):
+    left = any(len(strip.photos) > 1 and strip not in several for strip in inputs.strips)
+    if not left and not all(known.issuperset(strip.photos) for strip in several):
         return None
     if not settings.together or "none" in {settings.bundle.screening, settings.relative.screening}:
         return None

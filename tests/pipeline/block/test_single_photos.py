@@ -57,6 +57,21 @@ def test_single_photos_hand_points_on_to_the_next() -> None:
     assert np.abs(errors(simulation, result)).max() < MICROMETRE
 
 
+def test_photos_of_a_strip_without_points_on_three_of_them_start_on_points_of_the_other_strip() -> None:
+    block = exact(flight=Flight(photos=5, strips=2, side_lap_percent=60.0), points=Points(rows=5))
+    simulation = simulate(block)
+    seen, names = simulation.observations, simulation.strips[1][1]
+    shown = np.zeros((len(seen.photo_ids), len(seen.point_ids)), bool)
+    shown[seen.photo, seen.point] = True
+    first, middle, last = (seen.photo_index[photo] for photo in names[1:4])
+    on_three = shown[first] & shown[middle] & shown[last]
+    kept = ~(on_three[seen.point] & (seen.photo == middle))
+    columns = {name: getattr(seen, name)[kept] for name in ("photo", "point", "xy", "sigma")}
+    result = adjusted(simulation, replace(inputs_of(simulation), observations=replace(seen, **columns)))
+    assert np.abs(errors(simulation, result)).max() < MICROMETRE
+    assert any(note.code == "not-formed" for note in result.notes)
+
+
 def test_single_photos_with_three_known_points_each_are_refused_with_a_way_out() -> None:
     simulation = simulate(exact(flight=Flight(photos=6), control=replace(MANY, bands=2)))
     with pytest.raises(GeometryError, match=r"3 known points .*; list photos that overlap as one strip"):
