@@ -119,6 +119,22 @@ def accuracy(strips: int) -> None:
             print(f"| {models} | {adjustment} | {cells} | {ratio} |")
 
 
+def control_bands(strips: int) -> None:
+    """Print errors of the network over those of polynomials at the check points of 24 models, by bands of control."""
+    print("| bands | east | north | height |")
+    print("|---|---|---|---|")
+    for bands in (3, 5, 9):
+        off: dict[str, list[Floats]] = {"bundle": [], "polynomial": []}
+        for seed in range(101, 101 + strips):
+            spec = Spec(seed=seed, flight=Flight(photos=25), control=Control(bands=bands), models=Models())
+            given = inputs_of(simulate(spec))
+            for adjustment, differences in off.items():
+                result = triangulate(given, Settings(adjustment=adjustment, precision=False))
+                differences.append(result.control_differences[given.control.check])
+        network, polynomial = (np.sqrt(np.nanmean(np.concatenate(each) ** 2, axis=0)) for each in off.values())
+        print(f"| {bands} | " + " | ".join(f"{ratio:.2f}" for ratio in network / polynomial) + " |")
+
+
 def precision(repetitions: int) -> None:
     """Print the scatter of repeated measurements over the standard deviations that are stated."""
     print("| models | points, mean (least to largest) | centers, mean (least to largest) |")
@@ -192,6 +208,8 @@ def main() -> None:
     options = parser.parse_args()
     print(f"Errors of new and check points, µm at photo scale, {options.strips} strips\n")
     accuracy(options.strips)
+    print(f"\nNetwork over polynomials at check points, {options.strips} strips of 24 models from plotters\n")
+    control_bands(options.strips)
     print(f"\nScatter of {options.repetitions} repetitions over the standard deviations stated\n")
     precision(options.repetitions)
     print(f"\nGross errors in links, {5 * options.strips} strips of 8 models\n")

@@ -100,6 +100,7 @@ def test_independent_models_prints_three_tables() -> None:
     out = printed("independent_models.py", "--strips", "1", "--repetitions", "3")
     errors = r"^\| (?:6|12|20) \| (?:polynomial|bundle) \|(?: \d+\.\d / \d+\.\d \|){3}"
     assert len(re.findall(errors, out, re.MULTILINE)) == 6
+    assert len(re.findall(r"^\| [359] \|(?: \d\.\d\d \|){3}$", out, re.MULTILINE)) == 3
     assert len(re.findall(r"^\| [38] \|(?: \d\.\d+ \(.*?\) \|){2}$", out, re.MULTILINE)) == 2
     assert re.search(r"^\| 1000 \| 100 % \| 100 % \|", out, re.MULTILINE)
 

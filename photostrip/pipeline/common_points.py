@@ -110,8 +110,15 @@ def _joined(strips: Sequence[StripResult], point_ids: Sequence[str], output: Gro
     rays = np.zeros(len(number), np.intp)
     for strip in strips:
         rays[np.searchsorted(number, strip.formed.point)] += strip.rays
-    ids = [point_ids[n] for n in number]
-    return Adjusted(number=number, cartesian=xyz, ground=output.ground_from_cartesian(xyz, ids=ids), rays=rays)
+    return in_output(number, xyz, rays, point_ids, output)
+
+
+def in_output(
+    number: Numbers, cartesian: Floats, rays: Numbers, point_ids: Sequence[str], output: GroundFrame
+) -> Adjusted:
+    """Give adjusted points their coordinates in the output frame; number (n,) counts in ``point_ids``."""
+    ground = output.ground_from_cartesian(cartesian, ids=[point_ids[n] for n in number])
+    return Adjusted(number=number, cartesian=cartesian, ground=ground, rays=rays)
 
 
 def _ties(strips: Sequence[StripResult], output: GroundFrame) -> Ties:

@@ -11,6 +11,7 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.notes import Note
 from photostrip.pipeline.block.adjust import adjust_block
+from photostrip.pipeline.block.datum import FormedStrips
 from photostrip.pipeline.common_points import join_photos, join_strips
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
@@ -22,13 +23,10 @@ from photostrip.pipeline.refusals import require_runnable, require_whole
 from photostrip.pipeline.results import AdjustedStrips, Result
 from photostrip.pipeline.strips.adjusting import adjust_formed, adjust_photos
 from photostrip.pipeline.strips.forming import as_single_photos, form_strips
-from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.pipeline.strips.photos_on_control import on_control
 from photostrip.pipeline.unchecked_control import unchecked_control_notes
 from photostrip.points import PhotoPoints
-
-Formed = list[FormedPhotos] | list[LinkedModels]
 
 
 def triangulate(
@@ -172,7 +170,7 @@ def _adjusted(
     settings: Settings,
     ground: GroundFrames,
     observations: PhotoPoints,
-    formed: Formed,
+    formed: FormedStrips,
     whole: Result | None,
 ) -> AdjustedStrips:
     """Bring formed strips to the ground and adjust them, all in one network or each by itself."""

@@ -30,7 +30,7 @@ KINDS: dict[str, Kind] = {
     "P109": Kind("image coordinates of one photo shifted", WARNING),
     "P110": Kind("lens distortion that is not stated", WARNING),
     "P111": Kind("another principal point fits better", WARNING),
-    "P112": Kind("film longer or shorter one way than the other", WARNING),
+    "P112": Kind("images longer or shorter one way than the other", WARNING),
     "P201": Kind("photos out of flight order", ERROR),
     "P202": Kind("neighbouring photos that do not overlap", ERROR),
     "P203": Kind("the same photo twice", ERROR),

@@ -10,6 +10,7 @@ from photostrip.arrays import Numbers
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network import self_calibration
 from photostrip.pipeline.block import block_notes
+from photostrip.pipeline.common_points import in_output
 from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, Bundle, Precision, StripResult, Ties
 from photostrip.points import PhotoPoints
@@ -24,9 +25,7 @@ def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFra
     rays = np.bincount(observations.point[used], minlength=len(observations.point_ids))
     number = np.flatnonzero(rays)
     cartesian = solution.points[number] + block.origin
-    ids = [observations.point_ids[n] for n in number]
-    ground = output.ground_from_cartesian(cartesian, ids=ids)
-    points = Adjusted(number=number, cartesian=cartesian, ground=ground, rays=rays[number])
+    points = in_output(number, cartesian, rays[number], observations.point_ids, output)
     calibrated = _calibrated(observations, bundle)
     count = [len(strip.photos) for strip in inputs.strips]
     first = np.cumsum([0, *count])

@@ -22,7 +22,7 @@ from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
 from photostrip.strip import absolute_orientation
 
-Stages = Sequence[FormedPhotos] | Sequence[LinkedModels]
+FormedStrips = Sequence[FormedPhotos] | Sequence[LinkedModels]
 
 LEAST_TIES = 3
 ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line
@@ -95,7 +95,7 @@ class JoinedStrips:
     points: Floats
 
 
-def join_waiting(stages: Stages, waiting: Sequence[int], count: int) -> JoinedStrips:
+def join_waiting(stages: FormedStrips, waiting: Sequence[int], count: int) -> JoinedStrips:
     """Join the strip with the most points to all that share points with it, and so on."""
     first = max(waiting, key=lambda number: (len(stages[number].formed.point), -number))
     identity = Similarity(1.0, np.eye(3), np.zeros(3))
@@ -122,7 +122,7 @@ def join_waiting(stages: Stages, waiting: Sequence[int], count: int) -> JoinedSt
 
 
 def datum(
-    stages: Stages, group: JoinedStrips, observations: PhotoPoints, known: Known, *, alone: bool
+    stages: FormedStrips, group: JoinedStrips, observations: PhotoPoints, known: Known, *, alone: bool
 ) -> tuple[Similarity, bool]:
     """Similarity from the frame of a block to the Cartesian frame; True with it when nothing gave it."""
     names = tuple(photo for number in group.members for photo in stages[number].strip.photos)
@@ -199,7 +199,7 @@ def _levelled(strip: Floats, targets: absolute_orientation.Targets, level: Level
     return found
 
 
-def _oriented(stages: Stages, group: JoinedStrips) -> tuple[Floats, Floats]:
+def _oriented(stages: FormedStrips, group: JoinedStrips) -> tuple[Floats, Floats]:
     """Centres and rotations of all photos, in the frame of the block; models have no rotations but stand upright."""
     centers, rotations = [], []
     for number in group.members:
@@ -212,7 +212,7 @@ def _oriented(stages: Stages, group: JoinedStrips) -> tuple[Floats, Floats]:
 
 
 def _with_cameras(
-    stages: Stages,
+    stages: FormedStrips,
     group: JoinedStrips,
     on_ground: tuple[Floats, ControlPoints],
     cameras: ControlPoints,
@@ -246,7 +246,7 @@ def _with_cameras(
     return found
 
 
-def _of_its_own(stages: Stages, group: JoinedStrips) -> Similarity:
+def _of_its_own(stages: FormedStrips, group: JoinedStrips) -> Similarity:
     """Frame and scale of a block that nothing ties to the ground: X along the first strip, Z against the view."""
     centers, rotations = _oriented(stages, group)
     first, last = stages[group.members[0]].formed.ends

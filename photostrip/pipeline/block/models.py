@@ -18,12 +18,11 @@ from photostrip.network.problem import BundleCameras, BundleProblem, ModelObserv
 from photostrip.network.selection import Selection
 from photostrip.pipeline.block import block_notes
 from photostrip.pipeline.block.problem import control_begun, control_observations
-from photostrip.pipeline.common_points import mean_points
+from photostrip.pipeline.common_points import in_output, mean_points
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import MeasuredModels, Settings
 from photostrip.pipeline.overruling import rows_of_models
 from photostrip.pipeline.results import (
-    Adjusted,
     AdjustedStrips,
     BlockProblem,
     BlockStart,
@@ -164,18 +163,12 @@ def adjusted_strips(
     held[measured.node[used]] = True
     number = np.flatnonzero(held[:count])
     cartesian = solution.points + block.origin
-    ids = [observations.point_ids[n] for n in number]
     covariances = screened.precision.points * bundle.unit**2
     shown = _photos_of_points(models, used, count)
-    points = Adjusted(
-        number=number,
-        cartesian=cartesian[number],
-        ground=output.ground_from_cartesian(cartesian[number], ids=ids),
-        rays=shown[number],
-    )
+    points = in_output(number, cartesian[number], shown[number], observations.point_ids, output)
     strips = tuple(_strip(strip, models, bundle, used, cartesian, held) for strip in bundle.start.strips)
-    sigma, unit = float(np.sqrt(np.median(measured.sigma**2))) * bundle.unit, bundle.unit
-    basis = "a-priori" if unit == 1.0 else "a-posteriori"
+    sigma = float(np.median(measured.sigma)) * bundle.unit
+    basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"
     precision = Precision(
         points=covariances[number],
         photos=tuple(_of_centers(strip, held, covariances) for strip in strips),

@@ -22,9 +22,9 @@ from photostrip.pipeline.block import models
 from photostrip.pipeline.block.datum import (
     LEAST_TIES,
     ON_A_LINE,
+    FormedStrips,
     JoinedStrips,
     Known,
-    Stages,
     datum,
     join_waiting,
 )
@@ -49,7 +49,7 @@ MOST_TIES = 60  # points that hand the frame of a block to one of its strips
 def start(
     inputs: Inputs,
     settings: Settings,
-    stages: Stages,
+    stages: FormedStrips,
     observations: PhotoPoints,
     known: Known,
 ) -> BlockStart:
@@ -102,7 +102,7 @@ class _Block:
             found[strip.formed.point] = strip.cartesian
         return found
 
-    def tie(self, stages: Stages, waiting: Sequence[int]) -> list[int]:
+    def tie(self, stages: FormedStrips, waiting: Sequence[int]) -> list[int]:
         """Tie strips to those on the ground, the best tied first; give those that are left."""
         left = list(waiting)
         while left and self.done:
@@ -148,7 +148,7 @@ class _Block:
         control = concatenated([others, of_ties])
         return adjust_formed(stage, control, (*known.frames, known.output), self.tied)
 
-    def place(self, stages: Stages, group: JoinedStrips) -> bool:
+    def place(self, stages: FormedStrips, group: JoinedStrips) -> bool:
         """Bring a block of strips to the ground; True when nothing was known and its own frame was taken."""
         similarity, free = datum(stages, group, self.observations, self.known, alone=not self.done)
         for number in group.members:

@@ -120,12 +120,13 @@ def _film(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
     # b1 is what x must be stretched by: the film is shorter along x by as much
     percent, sigma, turned = -100.0 * affinity.value, 100.0 * affinity.sigma, float(np.degrees(shear.value))
     message = (
-        f"photos of camera {affinity.camera} agree with each other and with what is given where the film is "
+        f"photos of camera {affinity.camera} agree with each other and with what is given where the images are "
         f"{abs(percent):.3f} % (standard deviation {sigma:.3f} %) {'longer' if percent > 0 else 'shorter'} along x "
         f"than along y, its axes {abs(turned):.3f}° from a right angle. {CONTINUED}"
     )
     fix = (
-        "measure the fiducial marks of the photos, or scan or print them anew along both axes; "
+        "where film shrank or was scanned, measure the fiducial marks; of a digital camera, look at both sides of a "
+        "pixel; "
         f"{_decision(['affinity', 'shear'])}"
     )
     numbers: Evidence = {"x_over_y_percent": percent, "standard_deviation_percent": sigma, "shear_deg": turned}

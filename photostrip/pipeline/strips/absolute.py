@@ -5,7 +5,7 @@ Source: [001] eq. 142-149.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -16,12 +16,14 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
+from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.inputs import ModelStrip, Strip
 from photostrip.points import ControlPoints
 from photostrip.strip import absolute_orientation
 from photostrip.strip.error_propagation import control_errors
 from photostrip.strip.error_propagation.control_errors import Misclosures
+from photostrip.strip.error_propagation.strip_at_control import ControlRay, StripAtControl
 from photostrip.strip.strip_formation.strip import FormedStrip
 
 if TYPE_CHECKING:
@@ -77,6 +79,29 @@ class OrientedStrip:
         """Control coordinates that count."""
         turned = self.targets.turned(self.at_control)
         return control_errors.misclosures(turned, self.control_rows, self.absolute.axes)
+
+
+def strip_at_control(
+    oriented: OrientedStrip, rays: Sequence[ControlRay], covariance: Callable[[Numbers], Floats]
+) -> StripAtControl:
+    """Put together what wrong control is searched with.
+
+    rays: rays of control points that stand on two photos; models have none.
+    covariance: gives that of some misclosures (w,), strip and control together, metres^2, but for a similarity.
+    """
+    coordinates = oriented.misclosures
+    moved = similarity_derivatives(oriented.at_control[coordinates.point], oriented.at_control.mean(axis=0))
+    return StripAtControl(
+        targets=oriented.targets,
+        xyz=oriented.formed.xyz[oriented.control_rows],
+        similarity=oriented.absolute.similarity,
+        weight=oriented.weights,
+        rays=rays,
+        coordinates=coordinates,
+        design=np.einsum("wi,wij->wj", coordinates.direction, moved),
+        covariance=covariance,
+        share=1.0,
+    )
 
 
 def control_of(

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.geometry.similarity import Similarity, similarity_derivatives
+from photostrip.geometry.similarity import Similarity
 from photostrip.network.cofactors import joint_cofactors
 from photostrip.network.problem import BundleCameras, BundleProblem, ModelObservations, StartValues
 from photostrip.network.solution import BundleSolution
@@ -21,11 +21,10 @@ from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
 from photostrip.pipeline.overruling import rows_of_models
 from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes
-from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, to_ground
+from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, strip_at_control, to_ground
 from photostrip.pipeline.strips.model_notes import link_notes
 from photostrip.points import ControlPoints, ModelPoints, locate, take_rows
 from photostrip.strip import absolute_orientation
-from photostrip.strip.error_propagation.strip_at_control import StripAtControl
 from photostrip.strip.gross_errors.control import control_screening
 from photostrip.strip.independent_models import link_screening, linking, perspective_centers
 from photostrip.strip.independent_models.formation import FormedModels, form_from_models, require_links
@@ -105,21 +104,7 @@ def on_control(
     if settings.links.screening == "none":
         return ScreenedModels(models, control_screening.not_screened(models.oriented.control))
     oriented = models.oriented
-    found = oriented.misclosures
-    moved = similarity_derivatives(oriented.at_control[found.point], oriented.at_control.mean(axis=0))
-    screened = control_screening.screen_control(
-        StripAtControl(
-            targets=oriented.targets,
-            xyz=linked.formed.xyz[oriented.control_rows],
-            similarity=oriented.absolute.similarity,
-            weight=oriented.weights,
-            rays=(),
-            coordinates=found,
-            design=np.einsum("wi,wij->wj", found.direction, moved),
-            covariance=models.misclosure_covariance,
-            share=1.0,
-        )
-    )
+    screened = control_screening.screen_control(strip_at_control(oriented, (), models.misclosure_covariance))
     if screened.rejections:
         models = orient_on_control(linked, screened.kept, frames, settings.absolute)
     return ScreenedModels(models, screened)

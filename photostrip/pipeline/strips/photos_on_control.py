@@ -14,19 +14,18 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers, pieces
 from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import Settings
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
-from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, to_ground
+from photostrip.pipeline.strips.absolute import OrientedStrip, control_of, strip_at_control, to_ground
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
 from photostrip.points import ControlPoints
 from photostrip.strip import absolute_orientation
 from photostrip.strip.error_propagation import control_errors, strip_errors
 from photostrip.strip.error_propagation.control_errors import FitOperator
-from photostrip.strip.error_propagation.strip_at_control import ControlRay, StripAtControl
+from photostrip.strip.error_propagation.strip_at_control import ControlRay
 from photostrip.strip.error_propagation.strip_errors import StripErrors
 from photostrip.strip.gross_errors.control import control_screening
 from photostrip.strip.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
@@ -135,19 +134,7 @@ def reject_wrong_control(photos: OrientedPhotos) -> ScreenedPhotos:
     A point with a wrong image leaves the strip; what is left is tested again.
     """
     stage, oriented, control = photos.stage, photos.oriented, photos.oriented.control
-    found = oriented.misclosures
-    moved = similarity_derivatives(oriented.at_control[found.point], oriented.at_control.mean(axis=0))
-    place = StripAtControl(
-        targets=oriented.targets,
-        xyz=stage.formed.xyz[oriented.control_rows],
-        similarity=oriented.absolute.similarity,
-        weight=oriented.weights,
-        rays=photos.control_rays(),
-        coordinates=found,
-        design=np.einsum("wi,wij->wj", found.direction, moved),
-        covariance=photos.misclosure_covariance(),
-        share=1.0,
-    )
+    place = strip_at_control(oriented, photos.control_rays(), photos.misclosure_covariance())
     if shared := find_shared(place):  # single points prove nothing then
         return ScreenedPhotos(photos, control_screening.not_screened(control), shared)
     screened = control_screening.screen_control(place)
