@@ -212,6 +212,22 @@ def _roots(normal: Floats) -> tuple[Floats, Floats]:
     return root, strength
 
 
+class Columns(NamedTuple):
+    """What each of k causes of size one puts into the observations, in units of their standard deviations."""
+
+    rays: csr_array  # (c n, k)
+    control: Floats  # (c, 3, k): along its axes
+    positions: Floats  # (g, 3, k): along theirs
+
+
+class Explained(NamedTuple):
+    """Normal equations of causes beside all unknowns: with H their columns, w the misfits, M = I - A Q A'."""
+
+    pull: Floats  # (k,): H' M w
+    normal: Floats  # (k, k): H' M H
+    squares: Floats  # (k,): H' H of each column
+
+
 class Solved(NamedTuple):
     """N^-1 times right-hand sides of k columns."""
 
@@ -277,6 +293,33 @@ class FactoredEquations:
         alone = self.by_photos(photos)
         by_common = self.common @ (common - self.equations.border.T @ alone)
         return alone - self.cross @ by_common, by_common
+
+    def explained(self, columns: Columns) -> Explained:
+        """Say what the misfits would lose by causes that nothing has been asked about."""
+        equations, at = self.equations, self.equations.linearised
+        problem, k, p = equations.prepared.problem, columns.rays.shape[1], len(equations.right_common)
+        m, q = problem.photos, problem.points
+        photos = (_blocks(at.rays.by_photo, problem.images.photo, m).T @ columns.rays).toarray()
+        points = (_blocks(at.rays.by_point, problem.images.point, q).T @ columns.rays).toarray()
+        np.add.at(points.reshape(q, 3, k), problem.control.point, at.by_controlled.swapaxes(1, 2) @ columns.control)
+        by_calibration = at.rays.by_common
+        common = np.zeros((p, k))
+        common[: by_calibration.shape[1]] = (by_calibration.T @ columns.rays).toarray()
+        squares = (columns.rays.T @ columns.rays).toarray() + np.einsum("nik,nil->kl", columns.control, columns.control)
+        pull = columns.rays.T @ at.rays.misfit.ravel() + np.einsum("nik,ni->k", columns.control, at.control)
+        if len(at.positions.photo):
+            by_photo, by_common, off = at.positions.scaled()
+            np.add.at(photos.reshape(m, -1, k), at.positions.photo, by_photo.swapaxes(1, 2) @ columns.positions)
+            common += np.einsum("nip,nik->pk", by_common, columns.positions)
+            squares += np.einsum("nik,nil->kl", columns.positions, columns.positions)
+            pull += np.einsum("nik,ni->k", columns.positions, off)
+        white = equations.roots @ points
+        photos, common = photos - equations.carried @ white, common - equations.common_points.T @ white
+        by_photos, by_common = self.shared(photos, common)
+        normal = squares - white.T @ white - photos.T @ by_photos - common.T @ by_common
+        pull = pull - white.T @ equations.right_points - by_photos.T @ equations.right_photos
+        pull = pull - by_common.T @ equations.right_common
+        return Explained(pull, 0.5 * (normal + normal.T), np.diag(squares))
 
     def solved_for_points(self, right: Floats) -> Solved:
         """Solve for right-hand sides (3 q, k) of the points alone."""

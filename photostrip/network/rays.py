@@ -116,6 +116,18 @@ def whitening(measured: ImageObservations | ModelObservations) -> Floats:
     return white
 
 
+def by_calibration(problem: BundleProblem, asked: Calibrated, known: Calibrated, state: Parameters) -> csr_array:
+    """Differentiate computed minus corrected image coordinates by calibration parameters that are asked about.
+
+    known: the parameters that are unknowns at the state. Returns (2 n, c), in units of sigma.
+    """
+    images = problem.images
+    back = np.swapaxes(state.rotations, 1, 2)[images.photo]
+    arm = np.einsum("nij,nj->ni", back, state.points[images.point] - state.centers[images.photo])
+    values = values_of(problem.cameras, state.common[: len(known)])
+    return _by_calibration(problem, asked, values, -arm[:, :2] / arm[:, 2:], 1.0 / images.sigma)
+
+
 def _by_calibration(
     problem: BundleProblem, calibrated: Calibrated, values: Floats, ratio: Floats, weight: Floats
 ) -> csr_array:

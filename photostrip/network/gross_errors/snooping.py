@@ -17,19 +17,13 @@ import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError
-from photostrip.network import camera_errors, defects, reliability, robust
+from photostrip.network import defects, hypotheses, reliability, robust
 from photostrip.network.cofactors import JointCofactors, cofactors_of
-from photostrip.network.common_errors import (
-    OF_CAMERAS,
-    CommonError,
-    find_common_error,
-    given_up,
-    taken_up,
-)
 from photostrip.network.datum import is_free
 from photostrip.network.gross_errors.point_decisions import cause_of_all
 from photostrip.network.gross_errors.ray_decisions import Adjusted, RayDecisions, decide_rays
 from photostrip.network.gross_errors.ray_log import ROBUST, START, RayLog, WrongRays
+from photostrip.network.hypotheses import OF_CAMERAS, Hypothesis, Likely
 from photostrip.network.problem import BundleProblem
 from photostrip.network.reliability import CONTROL, IMAGE, Limit
 from photostrip.network.selection import Selection, restarted, selected, supported
@@ -56,7 +50,7 @@ class ScreenedBundle:
     limit: Limit  # what its residuals are tested against
     rejections: tuple[Rejection, ...] = ()  # what was taken out, in order; re-admitted ones are marked
     rounds: int = 1
-    common: tuple[CommonError, ...] = ()  # what groups of observations share, taken up as unknowns
+    common: tuple[Hypothesis, ...] = ()  # what groups of observations share, taken up as unknowns
     held: tuple[Rejection, ...] = ()  # given coordinates beyond the limit that stay: without them the adjustment fails
 
     @classmethod
@@ -138,10 +132,10 @@ class _Search:
         self.decided = Selection.everything(problem)  # what took part when rays outside were decided on
         self.beyond = np.full(problem.points, np.inf)  # test values of points with a ray outside, when decided on
         self.rounds = self.failed = 0
-        self.common: list[CommonError] = []
-        self.next_trial = 0  # given coordinates that are out when a common error, tried in vain, is tried again
-        # observations that are out when errors of cameras, asked for in vain, are asked for again
-        self.next_question = float("inf") if rough or not settings.search_cameras else 0
+        self.common: list[Hypothesis] = []
+        self.refused: list[
+            Hypothesis
+        ] = []  # without which nothing would hold the photos, or that mean nothing in the end
 
     def rays_of(self, points: Numbers, among: Flags | None = None) -> Numbers:
         """Rows of all rays of points, or of those `among` them (n,), by point, then photo."""
@@ -174,32 +168,27 @@ class _Search:
         return supported(self.problem, replace(selection, images=images))
 
     def clean(self, selection: Selection) -> ScreenedBundle:
-        """Test and take out until nothing is beyond the limit."""
+        """Test, and take up or take out what explains most, until nothing is beyond the limit."""
         done = self.adjust(selection)
         while True:
             worst = self._worst(done)
-            if self._take_up_camera(done, worst):
-                done = self.adjust(supported(self.problem, done.selection))
-                continue
-            if isinstance(worst, WrongRays) and len(worst):
-                done = self._without_rays(done, worst)
-                continue
-            given = [] if isinstance(worst, WrongRays) else worst
-            if not given and not reliability.sigma0_test(done.solution).too_large:
+            if not len(worst) and not reliability.sigma0_test(done.solution).too_large:
                 return done
-            if self._take_up_common(done, *given[:1]):
-                done = self.adjust(supported(self.problem, done.selection))
-                continue
-            if not given:
+            found = self._with_likeliest(done, worst)
+            if found is None and not len(worst):
                 return done
-            done = self._without_given(done, given)
+            if found is None and isinstance(worst, WrongRays):
+                found = self._without_rays(done, worst)
+            elif found is None:
+                found = self._without_given(done, worst)
+            done = found
 
     def with_doubted_control(self, selection: Selection) -> Selection:
-        """Put in what the strips by themselves left out of the control, where an error of a camera explains it better.
+        """Put in what the strips by themselves left out of the control, where a hypothesis explains it better.
 
         Their search knows nothing of cameras: of a lens that is not as stated it throws out sound control.
         """
-        if self.next_question or not self.waiting.any():
+        if self.rough or not self.waiting.any():
             return selection
         before = self.problem
         everything = Selection.everything(before).control
@@ -211,62 +200,79 @@ class _Search:
         except GeometryError:
             self.problem = before
             return selection
-        unit = done.limit.unit
-        fall = max(done.solution.chi_square - without.solution.chi_square, 0.0) / unit**2
-        doubted = camera_errors.log_probability(fall, int(self.waiting.sum()))
-        likely = camera_errors.most_likely(done.problem, done.solution, unit)
-        if likely is None or likely.log_p > min(doubted, self._level_of_common()):
+        fall = max(done.solution.chi_square - without.solution.chi_square, 0.0) / done.limit.unit**2
+        doubted = hypotheses.log_probability(fall, int(self.waiting.sum()))
+        likely = self._likeliest(done, doubted)
+        if not likely:
             self.problem = before
             return selection
-        self._take_up(likely.error)
+        self._take_up(hypotheses.most_likely(likely, self.settings.level).hypothesis)
         self.waiting[:], self.control = False, everything
         self.began = {key: each for key, each in self.began.items() if key[0] != CONTROL}
         return supported(self.problem, done.selection)
 
-    def _level_of_common(self) -> float:
+    @property
+    def _level(self) -> float:
         """Logarithm of the level at which anything but single observations is taken up: half of that of all tests."""
         return float(np.log(self.settings.level / 2))
 
-    def _take_up(self, error: CommonError) -> None:
-        self.common.append(error)
-        self.problem = taken_up(self.problem, error)
+    def _likeliest(self, done: ScreenedBundle, bound: float) -> list[Likely]:
+        """Hypotheses that are likelier than a bound, one of each kind, and than the level."""
+        asked = self.settings.search_cameras and not self.rough
+        unit, level = done.limit.unit, self.settings.level
+        found = hypotheses.likeliest(done.solution, unit, level, cameras=asked, refused=self.refused)
+        return [each for each in found if each.log_p <= min(bound, self._level)]
 
-    def _take_up_camera(self, done: ScreenedBundle, worst: list[Rejection] | WrongRays) -> bool:
-        """Take up an error of a camera where it explains more, by its probability, than the worst observation."""
-        out = int((~done.selection.images).sum()) + self._given_out()
+    def _take_up(self, hypothesis: Hypothesis) -> None:
+        self.common.append(hypothesis)
+        self.problem = hypotheses.taken_up(self.problem, hypothesis)
+
+    def _with_likeliest(self, done: ScreenedBundle, worst: list[Rejection] | WrongRays) -> ScreenedBundle | None:
+        """Take up the hypothesis that explains more, by its probability, than the worst observation; None: none does.
+
+        Those that explain it nearly alike are adjusted with: what contradicts the rest by a hundred standard deviations
+        bends the network further than it can be linearised.
+        """
         value = float(worst.value.max(initial=0.0)) if isinstance(worst, WrongRays) else worst[0].value
-        if out < self.next_question or not (value or reliability.sigma0_test(done.solution).too_large):
-            return False
-        likely = camera_errors.most_likely(done.problem, done.solution, done.limit.unit)
-        of_worst = camera_errors.log_probability_of_worst(value, done.solution.redundancy)
-        if likely is None or likely.log_p > min(of_worst, self._level_of_common()):
-            self.next_question = 2 * out + 1
-            return False
-        self._take_up(likely.error)
-        return True
+        of_worst = hypotheses.log_probability_of_worst(value, done.solution.redundancy)
+        before, solution, tried = self.problem, done.solution, {}
+        for each in self._likeliest(done, of_worst):
+            self.problem = hypotheses.taken_up(before, each.hypothesis)
+            try:
+                found = self.adjust(supported(self.problem, done.selection))
+            except GeometryError:  # what is left would not hold the photos
+                self.refused.append(each.hypothesis)
+                continue
+            tried[each.hypothesis.name] = each.hypothesis, found, self.problem
+        self.problem = before
+        if not tried:
+            return None
+        # what is wrong makes sigma0 large: the hypotheses are compared by what it becomes
+        unit = max(min(found.solution.sigma0 for _, found, _ in tried.values()), 1.0)
+        adjusted = [
+            Likely.of(
+                hypothesis,
+                (solution.chi_square - found.solution.chi_square) / unit**2,
+                solution.redundancy - found.solution.redundancy,
+                1,
+            )
+            for hypothesis, found, _ in tried.values()
+        ]
+        likely = hypotheses.most_likely(adjusted, self.settings.level)
+        _, found, self.problem = tried[likely.hypothesis.name]
+        self.common.append(likely.hypothesis)
+        return found
 
     def put_back(self, done: ScreenedBundle) -> bool:
         """Give up errors of cameras that mean nothing in the end; whether there were any."""
         errors = [each for each in self.common if each.kind in OF_CAMERAS]
-        unit = done.limit.unit
-        found = camera_errors.log_probabilities(done.problem, done.solution, done.precision, unit, errors)
-        gone = [each for each, log_p in zip(errors, found, strict=True) if log_p > self._level_of_common()]
+        found = hypotheses.log_probabilities(done.problem, done.solution, done.precision, done.limit.unit, errors)
+        gone = [each for each, log_p in zip(errors, found, strict=True) if log_p > self._level]
         for each in gone:
             self.common.remove(each)
-            self.problem = given_up(self.problem, each)
-        self.next_question = float("inf")
+            self.problem = hypotheses.given_up(self.problem, each)
+            self.refused.append(each)
         return bool(gone)
-
-    def _take_up_common(self, done: ScreenedBundle, worst: Rejection | None = None) -> bool:
-        """Take up what a group of observations shares, where that explains more than the worst given coordinate."""
-        if worst and self._given_out() < self.next_trial:
-            return False
-        found = find_common_error(self.problem, done.selection, done.solution, done.limit, worst)
-        if found is None:
-            self.next_trial = 2 * self._given_out() + 1
-            return False
-        self._take_up(found)
-        return True
 
     def _without_rays(self, done: ScreenedBundle, worst: WrongRays) -> ScreenedBundle:
         """Take rays out; points without which nothing would hold some photos stay, whatever the tests say."""

@@ -12,10 +12,10 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.network import defects, reliability, self_calibration, variance_components
 from photostrip.network.cofactors import cofactors_of as precision_of
-from photostrip.network.common_errors import taken_up
 from photostrip.network.correlations import Correlation, correlations
 from photostrip.network.gross_errors import snooping
 from photostrip.network.gross_errors.snooping import ScreenedBundle
+from photostrip.network.hypotheses import taken_up
 from photostrip.network.selection import Selection, restarted, selected, supported
 from photostrip.network.solution import BundleSolution, Cofactors
 from photostrip.network.solve import solve

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from photostrip.network import defects, reliability
-from photostrip.network.common_errors import OF_CAMERAS
+from photostrip.network.hypotheses import OF_CAMERAS
 from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import CALIBRATION
 from photostrip.notes import Note

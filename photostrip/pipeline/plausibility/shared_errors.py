@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.network.common_errors import (
+from photostrip.network.given_orientations import drift_columns
+from photostrip.network.hypotheses import (
     ALL,
     DISTANCE,
     DRIFT,
@@ -17,9 +18,8 @@ from photostrip.network.common_errors import (
     OFFSET,
     POINT,
     SHOWN_SIGMAS,
-    CommonError,
+    Hypothesis,
 )
-from photostrip.network.given_orientations import drift_columns
 from photostrip.network.reliability import CONTROL
 from photostrip.network.self_calibration import Parameter
 from photostrip.notes import Finding
@@ -49,11 +49,11 @@ def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
         yield from _positions(bundle, inputs, of_positions[-1])
 
 
-def _list(error: CommonError, inputs: Inputs) -> Finding:
+def _list(error: Hypothesis, inputs: Inputs) -> Finding:
     shift = ShiftedList(error.number, np.array(error.shift), np.array(error.sigma), gain=float("nan"))
     control = inputs.control.take(~inputs.control.check)
     strips = [each.id for each in inputs.strips]
-    then = "; whether it or the others are wrong cannot be told" if error.rival == LIST else ""
+    then = "; whether it or the others are wrong cannot be told" if LIST in error.rivals else ""
     return shifted_list(shift, control, "the block", strips, then)
 
 
@@ -82,13 +82,13 @@ def _decision(names: Sequence[str]) -> str:
     )
 
 
-def _parameters(error: CommonError, bundle: Bundle, asked: str) -> list[Parameter]:
+def _parameters(error: Hypothesis, bundle: Bundle, asked: str) -> list[Parameter]:
     """Return what was estimated of the camera that an error is of."""
     camera = bundle.screened.problem.camera_ids[error.number]
     return [each for each in bundle.parameters if each.camera == camera and each.name.startswith(asked)]
 
 
-def _lens(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
+def _lens(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     (k1,) = _parameters(error, bundle, "k1")
     images = bundle.screened.problem.images
     radius = float(np.hypot(*images.xy.T).max())
@@ -103,7 +103,7 @@ def _lens(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
     return found("P110", message, fix, numbers, strips=_strips_of(k1.camera, inputs), key="processing.self_calibration")
 
 
-def _point(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
+def _point(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     x, y = _parameters(error, bundle, "principal_point")
     message = (
         f"photos of camera {x.camera} agree with each other and with what is given at a principal point that lies "
@@ -115,7 +115,7 @@ def _point(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
     return found("P111", message, fix, numbers, strips=_strips_of(x.camera, inputs), key="processing.self_calibration")
 
 
-def _film(error: CommonError, bundle: Bundle, inputs: Inputs) -> Finding:
+def _film(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     (affinity,), (shear,) = (_parameters(error, bundle, name) for name in ("affinity", "shear"))
     # b1 is what x must be stretched by: the film is shorter along x by as much
     percent, sigma, turned = -100.0 * affinity.value, 100.0 * affinity.sigma, float(np.degrees(shear.value))
@@ -138,7 +138,7 @@ def _strips_of(camera: str, inputs: Inputs) -> list[str]:
     return [each.id for each in inputs.strips if each.camera.name == camera]
 
 
-def _positions(bundle: Bundle, inputs: Inputs, error: CommonError) -> Iterator[Finding]:
+def _positions(bundle: Bundle, inputs: Inputs, error: Hypothesis) -> Iterator[Finding]:
     problem, solution, precision = bundle.screened.problem, bundle.screened.solution, bundle.screened.precision
     given = problem.positions
     calibrated = len(solution.common) - int((given.offset_sigma > 0).sum() + (given.drift_sigma > 0).sum())
@@ -155,7 +155,7 @@ def _positions(bundle: Bundle, inputs: Inputs, error: CommonError) -> Iterator[F
 
 
 def _finding(
-    bundle: Bundle, inputs: Inputs, error: CommonError, group: int, offset: Floats, drift: Floats | None
+    bundle: Bundle, inputs: Inputs, error: Hypothesis, group: int, offset: Floats, drift: Floats | None
 ) -> Finding:
     problem = bundle.screened.problem
     rows = np.flatnonzero(problem.positions.group == group)
@@ -169,7 +169,7 @@ def _finding(
         evidence |= _numbers("drift", drift, axes)
         correction = "drift"
     message += f"; the adjustment continued as with `correction: {correction}`"
-    if error.rival == DISTANCE:
+    if DISTANCE in error.rivals:
         message += ". A wrong principal distance would explain it nearly as well"
     given = int(np.isfinite(bundle.block.problem.control.sigma).sum())
     rejected = sum(each.kind == CONTROL and not each.readmitted for each in bundle.screened.rejections)

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2, norm
 
 from photostrip.camera import Distortion
-from photostrip.network.camera_errors import log_probability, log_probability_of_worst
+from photostrip.network.hypotheses import log_probability, log_probability_of_worst
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import FILM, Control, Flight, GrossError, Points, Spec, simulate
 from tests.pipeline.blocks import errors

@@ -1,0 +1,298 @@
+"""What may be wrong beside single observations: a table of hypotheses, and what each of them explains.
+
+Photos of a camera share its lens, its film or sensor, its principal point and distance; camera positions share a datum
+and an antenna; a control list is of one survey. Such a cause contradicts good observations one by one, and taken out
+one by one they go. Each hypothesis is a few columns H of the design: with the misfits w of an adjustment and
+M = I - A Q A', the sum of squares would fall by w'H (H'M H)^-1 H'w with it. That fall has a probability, with
+the number of hypotheses counted, and is compared with those of single observations on one rank.
+
+A line of ``HYPOTHESES`` is all that a hypothesis needs here: who may be wrong, and its columns; ``taken_up`` says what
+the adjustment then does. Source: derived, see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array, hstack
+from scipy.special import gammaincc, gammaln, log_ndtr
+
+from photostrip.arrays import Floats, Numbers
+from photostrip.network import datum
+from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, Calibrated
+from photostrip.network.calibration import POINT as PRINCIPAL_POINT
+from photostrip.network.normal_equations import Columns, Explained
+from photostrip.network.problem import BundleProblem
+from photostrip.network.rays import by_calibration
+from photostrip.network.settings import CALIBRATION
+from photostrip.network.solution import BundleSolution, Cofactors
+
+OFFSET, DRIFT, LIST = "offset", "drift", "control list"
+LENS, FILM, POINT, DISTANCE = "lens distortion", "film", "principal point", "principal distance"
+OF_CAMERAS = {
+    LENS: [list(CALIBRATION).index("k1")],
+    FILM: AFFINE,
+    POINT: PRINCIPAL_POINT,
+    DISTANCE: [PRINCIPAL_DISTANCE],
+}
+"""What may be wrong with a camera, with the columns of its parameters."""
+ALL = "all"  # positions of all groups share one error
+EACH = "each"  # those of every group have one of their own
+LEAST_SHARE = 1e-6  # of a column that the other unknowns leave to it, for it to be asked about at all
+SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
+UP_AXIS = 2
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What a group of observations may share beside the truth."""
+
+    kind: str
+    number: int = -1  # of a camera or a control list
+    of: str = EACH  # of positions: ``ALL`` or ``EACH``
+    rivals: tuple[str, ...] = ()  # kinds of others that explain nearly as much
+    # shift, sigma: how a list lies beside everything else, along its axes, metres; NaN where it gives nothing
+    shift: tuple[float, ...] = ()
+    sigma: tuple[float, ...] = ()
+
+    @property
+    def name(self) -> tuple[str, int, str]:
+        return self.kind, self.number, self.of
+
+
+def _offsets(problem: BundleProblem) -> Iterator[Hypothesis]:
+    """Ask whether camera positions all lie elsewhere: those of the whole block, or of each group."""
+    positions = problem.positions
+    if positions.offset_sigma.any() or positions.drift_sigma.any():
+        return
+    groups = len(np.unique(positions.group[positions.group >= 0]))
+    if groups > 1:
+        yield Hypothesis(OFFSET, of=ALL)
+    if groups:
+        yield Hypothesis(OFFSET)
+
+
+def _drifts(problem: BundleProblem) -> Iterator[Hypothesis]:
+    positions = problem.positions
+    if (positions.group >= 0).any() and not positions.drift_sigma.any():
+        yield Hypothesis(DRIFT)
+
+
+def _lists(problem: BundleProblem) -> Iterator[Hypothesis]:
+    """Ask whether a control list lies beside the others, the shortest first."""
+    control = problem.control
+    lists, sizes = np.unique(control.frame[np.isfinite(control.sigma).any(axis=1)], return_counts=True)
+    if len(lists) > 1:
+        yield from (Hypothesis(LIST, number) for number in lists[np.argsort(sizes, kind="stable")].tolist())
+
+
+def _cameras(problem: BundleProblem) -> Iterator[Hypothesis]:
+    """Ask what may be wrong with each camera; of a principal distance photos alone say nothing."""
+    cameras = problem.cameras
+    given = not datum.is_free(problem)
+    for kind, columns in OF_CAMERAS.items():
+        for camera in np.unique(cameras.of_photo).tolist():
+            if (cameras.unknown[camera, columns] < 0).all() and (given or kind != DISTANCE):
+                yield Hypothesis(kind, camera)
+
+
+HYPOTHESES: tuple[Callable[[BundleProblem], Iterator[Hypothesis]], ...] = (_offsets, _drifts, _lists, _cameras)
+"""Who may be wrong. Of hypotheses that explain the same the first is taken up: what is given goes before the camera."""
+
+
+class Likely(NamedTuple):
+    """A hypothesis, and how much it explains."""
+
+    hypothesis: Hypothesis
+    squares: float  # what the sum of squares falls by with it, for a sigma0 of 1
+    freedom: int
+    log_p: float  # logarithm of the probability that any of the hypotheses explains so much by chance
+
+    @classmethod
+    def of(cls, hypothesis: Hypothesis, squares: float, freedom: int, number: int) -> Likely:
+        log_p = min(log_probability(max(squares, 0.0), max(freedom, 1)) + float(np.log(number)), 0.0)
+        return cls(hypothesis, squares, freedom, log_p)
+
+
+def log_probability(squares: float, freedom: int) -> float:
+    """Logarithm of the probability of a larger chi-square; asymptotic where the probability is too small a number."""
+    p = float(gammaincc(freedom / 2, squares / 2))
+    if p > np.finfo(float).tiny:
+        return float(np.log(p))
+    return float(-squares / 2 + (freedom / 2 - 1) * np.log(squares / 2) - gammaln(freedom / 2))
+
+
+def log_probability_of_worst(value: float, tests: int) -> float:
+    """Logarithm of the probability that the largest of so many standardised residuals is so large by chance."""
+    return min(float(np.log(2.0 * max(tests, 1)) + log_ndtr(-value)), 0.0)
+
+
+def likeliest(
+    solution: BundleSolution, unit: float, level: float, *, cameras: bool, refused: Sequence[Hypothesis] = ()
+) -> list[Likely]:
+    """Find what each line of the table has to say of a solution: its likeliest hypothesis.
+
+    unit: standard deviation of unit weight in force.
+    level: as of ``most_likely``.
+    cameras: whether cameras may be asked about.
+    refused: what has been taken up in vain.
+    """
+    problem, in_vain = solution.prepared.problem, {each.name for each in refused}
+    lines = [line for line in HYPOTHESES if line is not _cameras or (cameras and not problem.of_models)]
+    asked = [[each for each in line(problem) if each.name not in in_vain] for line in lines]
+    every = [each for line in asked for each in line]
+    if not every:
+        return []
+    gains = [_gain(solution, *each) for each in zip(every, _explained(solution, every), strict=True)]
+    found = [
+        Likely.of(_with_shift(each, gain, solution), gain.squares / unit**2, len(gain.value), len(every))
+        for each, gain in zip(every, gains, strict=True)
+    ]
+    ends = np.cumsum([len(line) for line in asked])
+    by_line = (found[end - len(line) : end] for line, end in zip(asked, ends.tolist(), strict=True) if line)
+    return [most_likely(line, level) for line in by_line]
+
+
+def most_likely(found: Sequence[Likely], level: float) -> Likely:
+    """Choose the hypothesis that explains most, and name its rivals; of those that explain alike it is the first.
+
+    level: of the test of what one explains beyond another.
+    """
+    most = max(found, key=lambda each: each.squares)
+
+    def alike(each: Likely) -> bool:
+        more = log_probability(max(most.squares - each.squares, 0.0), max(most.freedom - each.freedom, 1))
+        return more > np.log(level)
+
+    first, *others = (each for each in found if alike(each))
+    rivals = tuple(dict.fromkeys((*first.hypothesis.rivals, *(each.hypothesis.kind for each in others))))
+    return first._replace(hypothesis=replace(first.hypothesis, rivals=rivals))
+
+
+class _Gain(NamedTuple):
+    """What one hypothesis explains."""
+
+    squares: float  # what the sum of squares would fall by; 0 where nothing can be told
+    value: Floats  # (k,): the coefficients of its columns
+    sigma: Floats  # (k,): their standard deviations, for a sigma0 of 1
+
+
+def _gain(solution: BundleSolution, hypothesis: Hypothesis, explained: Explained) -> _Gain:
+    """Solve for the coefficients of one hypothesis."""
+    pull, normal, size = explained
+    if not len(pull) or (np.diag(normal) < LEAST_SHARE * size).any():
+        return _Gain(0.0, np.zeros(len(pull)), np.full(len(pull), np.inf))
+    inverse = np.linalg.pinv(normal, rcond=LEAST_SHARE, hermitian=True)
+    value = inverse @ pull
+    squares = float(pull @ value)
+    cameras = solution.prepared.problem.cameras
+    if hypothesis.kind == DISTANCE and cameras.focal[hypothesis.number] + value[0] <= 0.0:
+        squares = 0.0  # heights that count downwards are no lens
+    return _Gain(squares, value, np.sqrt(np.diag(inverse)))
+
+
+def _with_shift(hypothesis: Hypothesis, gain: _Gain, solution: BundleSolution) -> Hypothesis:
+    """Say of a control list how it lies beside everything else."""
+    if hypothesis.kind != LIST:
+        return hypothesis
+    axes = _given_axes(solution.prepared.problem, hypothesis.number)
+    shift, sigma = np.full((2, 3), np.nan)
+    shift[axes], sigma[axes] = gain.value, gain.sigma * max(1.0, solution.sigma0)
+    return replace(hypothesis, shift=tuple(shift.tolist()), sigma=tuple(sigma.tolist()))
+
+
+def _explained(solution: BundleSolution, asked: Sequence[Hypothesis]) -> list[Explained]:
+    """Lay out the normal equations of each hypothesis alone, from one product with the columns of all."""
+    columns = [_columns(solution, each) for each in asked]
+    every = Columns(
+        rays=csr_array(hstack([each.rays for each in columns])),
+        control=np.concatenate([each.control for each in columns], axis=2),
+        positions=np.concatenate([each.positions for each in columns], axis=2),
+    )
+    ends = np.cumsum([each.control.shape[2] for each in columns])
+    found = solution.factored.explained(every)
+    own = [np.arange(end - each.control.shape[2], end) for each, end in zip(columns, ends, strict=True)]
+    return [Explained(found.pull[each], found.normal[np.ix_(each, each)], found.squares[each]) for each in own]
+
+
+def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
+    """Columns of a hypothesis over all observations, in units of their standard deviations."""
+    prepared = solution.prepared
+    problem, size = prepared.problem, solution.image_residuals.size
+    control, positions = problem.control, problem.positions
+    if hypothesis.kind in OF_CAMERAS:
+        kinds = np.array(OF_CAMERAS[hypothesis.kind])
+        calibrated = Calibrated(np.full(len(kinds), hypothesis.number), kinds, np.full(len(kinds), np.inf))
+        rays = by_calibration(problem, calibrated, prepared.calibrated, solution.state)
+        return Columns(rays, np.zeros((len(control), 3, len(kinds))), np.zeros((len(positions), 3, len(kinds))))
+    if hypothesis.kind == LIST:
+        axes = _given_axes(problem, hypothesis.number)
+        rows = np.where((control.frame == hypothesis.number)[:, None], 1.0 / control.sigma, 0.0)
+        shifts = rows[:, :, None] * np.eye(3)[:, axes]
+        return Columns(csr_array((size, len(axes))), shifts, np.zeros((len(positions), 3, len(axes))))
+    group = np.where(positions.group >= 0, 0 if hypothesis.of == ALL else positions.group, -1)
+    groups = np.unique(group[group >= 0])
+    weight = np.where(group >= 0, 1.0, 0.0)[:, None] / positions.sigma
+    factors = [np.ones(len(positions))]
+    if hypothesis.kind == DRIFT:  # one of an offset that is asked for already is the drift alone
+        factors = [positions.time] if positions.offset_sigma.any() else [*factors, positions.time]
+    parts = [
+        (weight * (group == number)[:, None] * factor[:, None])[:, :, None] * np.eye(3)
+        for factor in factors
+        for number in groups.tolist()
+    ]
+    shifts = np.concatenate(parts, axis=2)
+    shifts = shifts[:, :, shifts.any(axis=(0, 1))]
+    return Columns(csr_array((size, shifts.shape[2])), np.zeros((len(control), 3, shifts.shape[2])), shifts)
+
+
+def _given_axes(problem: BundleProblem, number: int) -> Numbers:
+    """Axes along which a control list gives anything."""
+    control = problem.control
+    return np.flatnonzero(np.isfinite(control.sigma[control.frame == number]).any(axis=0))
+
+
+def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
+    """Give a problem the unknowns of a hypothesis; a control list that is shifted is left out as far as it is off."""
+    positions, cameras = problem.positions, problem.cameras
+    if hypothesis.kind == LIST:
+        off = np.abs(hypothesis.shift) > SHOWN_SIGMAS * np.array(hypothesis.sigma)
+        outside = (problem.control.frame == hypothesis.number)[:, None] & (
+            off[:UP_AXIS].any() | (np.arange(3) == UP_AXIS)
+        )
+        control = replace(problem.control, sigma=np.where(outside, np.inf, problem.control.sigma))
+        return replace(problem, control=control)
+    if hypothesis.kind in OF_CAMERAS:
+        camera = np.array([hypothesis.number])
+        return replace(problem, cameras=cameras.with_unknown(camera, OF_CAMERAS[hypothesis.kind]))
+    group = np.where(positions.group >= 0, 0 if hypothesis.of == ALL else positions.group, -1)
+    count = 1 if hypothesis.of == ALL else len(positions.offset_sigma)
+    members = np.zeros((count, 3), np.intp)
+    np.add.at(members, group[group >= 0], np.isfinite(positions.sigma[group >= 0]))
+    drift = np.where((members > 1) & (hypothesis.kind == DRIFT), np.inf, 0.0)
+    changed = replace(positions, group=group, offset_sigma=np.where(members > 0, np.inf, 0.0), drift_sigma=drift)
+    names = ("of the block",) if hypothesis.of == ALL else problem.group_ids
+    return replace(problem, positions=changed, group_ids=names)
+
+
+def given_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
+    """Take the unknowns of an error of a camera back: the camera is as it is given."""
+    sigma = np.array(problem.cameras.sigma, float)
+    sigma[hypothesis.number, OF_CAMERAS[hypothesis.kind]] = 0.0
+    return replace(problem, cameras=replace(problem.cameras, sigma=sigma if sigma.any() else None))
+
+
+def log_probabilities(
+    problem: BundleProblem, solution: BundleSolution, cofactors: Cofactors, unit: float, taken: Sequence[Hypothesis]
+) -> list[float]:
+    """Logarithm of the probability of such values of the parameters of each error of a camera, if they were zero."""
+    found = []
+    for each in taken:
+        own = problem.cameras.unknown[each.number, OF_CAMERAS[each.kind]]
+        value = solution.common[own]
+        squares = float(value @ np.linalg.solve(cofactors.common[np.ix_(own, own)], value)) / unit**2
+        found.append(log_probability(squares, len(own)))
+    return found
