@@ -114,7 +114,7 @@ class Likely(NamedTuple):
     @classmethod
     def of(cls, hypothesis: Hypothesis, squares: float, freedom: int, number: int) -> Likely:
         log_p = min(log_probability(max(squares, 0.0), max(freedom, 1)) + float(np.log(number)), 0.0)
-        return cls(hypothesis, squares, freedom, log_p)
+        return cls(hypothesis=hypothesis, squares=squares, freedom=freedom, log_p=log_p)
 
 
 def log_probability(squares: float, freedom: int) -> float:

@@ -177,11 +177,12 @@ class _Search:
             found = self._with_likeliest(done, worst)
             if found is None and not len(worst):
                 return done
-            if found is None and isinstance(worst, WrongRays):
-                found = self._without_rays(done, worst)
-            elif found is None:
-                found = self._without_given(done, worst)
-            done = found
+            if found is not None:
+                done = found
+            elif isinstance(worst, WrongRays):
+                done = self._without_rays(done, worst)
+            else:
+                done = self._without_given(done, worst)
 
     def with_doubted_control(self, selection: Selection) -> Selection:
         """Put in what the strips by themselves left out of the control, where a hypothesis explains it better.
