@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array, hstack
-from scipy.special import gammaincc, gammaln, log_ndtr
+from scipy.special import gammaincc, gammaln
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.network import datum
@@ -113,7 +113,7 @@ class Likely(NamedTuple):
 
     @classmethod
     def of(cls, hypothesis: Hypothesis, squares: float, freedom: int, number: int) -> Likely:
-        log_p = min(log_probability(max(squares, 0.0), max(freedom, 1)) + float(np.log(number)), 0.0)
+        log_p = log_probability_of_any(max(squares, 0.0), max(freedom, 1), number)
         return cls(hypothesis=hypothesis, squares=squares, freedom=freedom, log_p=log_p)
 
 
@@ -125,9 +125,9 @@ def log_probability(squares: float, freedom: int) -> float:
     return float(-squares / 2 + (freedom / 2 - 1) * np.log(squares / 2) - gammaln(freedom / 2))
 
 
-def log_probability_of_worst(value: float, tests: int) -> float:
-    """Logarithm of the probability that the largest of so many standardised residuals is so large by chance."""
-    return min(float(np.log(2.0 * max(tests, 1)) + log_ndtr(-value)), 0.0)
+def log_probability_of_any(squares: float, freedom: int, number: int) -> float:
+    """Logarithm of the probability that any of a number of hypotheses explains so much by chance."""
+    return min(log_probability(squares, freedom) + float(np.log(max(number, 1))), 0.0)
 
 
 def likeliest(

@@ -93,6 +93,17 @@ def _group(kind: str, error: Floats, sigma: Floats, cofactors: Floats) -> Group:
     return Group(kind=kind, error=np.where(given, error, np.nan), sigma=known, redundancy=redundancy)
 
 
+def explained_by_rays(error: Floats, cofactor: Floats, sigma: Floats) -> Floats:
+    """Say what the sum of squares falls by without each ray: v' Qvv^-1 v in the directions that others control, (n,).
+
+    error, sigma: (n, c): residuals and standard deviations. cofactor: (n, c, c): of the residuals.
+    """
+    share, axes = np.linalg.eigh(cofactor / (sigma[:, :, None] * sigma[:, None, :]))
+    along = np.einsum("nij,ni->nj", axes, error / sigma)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(share > UNCONTROLLED, along**2 / share, 0.0).sum(axis=1), float)
+
+
 def noncentrality(alpha: float, power: float) -> float:
     """Shift of a test value by the smallest error that is found with a wanted probability, in standard deviations.
 

@@ -9,7 +9,7 @@ Source: [Baarda 1968], [Pope 1976].
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -86,11 +86,41 @@ def screen_bundle(
     ``begin`` takes part at first, the rest is put in at the end where it fits; the rays ``kept`` (n,) stay in whatever
     the tests say, and so does what photos, points or the datum would be open without.
 
+    A hypothesis that was taken up while given coordinates went is doubted: the search is made again without it, and
+    what explains everything by less counts.
+
     rough: only the rays matter: adjust as well as their tests need it; two that only go together have ``BOTH_GO``.
     """
     if settings.screening == "none":
         return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)), settings)
     search = _Search(problem, begin, settings, kept, rough=rough)
+    done = _searched(search, begin)
+    if not (search.common or search.refused) or all(each.kind == IMAGE or each.readmitted for each in done.rejections):
+        return done
+    other = _Search(problem, begin, settings, kept, rough=rough, refused=[*search.common, *search.refused])
+    try:
+        without = _searched(other, begin)
+    except GeometryError:
+        return done
+    unit = max(min(done.solution.sigma0, without.solution.sigma0), 1.0)
+    return min(done, without, key=lambda each: _left_and_explained(each, unit, settings.level))
+
+
+def _left_and_explained(done: ScreenedBundle, unit: float, level: float) -> float:
+    """Sum of squares that is left, and what each cause that was found must have explained to be found."""
+    observations, common = done.problem, len(done.common)
+    given = int(sum(np.isfinite(each.sigma).sum() for each in (observations.control, observations.positions)))
+    rays_out = sum(each.kind == IMAGE and not each.readmitted for each in done.rejections)
+    given_out = sum(each.kind != IMAGE and not each.readmitted for each in done.rejections)
+    asked = rays_out, given_out, common
+    numbers = len(done.selection.images), given + given_out, len(OF_CAMERAS)
+    price = sum(count * 2.0 * np.log(number / level) for count, number in zip(asked, numbers, strict=True))
+    return float(done.solution.chi_square / unit**2 + price)
+
+
+def _searched(search: _Search, begin: Selection) -> ScreenedBundle:
+    """Search until there is nothing more to take out, to take up and to put back."""
+    problem, settings = search.problem, search.settings
     chosen = supported(problem, begin)
     if settings.screening == "robust":
         chosen = search.robust(chosen)
@@ -108,7 +138,14 @@ class _Search:
     """What is remembered from round to round."""
 
     def __init__(
-        self, problem: BundleProblem, begin: Selection, settings: BundleSettings, kept: Flags | None, *, rough: bool
+        self,
+        problem: BundleProblem,
+        begin: Selection,
+        settings: BundleSettings,
+        kept: Flags | None,
+        *,
+        rough: bool,
+        refused: Sequence[Hypothesis] = (),
     ) -> None:
         self.problem, self.settings, self.rough = problem, settings, rough
         images = problem.images
@@ -133,9 +170,8 @@ class _Search:
         self.beyond = np.full(problem.points, np.inf)  # test values of points with a ray outside, when decided on
         self.rounds = self.failed = 0
         self.common: list[Hypothesis] = []
-        self.refused: list[
-            Hypothesis
-        ] = []  # without which nothing would hold the photos, or that mean nothing in the end
+        # with which nothing would hold the photos, or that mean nothing in the end
+        self.refused: list[Hypothesis] = list(refused)
 
     def rays_of(self, points: Numbers, among: Flags | None = None) -> Numbers:
         """Rows of all rays of points, or of those `among` them (n,), by point, then photo."""
@@ -234,8 +270,7 @@ class _Search:
         Those that explain it nearly alike are adjusted with: what contradicts the rest by a hundred standard deviations
         bends the network further than it can be linearised.
         """
-        value = float(worst.value.max(initial=0.0)) if isinstance(worst, WrongRays) else worst[0].value
-        of_worst = hypotheses.log_probability_of_worst(value, done.solution.redundancy)
+        of_worst = self._log_p(done, worst)
         before, solution, tried = self.problem, done.solution, {}
         for each in self._likeliest(done, of_worst):
             self.problem = hypotheses.taken_up(before, each.hypothesis)
@@ -274,6 +309,21 @@ class _Search:
             self.problem = hypotheses.given_up(self.problem, each)
             self.refused.append(each)
         return bool(gone)
+
+    def _log_p(self, done: ScreenedBundle, worst: list[Rejection] | WrongRays) -> float:
+        """Logarithm of the probability that the worst single observation, ray or coordinate, is so bad by chance."""
+        if not len(worst):
+            return 0.0
+        if not isinstance(worst, WrongRays):
+            given = int(np.isfinite(done.problem.control.sigma).sum() + np.isfinite(done.problem.positions.sigma).sum())
+            return hypotheses.log_probability_of_any(worst[0].value ** 2, 1, given)
+        place = np.cumsum(done.selection.images) - 1
+        rows = place[worst.row[done.selection.images[worst.row]]]
+        error, cofactor = done.solution.image_residuals[rows], done.precision.image_residuals[rows]
+        squares = reliability.explained_by_rays(error, cofactor, done.problem.images.sigma[rows])
+        return hypotheses.log_probability_of_any(
+            float(squares.max(initial=0.0)) / done.limit.unit**2, error.shape[1], len(done.problem.images)
+        )
 
     def _without_rays(self, done: ScreenedBundle, worst: WrongRays) -> ScreenedBundle:
         """Take rays out; points without which nothing would hold some photos stay, whatever the tests say."""

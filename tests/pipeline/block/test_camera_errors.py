@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2, norm
 
 from photostrip.camera import Distortion
-from photostrip.network.hypotheses import log_probability, log_probability_of_worst
+from photostrip.network.hypotheses import log_probability, log_probability_of_any
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import FILM, Control, Flight, GrossError, Points, Spec, simulate
 from tests.pipeline.blocks import errors
@@ -110,5 +110,5 @@ def test_probabilities_are_those_of_scipy_and_go_on_where_numbers_end() -> None:
     for squares, freedom in ((3.0, 1), (30.0, 2), (200.0, 12)):
         assert log_probability(squares, freedom) == pytest.approx(chi2.logsf(squares, freedom), rel=1e-9)
     assert log_probability(4000.0, 1) == pytest.approx(norm.logsf(4000.0**0.5) + np.log(2.0), rel=1e-5)
-    assert log_probability_of_worst(6.0, 100) == pytest.approx(norm.logsf(6.0) + np.log(200.0), rel=1e-9)
-    assert log_probability_of_worst(0.0, 100) == 0.0
+    assert log_probability_of_any(36.0, 1, 100) == pytest.approx(norm.logsf(6.0) + np.log(200.0), rel=1e-9)
+    assert log_probability_of_any(0.0, 1, 100) == 0.0
