@@ -18,19 +18,19 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array, hstack
-from scipy.special import gammaincc, gammaln
+from scipy.special import fdtrc, gammaincc, gammaln
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.network import datum
 from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, Calibrated
 from photostrip.network.calibration import POINT as PRINCIPAL_POINT
 from photostrip.network.normal_equations import Columns, Explained
-from photostrip.network.problem import BundleProblem
+from photostrip.network.problem import BundleProblem, PositionObservations
 from photostrip.network.rays import by_calibration
 from photostrip.network.settings import CALIBRATION
 from photostrip.network.solution import BundleSolution, Cofactors
 
-OFFSET, DRIFT, LIST = "offset", "drift", "control list"
+ORDER, OFFSET, DRIFT, LIST = "order of positions", "offset", "drift", "control list"
 LENS, FILM, POINT, DISTANCE = "lens distortion", "film", "principal point", "principal distance"
 OF_CAMERAS = {
     LENS: [list(CALIBRATION).index("k1")],
@@ -41,6 +41,8 @@ OF_CAMERAS = {
 """What may be wrong with a camera, with the columns of its parameters."""
 ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group have one of their own
+REVERSED, FORWARDS, BACKWARDS = "reversed", "forwards", "backwards"  # rows of positions that belong to other photos
+ORDERS = REVERSED, FORWARDS, BACKWARDS
 LEAST_SHARE = 1e-6  # of a column that the other unknowns leave to it, for it to be asked about at all
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
 UP_AXIS = 2
@@ -52,7 +54,7 @@ class Hypothesis:
 
     kind: str
     number: int = -1  # of a camera or a control list
-    of: str = EACH  # of positions: ``ALL`` or ``EACH``
+    of: str = EACH  # of positions: ``ALL`` or ``EACH``, or one of ``ORDERS``
     rivals: tuple[str, ...] = ()  # kinds of others that explain nearly as much
     # shift, sigma: how a list lies beside everything else, along its axes, metres; NaN where it gives nothing
     shift: tuple[float, ...] = ()
@@ -265,6 +267,8 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
         )
         control = replace(problem.control, sigma=np.where(outside, np.inf, problem.control.sigma))
         return replace(problem, control=control)
+    if hypothesis.kind == ORDER:
+        return replace(problem, positions=_in_order(positions, hypothesis.of))
     if hypothesis.kind in OF_CAMERAS:
         camera = np.array([hypothesis.number])
         return replace(problem, cameras=cameras.with_unknown(camera, OF_CAMERAS[hypothesis.kind]))
@@ -296,3 +300,49 @@ def log_probabilities(
         squares = float(value @ np.linalg.solve(cofactors.common[np.ix_(own, own)], value)) / unit**2
         found.append(log_probability(squares, len(own)))
     return found
+
+
+def _in_order(positions: PositionObservations, order: str) -> PositionObservations:
+    """Give photos the positions that other rows state; a photo at an end that loses its own has none."""
+    rows = np.arange(len(positions))
+    source = {REVERSED: rows[::-1], FORWARDS: rows - 1, BACKWARDS: rows + 1}[order]
+    inside = (source >= 0) & (source < len(rows))
+    source = np.where(inside, source, rows)
+    sigma = np.where(inside[:, None], positions.sigma[source], np.inf)
+    return replace(positions, xyz=positions.xyz[source], axes=positions.axes[source], sigma=sigma)
+
+
+def order_of_positions(
+    solution: BundleSolution, cofactors: Cofactors, positions: PositionObservations, level: float
+) -> Hypothesis | None:
+    """Find the order in which given positions are those of the photos; None where it is theirs, or cannot be told.
+
+    solution, cofactors: of an adjustment in which the positions took no part.
+    The misfits about their mean are compared, in units of what is stated and what the photos know, by an F test.
+    """
+    orders = {each: _misfit(solution, cofactors, _in_order(positions, each)) for each in ORDERS}
+    least = min(orders, key=lambda each: orders[each].mean)
+    given, best = _misfit(solution, cofactors, positions), orders[least]
+    if not (given.freedom > 0 and best.freedom > 0 and given.mean > best.mean):
+        return None
+    p = len(ORDERS) * fdtrc(given.freedom, best.freedom, given.mean / max(best.mean, 1.0))
+    return Hypothesis(ORDER, of=least) if p < level / 2 else None
+
+
+class _Misfit(NamedTuple):
+    mean: float  # mean square of standardised misfits
+    freedom: int
+
+
+def _misfit(solution: BundleSolution, cofactors: Cofactors, positions: PositionObservations) -> _Misfit:
+    """Compare positions with photos that know nothing of them, but for what all of them share."""
+    photo, used = positions.photo, np.isfinite(positions.sigma)
+    antenna = solution.centers[photo] + np.einsum("nij,nj->ni", solution.rotations[photo], positions.lever)
+    off = np.einsum("nij,nj->ni", positions.axes, antenna - positions.xyz)
+    known = positions.axes @ cofactors.photos[photo, :3, :3] @ positions.axes.swapaxes(1, 2)
+    variance = np.where(used, positions.sigma, 1.0) ** 2 + np.einsum("nii->ni", known)
+    weight = np.where(used, 1.0 / variance, 0.0)
+    total = weight.sum(axis=0)
+    off = off - (weight * off).sum(axis=0) / np.where(total > 0.0, total, 1.0)
+    freedom = int(used.sum() - (total > 0.0).sum())
+    return _Misfit(float((weight * off**2).sum()) / max(freedom, 1), freedom)

@@ -23,8 +23,8 @@ from photostrip.network.datum import is_free
 from photostrip.network.gross_errors.point_decisions import cause_of_all
 from photostrip.network.gross_errors.ray_decisions import Adjusted, RayDecisions, decide_rays
 from photostrip.network.gross_errors.ray_log import ROBUST, START, RayLog, WrongRays
-from photostrip.network.hypotheses import OF_CAMERAS, Hypothesis, Likely
-from photostrip.network.problem import BundleProblem
+from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OFFSET, Hypothesis, Likely
+from photostrip.network.problem import BundleProblem, PositionObservations
 from photostrip.network.reliability import CONTROL, IMAGE, Limit
 from photostrip.network.selection import Selection, restarted, selected, supported
 from photostrip.network.settings import BundleSettings
@@ -169,6 +169,7 @@ class _Search:
         self.decided = Selection.everything(problem)  # what took part when rays outside were decided on
         self.beyond = np.full(problem.points, np.inf)  # test values of points with a ray outside, when decided on
         self.rounds = self.failed = 0
+        self.order_asked = False
         self.common: list[Hypothesis] = []
         # with which nothing would hold the photos, or that mean nothing in the end
         self.refused: list[Hypothesis] = list(refused)
@@ -205,7 +206,12 @@ class _Search:
 
     def clean(self, selection: Selection) -> ScreenedBundle:
         """Test, and take up or take out what explains most, until nothing is beyond the limit."""
-        done = self.adjust(selection)
+        try:
+            done = self.adjust(selection)
+        except GeometryError:
+            if not self._reordered(selection):
+                raise
+            done = self.adjust(supported(self.problem, selection))
         while True:
             worst = self._worst(done)
             if not len(worst) and not reliability.sigma0_test(done.solution).too_large:
@@ -271,8 +277,11 @@ class _Search:
         bends the network further than it can be linearised.
         """
         of_worst = self._log_p(done, worst)
+        likely_ones = self._likeliest(done, of_worst)
+        if any(each.hypothesis.kind in {OFFSET, DRIFT} for each in likely_ones) and self._reordered(done.selection):
+            return self.adjust(supported(self.problem, done.selection))
         before, solution, tried = self.problem, done.solution, {}
-        for each in self._likeliest(done, of_worst):
+        for each in likely_ones:
             self.problem = hypotheses.taken_up(before, each.hypothesis)
             try:
                 found = self.adjust(supported(self.problem, done.selection))
@@ -309,6 +318,24 @@ class _Search:
             self.problem = hypotheses.given_up(self.problem, each)
             self.refused.append(each)
         return bool(gone)
+
+    def _reordered(self, selection: Selection) -> bool:
+        """Give photos the positions of other rows, where an adjustment without any of them says so; asked once."""
+        used = selection.positions.any()
+        if self.order_asked or not used or is_free(replace(self.problem, positions=PositionObservations())):
+            return False
+        self.order_asked, before = True, self.problem
+        try:
+            free = self.adjust(supported(before, replace(selection, positions=np.zeros_like(selection.positions))))
+        except GeometryError:
+            self.problem = before
+            return False
+        found = hypotheses.order_of_positions(free.solution, free.precision, before.positions, self.settings.level)
+        if found is None:
+            self.problem = before
+            return False
+        self._take_up(found)
+        return True
 
     def _log_p(self, done: ScreenedBundle, worst: list[Rejection] | WrongRays) -> float:
         """Logarithm of the probability that the worst single observation, ray or coordinate, is so bad by chance."""

@@ -116,7 +116,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         if any(each.code in OF_LISTS for each in of_groups):  # all of the block says it best
             findings = [each for each in findings if each.code not in OF_LISTS]
         if not any(each.is_error for each in findings):  # of control that is misread a camera explains much
-            findings += of_groups
+            explained = {each.key for each in of_groups if each.key}
+            findings = [each for each in findings if each.key not in explained] + of_groups
     examined = [each for each in stages if each.strip in strips]
     findings += shared_control.find_shared_errors(examined, findings, joined=result.bundle is not None)
     if not any(each.is_error for each in findings) and not slips.strips_with_kept_exchanges(

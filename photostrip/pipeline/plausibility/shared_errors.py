@@ -10,13 +10,17 @@ from photostrip.arrays import Floats
 from photostrip.network.given_orientations import drift_columns
 from photostrip.network.hypotheses import (
     ALL,
+    BACKWARDS,
     DISTANCE,
     DRIFT,
     FILM,
+    FORWARDS,
     LENS,
     LIST,
     OFFSET,
+    ORDER,
     POINT,
+    REVERSED,
     SHOWN_SIGMAS,
     Hypothesis,
 )
@@ -44,6 +48,7 @@ def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
     yield from (_lens(each, bundle, inputs) for each in shared if each.kind == LENS)
     yield from (_point(each, bundle, inputs) for each in shared if each.kind == POINT)
     yield from (_film(each, bundle, inputs) for each in shared if each.kind == FILM)
+    yield from (_order(each, bundle) for each in shared if each.kind == ORDER)
     of_positions = [each for each in shared if each.kind in {OFFSET, DRIFT}]
     if of_positions:
         yield from _positions(bundle, inputs, of_positions[-1])
@@ -86,6 +91,21 @@ def _parameters(error: Hypothesis, bundle: Bundle, asked: str) -> list[Parameter
     """Return what was estimated of the camera that an error is of."""
     camera = bundle.screened.problem.camera_ids[error.number]
     return [each for each in bundle.parameters if each.camera == camera and each.name.startswith(asked)]
+
+
+ORDERS = {
+    REVERSED: "are those of the photos in reversed order",
+    FORWARDS: "each belong to the photo after the one that they are given for",
+    BACKWARDS: "each belong to the photo before the one that they are given for",
+}
+
+
+def _order(error: Hypothesis, bundle: Bundle) -> Finding:
+    problem = bundle.screened.problem
+    photos = tuple(dict.fromkeys(problem.photo_name(int(each)) for each in problem.positions.photo))
+    message = f"the camera positions {ORDERS[error.of]}; the adjustment continued with them so"
+    fix = "put the names of the photos and their positions together anew"
+    return found("P208", message, fix, {"order": error.of}, photos=photos, key="camera_positions")
 
 
 def _lens(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:

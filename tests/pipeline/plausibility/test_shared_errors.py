@@ -32,6 +32,7 @@ def adjusted(
     seed: int = 7,
     control: Control | None = None,
     use: tuple[bool, bool, bool] = (True, True, True),
+    rows: slice | np.ndarray = slice(None),
 ) -> tuple[Simulation, Result]:
     """Adjust a block whose control stands at both ends, with measured camera positions that are shifted."""
     flight = Flight(photos=10, strips=strips)
@@ -47,7 +48,7 @@ def adjusted(
         positions=CameraPositions(
             photos=photos,
             frame=inputs.frames[0],
-            enu=simulation.gnss + np.asarray(shift, float),
+            enu=simulation.gnss[rows] + np.asarray(shift, float),
             use=np.tile(use, (len(photos), 1)),
             sigma=np.tile((0.10, 0.10, 0.15), (len(photos), 1)),
             time=np.full(len(photos), np.nan),
@@ -212,3 +213,27 @@ def test_control_that_contradicts_the_positions_is_told_with_them() -> None:
     _, result = adjusted(strips=1, control=Control(bands=3, noise=(50.0, 50.0, 50.0)))
     told = [each.message for each in result.findings if each.code == "P208"]
     assert all("which of the two is right cannot be told" in each for each in nonempty(told))
+
+
+@pytest.mark.parametrize(
+    ("rows", "order"),
+    [(slice(None, None, -1), "reversed"), (np.arange(10) - 1, "backwards"), ((np.arange(10) + 1) % 10, "forwards")],
+)
+def test_positions_of_other_photos_are_named_and_put_right(rows: slice | np.ndarray, order: str) -> None:
+    """Sound control was blamed, or the adjustment did not converge."""
+    simulation, result = adjusted(strips=1, rows=rows)
+    (finding,) = result.findings
+    assert finding.code == "P208"
+    assert finding.key == "camera_positions"
+    assert finding.evidence["order"] == order
+    assert [kind for kind in lost(result) if kind == "control"] == []
+    assert rms(simulation, result) < 1.2 * rms(*adjusted(strips=1))
+
+
+def test_positions_that_are_off_by_a_base_are_those_of_other_photos_only_where_the_bases_say_so() -> None:
+    """An offset along the flight leaves the bases as they are."""
+    simulation = simulate(Spec(seed=7, flight=Flight(photos=10), control=Control(bands=2), gnss=Gnss()))
+    assert simulation.gnss is not None
+    _, result = adjusted(strips=1, shift=np.diff(simulation.gnss, axis=0).mean(axis=0))
+    (finding,) = result.findings
+    assert finding.key == "camera_positions.correction"
