@@ -21,7 +21,6 @@ from scipy.sparse import csr_array, hstack
 from scipy.special import fdtrc, gammaincc, gammaln
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.network import datum
 from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, Calibrated
 from photostrip.network.calibration import POINT as PRINCIPAL_POINT
 from photostrip.network.normal_equations import Columns, Explained
@@ -32,6 +31,7 @@ from photostrip.network.solution import BundleSolution, Cofactors
 
 ORDER, OFFSET, DRIFT, LIST = "order of positions", "offset", "drift", "control list"
 LENS, FILM, POINT, DISTANCE = "lens distortion", "film", "principal point", "principal distance"
+PHOTO = "shift of a photo"
 OF_CAMERAS = {
     LENS: [list(CALIBRATION).index("k1")],
     FILM: AFFINE,
@@ -43,6 +43,7 @@ ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group have one of their own
 REVERSED, FORWARDS, BACKWARDS = "reversed", "forwards", "backwards"  # rows of positions that belong to other photos
 ORDERS = REVERSED, FORWARDS, BACKWARDS
+ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most in common
 LEAST_SHARE = 1e-6  # of a column that the other unknowns leave to it, for it to be asked about at all
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
 UP_AXIS = 2
@@ -53,7 +54,7 @@ class Hypothesis:
     """What a group of observations may share beside the truth."""
 
     kind: str
-    number: int = -1  # of a camera or a control list
+    number: int = -1  # of a camera, a control list or a photo
     of: str = EACH  # of positions: ``ALL`` or ``EACH``, or one of ``ORDERS``
     rivals: tuple[str, ...] = ()  # kinds of others that explain nearly as much
     # shift, sigma: how a list lies beside everything else, along its axes, metres; NaN where it gives nothing
@@ -65,9 +66,9 @@ class Hypothesis:
         return self.kind, self.number, self.of
 
 
-def _offsets(problem: BundleProblem) -> Iterator[Hypothesis]:
+def _offsets(solution: BundleSolution) -> Iterator[Hypothesis]:
     """Ask whether camera positions all lie elsewhere: those of the whole block, or of each group."""
-    positions = problem.positions
+    positions = solution.prepared.problem.positions
     if positions.offset_sigma.any() or positions.drift_sigma.any():
         return
     groups = len(np.unique(positions.group[positions.group >= 0]))
@@ -77,32 +78,55 @@ def _offsets(problem: BundleProblem) -> Iterator[Hypothesis]:
         yield Hypothesis(OFFSET)
 
 
-def _drifts(problem: BundleProblem) -> Iterator[Hypothesis]:
-    positions = problem.positions
+def _drifts(solution: BundleSolution) -> Iterator[Hypothesis]:
+    positions = solution.prepared.problem.positions
     if (positions.group >= 0).any() and not positions.drift_sigma.any():
         yield Hypothesis(DRIFT)
 
 
-def _lists(problem: BundleProblem) -> Iterator[Hypothesis]:
+def _lists(solution: BundleSolution) -> Iterator[Hypothesis]:
     """Ask whether a control list lies beside the others, the shortest first."""
-    control = problem.control
+    control = solution.prepared.problem.control
     lists, sizes = np.unique(control.frame[np.isfinite(control.sigma).any(axis=1)], return_counts=True)
     if len(lists) > 1:
         yield from (Hypothesis(LIST, number) for number in lists[np.argsort(sizes, kind="stable")].tolist())
 
 
-def _cameras(problem: BundleProblem) -> Iterator[Hypothesis]:
+def _cameras(solution: BundleSolution) -> Iterator[Hypothesis]:
     """Ask what may be wrong with each camera; of a principal distance photos alone say nothing."""
-    cameras = problem.cameras
-    given = not datum.is_free(problem)
+    problem = solution.prepared.problem
+    cameras, given = problem.cameras, not solution.free
+    used = np.flatnonzero(np.bincount(cameras.of_photo) > min(1, problem.photos - 1))  # of one photo see `_photos`
     for kind, columns in OF_CAMERAS.items():
-        for camera in np.unique(cameras.of_photo).tolist():
+        for camera in used.tolist():
             if (cameras.unknown[camera, columns] < 0).all() and (given or kind != DISTANCE):
                 yield Hypothesis(kind, camera)
 
 
-HYPOTHESES: tuple[Callable[[BundleProblem], Iterator[Hypothesis]], ...] = (_offsets, _drifts, _lists, _cameras)
+def _photos(solution: BundleSolution) -> Iterator[Hypothesis]:
+    """Ask whether all image coordinates of a photo are shifted: other marks, another principal point."""
+    problem = solution.prepared.problem
+    images, m = problem.images, problem.photos
+    off = solution.image_residuals / images.sigma**2
+    pull, size = np.zeros((2, m, 2))
+    np.add.at(pull, images.photo, off)
+    np.add.at(size, images.photo, images.sigma**-2.0)
+    asking = (pull**2 / np.maximum(size, np.finfo(float).tiny)).sum(axis=1)
+    alone = np.bincount(problem.cameras.of_photo)[problem.cameras.of_photo] < min(2, m)
+    asking[alone] = 0.0  # its camera is asked about, or has been
+    most = np.argsort(-asking, kind="stable")[:ASKED_PHOTOS]
+    yield from (Hypothesis(PHOTO, photo) for photo in most[asking[most] > 0.0].tolist())
+
+
+HYPOTHESES: tuple[Callable[[BundleSolution], Iterator[Hypothesis]], ...] = (
+    _offsets,
+    _drifts,
+    _lists,
+    _cameras,
+    _photos,
+)
 """Who may be wrong. Of hypotheses that explain the same the first is taken up: what is given goes before the camera."""
+OF_IMAGES = _cameras, _photos
 
 
 class Likely(NamedTuple):
@@ -143,14 +167,15 @@ def likeliest(
     refused: what has been taken up in vain.
     """
     problem, in_vain = solution.prepared.problem, {each.name for each in refused}
-    lines = [line for line in HYPOTHESES if line is not _cameras or (cameras and not problem.of_models)]
-    asked = [[each for each in line(problem) if each.name not in in_vain] for line in lines]
+    lines = [line for line in HYPOTHESES if line not in OF_IMAGES or (cameras and not problem.of_models)]
+    asked = [[each for each in line(solution) if each.name not in in_vain] for line in lines]
     every = [each for line in asked for each in line]
     if not every:
         return []
+    number = len(every) + (problem.photos if cameras else 0)
     gains = [_gain(solution, *each) for each in zip(every, _explained(solution, every), strict=True)]
     found = [
-        Likely.of(_with_shift(each, gain, solution), gain.squares / unit**2, len(gain.value), len(every))
+        Likely.of(_with_shift(each, gain, solution), gain.squares / unit**2, len(gain.value), number)
         for each, gain in zip(every, gains, strict=True)
     ]
     ends = np.cumsum([len(line) for line in asked])
@@ -190,9 +215,11 @@ def _gain(solution: BundleSolution, hypothesis: Hypothesis, explained: Explained
     inverse = np.linalg.pinv(normal, rcond=LEAST_SHARE, hermitian=True)
     value = inverse @ pull
     squares = float(pull @ value)
-    cameras = solution.prepared.problem.cameras
-    if hypothesis.kind == DISTANCE and cameras.focal[hypothesis.number] + value[0] <= 0.0:
+    problem = solution.prepared.problem
+    if hypothesis.kind == DISTANCE and problem.cameras.focal[hypothesis.number] + value[0] <= 0.0:
         squares = 0.0  # heights that count downwards are no lens
+    if hypothesis.kind in {POINT, PHOTO} and np.abs(value).max() > np.abs(problem.images.xy).max():
+        squares = 0.0  # no photo lies beside all that it shows
     return _Gain(squares, value, np.sqrt(np.diag(inverse)))
 
 
@@ -225,10 +252,15 @@ def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
     prepared = solution.prepared
     problem, size = prepared.problem, solution.image_residuals.size
     control, positions = problem.control, problem.positions
-    if hypothesis.kind in OF_CAMERAS:
-        kinds = np.array(OF_CAMERAS[hypothesis.kind])
-        calibrated = Calibrated(np.full(len(kinds), hypothesis.number), kinds, np.full(len(kinds), np.inf))
+    if hypothesis.kind in OF_CAMERAS or hypothesis.kind == PHOTO:
+        of_photo, photo = hypothesis.kind == PHOTO, hypothesis.number
+        kinds = np.array(PRINCIPAL_POINT if of_photo else OF_CAMERAS[hypothesis.kind])
+        camera = problem.cameras.of_photo[photo] if of_photo else hypothesis.number
+        calibrated = Calibrated(np.full(len(kinds), camera), kinds, np.full(len(kinds), np.inf))
         rays = by_calibration(problem, calibrated, prepared.calibrated, solution.state)
+        if of_photo:
+            own = np.repeat(problem.images.photo == photo, 2)
+            rays = csr_array(rays.multiply(own[:, None]))
         return Columns(rays, np.zeros((len(control), 3, len(kinds))), np.zeros((len(positions), 3, len(kinds))))
     if hypothesis.kind == LIST:
         axes = _given_axes(problem, hypothesis.number)
@@ -269,6 +301,8 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
         return replace(problem, control=control)
     if hypothesis.kind == ORDER:
         return replace(problem, positions=_in_order(positions, hypothesis.of))
+    if hypothesis.kind == PHOTO:
+        return _with_own_camera(problem, hypothesis.number)
     if hypothesis.kind in OF_CAMERAS:
         camera = np.array([hypothesis.number])
         return replace(problem, cameras=cameras.with_unknown(camera, OF_CAMERAS[hypothesis.kind]))
@@ -282,10 +316,41 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
     return replace(problem, positions=changed, group_ids=names)
 
 
+def _with_own_camera(problem: BundleProblem, photo: int) -> BundleProblem:
+    """Give a photo a camera of its own, whose principal point is unknown."""
+    cameras = problem.cameras
+    old, new = int(cameras.of_photo[photo]), len(cameras.focal)
+    row = [*range(new), old]
+    of_photo = np.where(np.arange(problem.photos) == photo, new, cameras.of_photo)
+    changed = replace(
+        cameras,
+        of_photo=of_photo,
+        focal=cameras.focal[row],
+        sigma=None if cameras.sigma is None else cameras.sigma[row],
+        prior=None if cameras.prior is None else cameras.prior[row],
+        distortion=tuple(cameras.distortion[each] for each in row) if cameras.distortion else (),
+    )
+    names = (*problem.camera_ids, f"of photo {problem.photo_name(photo)}") if problem.camera_ids else ()
+    return replace(problem, cameras=changed.with_unknown(np.array([new]), PRINCIPAL_POINT), camera_ids=names)
+
+
+def of_images(hypothesis: Hypothesis) -> bool:
+    """Whether the parameters of a hypothesis are those of a camera."""
+    return hypothesis.kind in OF_CAMERAS or hypothesis.kind == PHOTO
+
+
+def place(problem: BundleProblem, hypothesis: Hypothesis) -> tuple[int, list[int]]:
+    """Return the camera, and the columns of its parameters, that a hypothesis has made unknown."""
+    if hypothesis.kind == PHOTO:
+        return int(problem.cameras.of_photo[hypothesis.number]), PRINCIPAL_POINT
+    return hypothesis.number, OF_CAMERAS[hypothesis.kind]
+
+
 def given_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
-    """Take the unknowns of an error of a camera back: the camera is as it is given."""
+    """Take the unknowns of an error of a camera, or of a photo, back: it is as it is given."""
+    camera, columns = place(problem, hypothesis)
     sigma = np.array(problem.cameras.sigma, float)
-    sigma[hypothesis.number, OF_CAMERAS[hypothesis.kind]] = 0.0
+    sigma[camera, columns] = 0.0
     return replace(problem, cameras=replace(problem.cameras, sigma=sigma if sigma.any() else None))
 
 
@@ -295,7 +360,7 @@ def log_probabilities(
     """Logarithm of the probability of such values of the parameters of each error of a camera, if they were zero."""
     found = []
     for each in taken:
-        own = problem.cameras.unknown[each.number, OF_CAMERAS[each.kind]]
+        own = problem.cameras.unknown[place(problem, each)]
         value = solution.common[own]
         squares = float(value @ np.linalg.solve(cofactors.common[np.ix_(own, own)], value)) / unit**2
         found.append(log_probability(squares, len(own)))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from photostrip.network import hypotheses
-from photostrip.network.hypotheses import DISTANCE, DRIFT, FILM, LENS, LIST, OFFSET, POINT, Likely, most_likely
+from photostrip.network.hypotheses import DISTANCE, DRIFT, FILM, LENS, LIST, OFFSET, PHOTO, POINT, Likely, most_likely
 from photostrip.network.problem import PositionObservations
 from photostrip.network.solve import solve
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
@@ -19,6 +19,7 @@ from tests.simulated_bundle import problem_of, truth_of
 if TYPE_CHECKING:
     from photostrip.network.hypotheses import Hypothesis
     from photostrip.network.problem import BundleProblem
+    from photostrip.network.solution import BundleSolution
 
 
 def with_positions_and_lists() -> BundleProblem:
@@ -47,15 +48,15 @@ def with_positions_and_lists() -> BundleProblem:
     return replace(problem, positions=positions, control=control)
 
 
-def asked(problem: BundleProblem) -> list[Hypothesis]:
-    return [each for line in hypotheses.HYPOTHESES for each in line(problem)]
+def asked(solution: BundleSolution) -> list[Hypothesis]:
+    return [each for line in hypotheses.HYPOTHESES for each in line(solution)]
 
 
 def test_every_hypothesis_gains_what_an_adjustment_with_it_does() -> None:
     problem = with_positions_and_lists()
     solution = solve(problem)
-    every = asked(problem)
-    assert {each.kind for each in every} == {OFFSET, DRIFT, LIST, LENS, FILM, POINT, DISTANCE}
+    every = asked(solution)
+    assert {each.kind for each in every} == {OFFSET, DRIFT, LIST, LENS, FILM, POINT, DISTANCE, PHOTO}
     for each in nonempty(every):
         (found,) = hypotheses.likeliest(
             solution, 1.0, 1e-9, cameras=True, refused=[other for other in every if other is not each]

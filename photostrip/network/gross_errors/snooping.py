@@ -310,7 +310,7 @@ class _Search:
 
     def put_back(self, done: ScreenedBundle) -> bool:
         """Give up errors of cameras that mean nothing in the end; whether there were any."""
-        errors = [each for each in self.common if each.kind in OF_CAMERAS]
+        errors = [each for each in self.common if hypotheses.of_images(each)]
         found = hypotheses.log_probabilities(done.problem, done.solution, done.precision, done.limit.unit, errors)
         gone = [each for each, log_p in zip(errors, found, strict=True) if log_p > self._level]
         for each in gone:

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from photostrip.network import defects, reliability
-from photostrip.network.hypotheses import OF_CAMERAS
+from photostrip.network import defects, hypotheses, reliability
 from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import CALIBRATION
 from photostrip.notes import Note
@@ -58,10 +57,11 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
         )
         yield Note("unit-weight", text, severity="note")
     yield from _given_notes(bundle)
-    kinds = list(CALIBRATION.values())
-    taken_up = {kinds[k].title for each in bundle.screened.common for k in OF_CAMERAS.get(each.kind, ())}
+    kinds, problem = list(CALIBRATION.values()), bundle.screened.problem
+    places = [hypotheses.place(problem, each) for each in bundle.screened.common if hypotheses.of_images(each)]
+    taken_up = {(problem.camera_ids[camera], kinds[k].title) for camera, columns in places for k in columns}
     for parameter in bundle.parameters:
-        if not parameter.significant and parameter.name not in taken_up:
+        if not parameter.significant and (parameter.camera, parameter.name) not in taken_up:
             text = (
                 f"camera {parameter.camera}: {parameter.name} is {parameter.value:.3g} {parameter.unit} with a "
                 f"standard deviation of {parameter.sigma:.3g}: it does not differ significantly from "

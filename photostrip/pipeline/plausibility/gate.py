@@ -6,15 +6,14 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Floats
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
@@ -36,7 +35,6 @@ from photostrip.plausibility.photos import flight, flight_order, identity, rotat
 from photostrip.points import PhotoPoints, locate
 
 if TYPE_CHECKING:
-    from photostrip.network.gross_errors.shifted_photo import ShiftedPhoto
     from photostrip.pipeline.results import Result
     from photostrip.strip.independent_models.formation import FormedModels
 
@@ -98,9 +96,6 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each in formed:
         findings += _of_formed(each, points)
-    wrong = {photo for each in findings if each.is_error for photo in each.photos}
-    names = {name for note in doubts for name in note.points}
-    findings += [each for each in _shifted_photos(result, formed, names) if wrong.isdisjoint(each.photos)]
     in_metres = not any(each.is_error for each in findings)
     if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
         checks = inputs.control.check
@@ -283,32 +278,6 @@ def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     focal = strip.camera.principal_distance
     findings += identity.find_double_ids(observations, formed, focal, strip.photos, strip.id, sigma)
     return findings
-
-
-def _shifted_photos(result: Result, formed: Sequence[EvidenceStrip], doubted: Collection[str]) -> Iterator[Finding]:
-    """Look for a photo of each strip whose image coordinates are all shifted; ``doubted`` are names of control."""
-    from photostrip.plausibility.photos import shifted_photo  # a check forms no strips
-
-    def tried(strip: EvidenceStrip, position: Numbers, about: int) -> ShiftedPhoto | None:
-        from photostrip.network.gross_errors.shifted_photo import (
-            shifted_photo,  # needs the bundle adjustment
-        )
-
-        return shifted_photo(strip.orientation, strip.formed, points, position, about)
-
-    points = result.refined.observations
-    is_doubted = np.array([name in doubted for name in points.point_ids], bool)
-    for each, strip in zip(formed, result.photo_strips, strict=True):
-        adjusted = shifted_photo.AdjustedPhotos(
-            strip=each.strip.id,
-            photos=each.strip.photos,
-            sigma=each.strip.median_sigma(points),
-            rms=strip.of_photos.resection.rms,
-            rows=strip.of_photos.rows,
-            doubted=bool(is_doubted[each.formed.point].any()),
-        )
-        rows = each.orientation.rows
-        yield from shifted_photo.find_shifted_photo(rows, points, adjusted, partial(tried, each))
 
 
 def _of_rotations(result: Result, formed: Sequence[EvidenceStrip], directory: Path | None) -> list[Finding]:

@@ -19,6 +19,7 @@ from photostrip.network.hypotheses import (
     LIST,
     OFFSET,
     ORDER,
+    PHOTO,
     POINT,
     REVERSED,
     SHOWN_SIGMAS,
@@ -48,6 +49,7 @@ def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
     yield from (_lens(each, bundle, inputs) for each in shared if each.kind == LENS)
     yield from (_point(each, bundle, inputs) for each in shared if each.kind == POINT)
     yield from (_film(each, bundle, inputs) for each in shared if each.kind == FILM)
+    yield from (_photo(each, bundle) for each in shared if each.kind == PHOTO)
     yield from (_order(each, bundle) for each in shared if each.kind == ORDER)
     of_positions = [each for each in shared if each.kind in {OFFSET, DRIFT}]
     if of_positions:
@@ -152,6 +154,25 @@ def _film(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     numbers: Evidence = {"x_over_y_percent": percent, "standard_deviation_percent": sigma, "shear_deg": turned}
     strips = _strips_of(affinity.camera, inputs)
     return found("P112", message, fix, numbers, strips=strips, key="processing.self_calibration")
+
+
+def _photo(error: Hypothesis, bundle: Bundle) -> Finding:
+    problem = bundle.screened.problem
+    name = problem.photo_name(error.number)
+    x, y = (
+        each for each in bundle.parameters if each.camera == problem.camera_ids[problem.cameras.of_photo[error.number]]
+    )
+    rays = int((problem.images.photo == error.number).sum())
+    message = (
+        f"all image coordinates of photo {name} are shifted by {x.value:+.2f} mm in x and {y.value:+.2f} mm in y "
+        f"(standard deviations {x.sigma:.2g} and {y.sigma:.2g} mm): once that is taken off, {rays} of its points agree "
+        "with the neighbouring photos. The adjustment continued without the shift"
+    )
+    fix = (
+        "look at its fiducial marks (do their numbers go with the certificate, was the photo turned on the "
+        "comparator?) and at the order and the signs of its principal point"
+    )
+    return found("P109", message, fix, {"shift_x_mm": x.value, "shift_y_mm": y.value}, photos=(name,))
 
 
 def _strips_of(camera: str, inputs: Inputs) -> list[str]:
