@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
@@ -14,25 +12,6 @@ from photostrip.strip.image_coordinates import lens_distortion
 
 PRINCIPAL_DISTANCE = list(CALIBRATION).index("c")
 POINT, K, P, AFFINE = [1, 2], [3, 4, 5], [6, 7], [8, 9]  # columns of parameters that belong together
-
-
-@dataclass(frozen=True, eq=False)
-class Calibrated:
-    """Which parameters of which cameras are unknown."""
-
-    # camera, kind: (c,): camera and number within ``CALIBRATION`` of each parameter
-    camera: Numbers
-    kind: Numbers
-    sigma: Floats  # (c,): a-priori standard deviations; infinite: free
-
-    def __len__(self) -> int:
-        return len(self.kind)
-
-
-def parameters(cameras: BundleCameras) -> Calibrated:
-    sigma = np.zeros((len(cameras.focal), len(CALIBRATION))) if cameras.sigma is None else cameras.sigma
-    camera, kind = np.nonzero(sigma > 0.0)
-    return Calibrated(camera, kind, sigma[camera, kind])
 
 
 def values_of(cameras: BundleCameras, common: Floats) -> Floats:

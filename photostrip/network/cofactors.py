@@ -41,7 +41,7 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
     to_points = -(found.equations.root.swapaxes(1, 2) @ back.reshape(q, 3, p))
     by_photo, by_point, image = at.rays.by_photo, at.rays.by_point, problem.images
     to_rays = by_photo @ to_photos[image.photo] + by_point @ to_points[image.point]
-    to_rays[..., : len(prepared.calibrated)] += at.rays.by_common.toarray().reshape(*at.rays.misfit.shape, -1)
+    to_rays[..., : prepared.calibrated] += at.rays.by_common.toarray().reshape(*at.rays.misfit.shape, -1)
     half = by_photo @ cross @ by_point.swapaxes(1, 2)
     of_rays = (
         np.eye(at.rays.misfit.shape[1])

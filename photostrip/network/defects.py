@@ -189,7 +189,7 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     with_rays[problem.images.point[inside[problem.images.photo]]] = True
     control = problem.control
     given = with_rays[control.point] & np.isfinite(control.sigma).any(axis=1)
-    with_common = len(prepared.calibrated)
+    with_common = prepared.calibrated
     positions = positions_at(problem.positions, state.centers, state.rotations, state.common, with_common)
     attitudes = attitudes_at(problem.attitudes, state.rotations, len(state.common))
     at = inside[positions.photo] & (positions.weight > 0.0).any(axis=1)

@@ -21,7 +21,7 @@ from scipy.sparse import csr_array, hstack
 from scipy.special import fdtrc, gammaincc, gammaln
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, Calibrated
+from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE
 from photostrip.network.calibration import POINT as PRINCIPAL_POINT
 from photostrip.network.normal_equations import Columns, Explained
 from photostrip.network.problem import BundleProblem, PositionObservations
@@ -31,7 +31,7 @@ from photostrip.network.solution import BundleSolution, Cofactors
 
 ORDER, OFFSET, DRIFT, LIST = "order of positions", "offset", "drift", "control list"
 LENS, FILM, POINT, DISTANCE = "lens distortion", "film", "principal point", "principal distance"
-PHOTO = "shift of a photo"
+SHIFT, SCALE = "shift of a photo", "scale of a photo"
 OF_CAMERAS = {
     LENS: [list(CALIBRATION).index("k1")],
     FILM: AFFINE,
@@ -39,6 +39,8 @@ OF_CAMERAS = {
     DISTANCE: [PRINCIPAL_DISTANCE],
 }
 """What may be wrong with a camera, with the columns of its parameters."""
+OF_PHOTOS = {SHIFT: PRINCIPAL_POINT, SCALE: [PRINCIPAL_DISTANCE]}
+"""What may be wrong with one photo: it has a principal point, or a principal distance, of its own."""
 ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group have one of their own
 REVERSED, FORWARDS, BACKWARDS = "reversed", "forwards", "backwards"  # rows of positions that belong to other photos
@@ -104,18 +106,19 @@ def _cameras(solution: BundleSolution) -> Iterator[Hypothesis]:
 
 
 def _photos(solution: BundleSolution) -> Iterator[Hypothesis]:
-    """Ask whether all image coordinates of a photo are shifted: other marks, another principal point."""
+    """Ask whether all image coordinates of a photo are shifted or enlarged: other marks, another lens or scan."""
     problem = solution.prepared.problem
-    images, m = problem.images, problem.photos
-    off = solution.image_residuals / images.sigma**2
-    pull, size = np.zeros((2, m, 2))
-    np.add.at(pull, images.photo, off)
-    np.add.at(size, images.photo, images.sigma**-2.0)
-    asking = (pull**2 / np.maximum(size, np.finfo(float).tiny)).sum(axis=1)
-    alone = np.bincount(problem.cameras.of_photo)[problem.cameras.of_photo] < min(2, m)
-    asking[alone] = 0.0  # its camera is asked about, or has been
-    most = np.argsort(-asking, kind="stable")[:ASKED_PHOTOS]
-    yield from (Hypothesis(PHOTO, photo) for photo in most[asking[most] > 0.0].tolist())
+    images, cameras, m = problem.images, problem.cameras, problem.photos
+    off, weight = solution.image_residuals / images.sigma**2, images.sigma**-2.0
+    alone = np.bincount(cameras.of_photo)[cameras.of_photo] < min(2, m)  # its camera is asked about, or has been
+    for kind, parts in ((SHIFT, np.ones((len(images), 2, 1)) * np.eye(2)), (SCALE, images.xy[:, :, None])):
+        pull, size = np.zeros((2, m, parts.shape[2]))
+        np.add.at(pull, images.photo, np.einsum("ni,nik->nk", off, parts))
+        np.add.at(size, images.photo, np.einsum("ni,nik->nk", weight, parts**2))
+        asking = (pull**2 / np.maximum(size, np.finfo(float).tiny)).sum(axis=1)
+        asking[alone] = 0.0
+        most = np.argsort(-asking, kind="stable")[:ASKED_PHOTOS]
+        yield from (Hypothesis(kind, photo) for photo in most[asking[most] > 0.0].tolist())
 
 
 HYPOTHESES: tuple[Callable[[BundleSolution], Iterator[Hypothesis]], ...] = (
@@ -172,7 +175,7 @@ def likeliest(
     every = [each for line in asked for each in line]
     if not every:
         return []
-    number = len(every) + (problem.photos if cameras else 0)
+    number = len(every) + (len(OF_PHOTOS) * problem.photos if cameras else 0)
     gains = [_gain(solution, *each) for each in zip(every, _explained(solution, every), strict=True)]
     found = [
         Likely.of(_with_shift(each, gain, solution), gain.squares / unit**2, len(gain.value), number)
@@ -218,7 +221,12 @@ def _gain(solution: BundleSolution, hypothesis: Hypothesis, explained: Explained
     problem = solution.prepared.problem
     if hypothesis.kind == DISTANCE and problem.cameras.focal[hypothesis.number] + value[0] <= 0.0:
         squares = 0.0  # heights that count downwards are no lens
-    if hypothesis.kind in {POINT, PHOTO} and np.abs(value).max() > np.abs(problem.images.xy).max():
+    if (
+        hypothesis.kind == SCALE
+        and problem.cameras.focal[problem.cameras.of_photo[hypothesis.number]] + value[0] <= 0.0
+    ):
+        squares = 0.0
+    if hypothesis.kind in {POINT, SHIFT} and np.abs(value).max() > np.abs(problem.images.xy).max():
         squares = 0.0  # no photo lies beside all that it shows
     return _Gain(squares, value, np.sqrt(np.diag(inverse)))
 
@@ -252,14 +260,14 @@ def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
     prepared = solution.prepared
     problem, size = prepared.problem, solution.image_residuals.size
     control, positions = problem.control, problem.positions
-    if hypothesis.kind in OF_CAMERAS or hypothesis.kind == PHOTO:
-        of_photo, photo = hypothesis.kind == PHOTO, hypothesis.number
-        kinds = np.array(PRINCIPAL_POINT if of_photo else OF_CAMERAS[hypothesis.kind])
-        camera = problem.cameras.of_photo[photo] if of_photo else hypothesis.number
-        calibrated = Calibrated(np.full(len(kinds), camera), kinds, np.full(len(kinds), np.inf))
-        rays = by_calibration(problem, calibrated, prepared.calibrated, solution.state)
+    if of_images(hypothesis):
+        cameras, kinds = problem.cameras, (OF_CAMERAS | OF_PHOTOS)[hypothesis.kind]
+        of_photo = hypothesis.kind in OF_PHOTOS
+        asked = np.full((len(cameras.focal), len(CALIBRATION)), -1)
+        asked[cameras.of_photo[hypothesis.number] if of_photo else hypothesis.number, kinds] = np.arange(len(kinds))
+        rays = by_calibration(problem, asked, solution.state)
         if of_photo:
-            own = np.repeat(problem.images.photo == photo, 2)
+            own = np.repeat(problem.images.photo == hypothesis.number, 2)
             rays = csr_array(rays.multiply(own[:, None]))
         return Columns(rays, np.zeros((len(control), 3, len(kinds))), np.zeros((len(positions), 3, len(kinds))))
     if hypothesis.kind == LIST:
@@ -301,8 +309,8 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
         return replace(problem, control=control)
     if hypothesis.kind == ORDER:
         return replace(problem, positions=_in_order(positions, hypothesis.of))
-    if hypothesis.kind == PHOTO:
-        return _with_own_camera(problem, hypothesis.number)
+    if hypothesis.kind in OF_PHOTOS:
+        return _with_own_camera(problem, hypothesis.number, OF_PHOTOS[hypothesis.kind])
     if hypothesis.kind in OF_CAMERAS:
         camera = np.array([hypothesis.number])
         return replace(problem, cameras=cameras.with_unknown(camera, OF_CAMERAS[hypothesis.kind]))
@@ -316,33 +324,34 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
     return replace(problem, positions=changed, group_ids=names)
 
 
-def _with_own_camera(problem: BundleProblem, photo: int) -> BundleProblem:
-    """Give a photo a camera of its own, whose principal point is unknown."""
+def _with_own_camera(problem: BundleProblem, photo: int, columns: list[int]) -> BundleProblem:
+    """Give a photo a camera of its own, which differs from that of the others by some parameters."""
     cameras = problem.cameras
     old, new = int(cameras.of_photo[photo]), len(cameras.focal)
     row = [*range(new), old]
-    of_photo = np.where(np.arange(problem.photos) == photo, new, cameras.of_photo)
+    nothing = np.zeros((1, len(CALIBRATION)))
     changed = replace(
         cameras,
-        of_photo=of_photo,
+        of_photo=np.where(np.arange(problem.photos) == photo, new, cameras.of_photo),
         focal=cameras.focal[row],
-        sigma=None if cameras.sigma is None else cameras.sigma[row],
-        prior=None if cameras.prior is None else cameras.prior[row],
+        sigma=None if cameras.sigma is None else np.concatenate([cameras.sigma, nothing]),
+        prior=None if cameras.prior is None else np.concatenate([cameras.prior, np.full_like(nothing, np.inf)]),
         distortion=tuple(cameras.distortion[each] for each in row) if cameras.distortion else (),
+        like=np.append(np.arange(new) if cameras.like is None else cameras.like, old),
     )
     names = (*problem.camera_ids, f"of photo {problem.photo_name(photo)}") if problem.camera_ids else ()
-    return replace(problem, cameras=changed.with_unknown(np.array([new]), PRINCIPAL_POINT), camera_ids=names)
+    return replace(problem, cameras=changed.with_unknown(np.array([new]), columns), camera_ids=names)
 
 
 def of_images(hypothesis: Hypothesis) -> bool:
     """Whether the parameters of a hypothesis are those of a camera."""
-    return hypothesis.kind in OF_CAMERAS or hypothesis.kind == PHOTO
+    return hypothesis.kind in OF_CAMERAS or hypothesis.kind in OF_PHOTOS
 
 
 def place(problem: BundleProblem, hypothesis: Hypothesis) -> tuple[int, list[int]]:
     """Return the camera, and the columns of its parameters, that a hypothesis has made unknown."""
-    if hypothesis.kind == PHOTO:
-        return int(problem.cameras.of_photo[hypothesis.number]), PRINCIPAL_POINT
+    if hypothesis.kind in OF_PHOTOS:
+        return int(problem.cameras.of_photo[hypothesis.number]), OF_PHOTOS[hypothesis.kind]
     return hypothesis.number, OF_CAMERAS[hypothesis.kind]
 
 

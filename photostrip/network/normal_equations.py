@@ -41,8 +41,8 @@ class Linearised:
 
 
 def linearise(prepared: PreparedProblem, state: Parameters) -> Linearised:
-    problem, calibrated = prepared.problem, len(prepared.calibrated)
-    rays = view(problem, prepared.calibrated, state)
+    problem, calibrated = prepared.problem, prepared.calibrated
+    rays = view(problem, state)
     control = problem.control
     counts = (1.0 / control.sigma) * prepared.measured[control.point][:, None]
     by_controlled = control.axes * counts[:, :, None]
@@ -132,7 +132,7 @@ def equations_at(prepared: PreparedProblem, state: Parameters, damping: float = 
     right_common -= prepared.prior**-2.0 * state.common
     C = csr_array((rays.by_common.data, rays.by_common.indices, rays.by_common.indptr), shape=(rays.misfit.size, p))
     common_points = csr_array((3 * q, p))
-    if len(prepared.calibrated):
+    if prepared.calibrated:
         common_points = csr_array(roots @ (by_point @ C))
         border += (by_photo @ C - carried @ common_points).toarray()
         corner += (C.T @ C - common_points.T @ common_points).toarray()

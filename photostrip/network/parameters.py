@@ -10,8 +10,6 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.network import calibration
-from photostrip.network.calibration import Calibrated
 from photostrip.network.problem import BundleProblem, ImageObservations, ModelObservations, Parameters
 
 TOGETHER = 64  # points that are worked on together: twice and half as many take as long
@@ -34,7 +32,7 @@ class PreparedProblem:
     """A problem with everything about it that does not change during the adjustment."""
 
     problem: BundleProblem
-    calibrated: Calibrated
+    calibrated: int  # how many of the common parameters are those of cameras; they come first
     prior: Floats  # (p,): a-priori sigmas of all common parameters
     measured: Flags  # (q,): points with rays
     joined: csr_array  # (m, m): how many points each pair of photos shares; every photo with itself
@@ -67,9 +65,9 @@ class PreparedProblem:
 
 def prepare(problem: BundleProblem) -> PreparedProblem:
     """Find what does not change during the adjustment."""
-    calibrated = calibration.parameters(problem.cameras)
+    of_cameras = np.zeros(0) if problem.cameras.sigma is None else problem.cameras.sigma
     drifts = (problem.positions.offset_sigma, problem.positions.drift_sigma)
-    sigmas = [calibrated.sigma, *(sigma[sigma > 0.0] for sigma in drifts)]
+    sigmas = [sigma[sigma > 0.0] for sigma in (of_cameras, *drifts)]
     images, m, q = problem.images, problem.photos, problem.points
     shown = csr_array((np.ones(len(images)), (images.photo, images.point)), shape=(m, q))
     joined = csr_array(shown @ shown.T + csr_array((np.ones(m), (np.arange(m), np.arange(m))), shape=(m, m)))
@@ -79,7 +77,7 @@ def prepare(problem: BundleProblem) -> PreparedProblem:
     own = np.flatnonzero(row == column)
     return PreparedProblem(
         problem=problem,
-        calibrated=calibrated,
+        calibrated=len(sigmas[0]),
         prior=np.concatenate(sigmas),
         measured=np.bincount(images.point, minlength=q) > 0,
         joined=joined,

@@ -150,6 +150,8 @@ class BundleCameras:
     prior: Floats | None = None
     # of each camera: the given distortion, taken out of the image coordinates; (): none
     distortion: tuple[Distortion | None, ...] = ()
+    # (cameras,), or None: the camera whose other unknown parameters each has, too; None: every one has its own
+    like: Numbers | None = None
 
     @property
     def unknown(self) -> Numbers:
@@ -158,7 +160,7 @@ class BundleCameras:
         if self.sigma is not None:
             free = self.sigma > 0.0
             found[free] = np.arange(int(free.sum()))
-        return found
+        return found if self.like is None else np.where(found >= 0, found, found[self.like])
 
     def with_unknown(self, cameras: Numbers, columns: Sequence[int]) -> BundleCameras:
         """Return the cameras with more parameters of some of them unknown."""

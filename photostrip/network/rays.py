@@ -20,7 +20,6 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.network.calibration import (
     PRINCIPAL_DISTANCE,
-    Calibrated,
     corrected,
     partials,
     values_of,
@@ -43,15 +42,14 @@ class Rays:
     by_common: csr_array  # (c n, p): by the calibration parameters
 
 
-def view(problem: BundleProblem, calibrated: Calibrated, state: Parameters) -> Rays:
+def view(problem: BundleProblem, state: Parameters) -> Rays:
     """Compute what all rays, or all model coordinates, should have measured."""
     if isinstance(problem.images, ModelObservations):
         return _models(problem.images, state)
-    images, cameras, common = problem.images, problem.cameras, state.common[: len(calibrated)]
-    photo, weight = images.photo, 1.0 / images.sigma
-    distance = calibrated.kind == PRINCIPAL_DISTANCE
-    focal = cameras.focal.astype(float)
-    np.add.at(focal, calibrated.camera[distance], common[distance])
+    images, cameras = problem.images, problem.cameras
+    photo, weight, unknown = images.photo, 1.0 / images.sigma, cameras.unknown
+    values = values_of(cameras, state.common)
+    focal = cameras.focal + values[:, PRINCIPAL_DISTANCE]
     pull = focal[cameras.of_photo[photo]][:, None] * weight
     back = np.ascontiguousarray(np.swapaxes(state.rotations, 1, 2))[photo]
     arm = np.einsum("nij,nj->ni", back, state.points[images.point] - state.centers[photo])
@@ -64,13 +62,12 @@ def view(problem: BundleProblem, calibrated: Calibrated, state: Parameters) -> R
     by_photo[:, 0, 3], by_photo[:, 0, 4], by_photo[:, 0, 5] = -u * v, 1.0 + u * u, v
     by_photo[:, 1, 3], by_photo[:, 1, 4], by_photo[:, 1, 5] = -1.0 - v * v, u * v, -u
     by_photo *= pull[:, :, None]
-    values = values_of(cameras, common)
-    measured = images.xy if not len(calibrated) else corrected(cameras, values, images.xy, cameras.of_photo[photo])
+    measured = images.xy if (unknown < 0).all() else corrected(cameras, values, images.xy, cameras.of_photo[photo])
     return Rays(
         misfit=measured * weight - ratio * pull,
         by_photo=by_photo,
         by_point=-by_photo[:, :, :3] @ back,
-        by_common=_by_calibration(problem, calibrated, values, ratio, weight),
+        by_common=_by_calibration(problem, unknown, values, ratio, weight),
     )
 
 
@@ -116,32 +113,32 @@ def whitening(measured: ImageObservations | ModelObservations) -> Floats:
     return white
 
 
-def by_calibration(problem: BundleProblem, asked: Calibrated, known: Calibrated, state: Parameters) -> csr_array:
+def by_calibration(problem: BundleProblem, asked: Numbers, state: Parameters) -> csr_array:
     """Differentiate computed minus corrected image coordinates by calibration parameters that are asked about.
 
-    known: the parameters that are unknowns at the state. Returns (2 n, c), in units of sigma.
+    asked: (cameras, 10): column of each parameter, -1: not asked about. Returns (2 n, c), in units of sigma.
     """
     images = problem.images
     back = np.swapaxes(state.rotations, 1, 2)[images.photo]
     arm = np.einsum("nij,nj->ni", back, state.points[images.point] - state.centers[images.photo])
-    values = values_of(problem.cameras, state.common[: len(known)])
+    values = values_of(problem.cameras, state.common)
     return _by_calibration(problem, asked, values, -arm[:, :2] / arm[:, 2:], 1.0 / images.sigma)
 
 
 def _by_calibration(
-    problem: BundleProblem, calibrated: Calibrated, values: Floats, ratio: Floats, weight: Floats
+    problem: BundleProblem, unknown: Numbers, values: Floats, ratio: Floats, weight: Floats
 ) -> csr_array:
     """Differentiate computed minus corrected image coordinates by the calibration parameters: (2 n, c), in sigmas."""
-    shape = (2 * len(ratio), len(calibrated))
-    if not len(calibrated):
+    shape = (2 * len(ratio), int(unknown.max(initial=-1)) + 1)
+    if not shape[1]:
         return csr_array(shape)
     camera = problem.cameras.of_photo[problem.images.photo]
     entries, rows, columns = [], [], []
-    for number in np.unique(calibrated.camera).tolist():
-        ray, column = np.flatnonzero(camera == number), np.flatnonzero(calibrated.camera == number)
+    for number in np.flatnonzero((unknown >= 0).any(axis=1)).tolist():
+        ray, kind = np.flatnonzero(camera == number), np.flatnonzero(unknown[number] >= 0)
         table = partials(problem.cameras, values, number, problem.images.xy[ray], ratio[ray])
-        entries.append((table[calibrated.kind[column]] * weight[ray].T).ravel())
-        places = np.broadcast_arrays(column[:, None, None], 2 * ray + np.arange(2)[:, None])
+        entries.append((table[kind] * weight[ray].T).ravel())
+        places = np.broadcast_arrays(unknown[number, kind][:, None, None], 2 * ray + np.arange(2)[:, None])
         columns.append(places[0].ravel())
         rows.append(places[1].ravel())
     place = (np.concatenate(rows), np.concatenate(columns))

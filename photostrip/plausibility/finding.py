@@ -27,7 +27,7 @@ KINDS: dict[str, Kind] = {
     "P106": Kind("fiducial marks measured in another unit", WARNING),
     "P107": Kind("another principal distance fits better", WARNING),
     "P108": Kind("standard deviations in another unit", WARNING),
-    "P109": Kind("image coordinates of one photo shifted", WARNING),
+    "P109": Kind("image coordinates of one photo shifted or enlarged", WARNING),
     "P110": Kind("lens distortion that is not stated", WARNING),
     "P111": Kind("another principal point fits better", WARNING),
     "P112": Kind("images longer or shorter one way than the other", WARNING),

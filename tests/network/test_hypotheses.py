@@ -9,7 +9,19 @@ import numpy as np
 import pytest
 
 from photostrip.network import hypotheses
-from photostrip.network.hypotheses import DISTANCE, DRIFT, FILM, LENS, LIST, OFFSET, PHOTO, POINT, Likely, most_likely
+from photostrip.network.hypotheses import (
+    DISTANCE,
+    DRIFT,
+    FILM,
+    LENS,
+    LIST,
+    OFFSET,
+    POINT,
+    SCALE,
+    SHIFT,
+    Likely,
+    most_likely,
+)
 from photostrip.network.problem import PositionObservations
 from photostrip.network.solve import solve
 from photostrip.simulation import Control, Flight, Points, Spec, simulate
@@ -56,7 +68,7 @@ def test_every_hypothesis_gains_what_an_adjustment_with_it_does() -> None:
     problem = with_positions_and_lists()
     solution = solve(problem)
     every = asked(solution)
-    assert {each.kind for each in every} == {OFFSET, DRIFT, LIST, LENS, FILM, POINT, DISTANCE, PHOTO}
+    assert {each.kind for each in every} == {OFFSET, DRIFT, LIST, LENS, FILM, POINT, DISTANCE, SHIFT, SCALE}
     for each in nonempty(every):
         (found,) = hypotheses.likeliest(
             solution, 1.0, 1e-9, cameras=True, refused=[other for other in every if other is not each]

@@ -17,11 +17,12 @@ from photostrip.network.hypotheses import (
     FORWARDS,
     LENS,
     LIST,
+    OF_PHOTOS,
     OFFSET,
     ORDER,
-    PHOTO,
     POINT,
     REVERSED,
+    SHIFT,
     SHOWN_SIGMAS,
     Hypothesis,
 )
@@ -45,11 +46,13 @@ def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
     shared = bundle.screened.common
     yield from (_list(each, inputs) for each in shared if each.kind == LIST)
     if any(each.kind == DISTANCE for each in shared):
-        yield from (_distance(each, inputs) for each in bundle.parameters if _is_distance(each))
+        cameras = {strip.camera.name for strip in inputs.strips}
+        of_cameras = (each for each in bundle.parameters if each.camera in cameras)
+        yield from (_distance(each, inputs) for each in of_cameras if _is_distance(each))
     yield from (_lens(each, bundle, inputs) for each in shared if each.kind == LENS)
     yield from (_point(each, bundle, inputs) for each in shared if each.kind == POINT)
     yield from (_film(each, bundle, inputs) for each in shared if each.kind == FILM)
-    yield from (_photo(each, bundle) for each in shared if each.kind == PHOTO)
+    yield from (_photo(each, bundle, inputs) for each in shared if each.kind in OF_PHOTOS)
     yield from (_order(each, bundle) for each in shared if each.kind == ORDER)
     of_positions = [each for each in shared if each.kind in {OFFSET, DRIFT}]
     if of_positions:
@@ -156,23 +159,36 @@ def _film(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     return found("P112", message, fix, numbers, strips=strips, key="processing.self_calibration")
 
 
-def _photo(error: Hypothesis, bundle: Bundle) -> Finding:
+def _photo(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     problem = bundle.screened.problem
-    name = problem.photo_name(error.number)
-    x, y = (
-        each for each in bundle.parameters if each.camera == problem.camera_ids[problem.cameras.of_photo[error.number]]
-    )
+    name, camera = problem.photo_name(error.number), problem.camera_ids[problem.cameras.of_photo[error.number]]
+    own = [each for each in bundle.parameters if each.camera == camera]
     rays = int((problem.images.photo == error.number).sum())
+    numbers: Evidence
+    if error.kind == SHIFT:
+        x, y = (each for each in own if each.name.startswith("principal_point"))
+        how = (
+            f"shifted by {x.value:+.2f} mm in x and {y.value:+.2f} mm in y (standard deviations {x.sigma:.2g} and "
+            f"{y.sigma:.2g} mm)"
+        )
+        fix = (
+            "look at its fiducial marks (do their numbers go with the certificate, was the photo turned on the "
+            "comparator?) and at the order and the signs of its principal point"
+        )
+        numbers = {"shift_x_mm": x.value, "shift_y_mm": y.value}
+    else:
+        (c,) = (each for each in own if each.name == "principal_distance")
+        focal = problem.cameras.focal[problem.cameras.of_photo[error.number]]
+        scale, sigma = 1.0 + c.value / focal, c.sigma / focal
+        how = f"{scale:.4f} times as large as those of its neighbours (standard deviation {sigma:.1g})"
+        fix = "is it from another flight or scan, or taken with another lens?"
+        numbers = {"scale": scale, "standard_deviation": sigma}
     message = (
-        f"all image coordinates of photo {name} are shifted by {x.value:+.2f} mm in x and {y.value:+.2f} mm in y "
-        f"(standard deviations {x.sigma:.2g} and {y.sigma:.2g} mm): once that is taken off, {rays} of its points agree "
-        "with the neighbouring photos. The adjustment continued without the shift"
+        f"all image coordinates of photo {name} are {how}: once that is taken off, {rays} of its points agree with the "
+        "neighbouring photos. The adjustment continued so"
     )
-    fix = (
-        "look at its fiducial marks (do their numbers go with the certificate, was the photo turned on the "
-        "comparator?) and at the order and the signs of its principal point"
-    )
-    return found("P109", message, fix, {"shift_x_mm": x.value, "shift_y_mm": y.value}, photos=(name,))
+    strips = [strip.id for strip in inputs.strips if name in strip.photos]
+    return found("P109", message, fix, numbers, photos=(name,), strips=strips)
 
 
 def _strips_of(camera: str, inputs: Inputs) -> list[str]:

@@ -2,7 +2,6 @@
 
 ``units`` the size of image coordinates, ``mosaic`` photos laid out side by side by their common points,
 ``flight_order`` what that says about the order, ``identity`` ids of points, ``tied_strips`` those of two strips,
-``shifted_photo`` shifts of a whole photo, ``flight`` the perspective centres of a formed strip, ``rotations`` the
-reading of given angles. All but ``units`` look at what is common to neighbours, so that neither the principal distance
-nor the control matters.
+``flight`` the perspective centres of a formed strip, ``rotations`` the reading of given angles. All but ``units`` look
+at what is common to neighbours, so that neither the principal distance nor the control matters.
 """
