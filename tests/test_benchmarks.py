@@ -153,10 +153,18 @@ def test_screening_prints_how_the_time_grows() -> None:
 
 
 @pytest.mark.slow
-def test_false_alarms_prints_a_row_for_each_layout() -> None:
-    out = printed("false_alarms.py", "--count", "1", "--first", "7", "corners", "GNSS")
-    assert len(re.findall(r"^(?:corners|blocks|strips|GNSS)[\w ,]+ +1 +0", out, re.MULTILINE)) == 4
-    assert re.search(r"^all +4 +0 +0\.00 %$", out, re.MULTILINE)
+def test_causes_prints_a_row_for_each_kind_and_layout_beside_the_goals() -> None:
+    options = ("--first", "43003", "short or long one way", "heights in feet", "corners", "strips held by GNSS")
+    out = printed("causes.py", *options)
+    rows = re.findall(
+        r"^(film|their|heights)[\w .%,]+? +1 +([01])((?: +(?:\d+ %|-)){3})(?: +[.1]){4}$", out, re.MULTILINE
+    )
+    assert [name for name, _, _ in rows] == ["film", "their", "heights"]
+    assert rows[0][1] == "1"
+    assert rows[0][2].split()[:2] == ["100", "%"]
+    assert re.search(r"^true cause first: \d+\.\d % of [23] that can be told \(goal: 85 %\)$", out, re.MULTILINE)
+    assert len(re.findall(r"^(?:corners|strips)[\w ,]+ +1 +0 +0 +0  $", out, re.MULTILINE)) == 2
+    assert re.search(r"^alarms: 0\.00 % of 2 sound projects \(goal: at most 0\.5 %\), 0 refused", out, re.MULTILINE)
 
 
 @pytest.mark.slow
