@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywher
 
 from photostrip.errors import InputError, PhotostripError
 from photostrip.geometry.rotation import angles, from_angles
-from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
+from photostrip.pipeline.inputs import AUTO, CameraPositions, GivenOrientations
 from photostrip.pipeline.run import triangulate
 from photostrip.result.document import document_of
 from photostrip.simulation import (
@@ -39,6 +39,7 @@ from photostrip.simulation import (
     Control,
     Film,
     Flight,
+    Gnss,
     GrossError,
     Ground,
     Image,
@@ -70,8 +71,8 @@ SHIFT = 5.0  # mm
 HARMLESS = np.radians(0.3)  # rms of given angles: start values need not be better
 BEYOND = 1 / 3  # of what the control spans, beyond which a sound strip does not reach at either end
 TOLD_APART = 5.0  # standard deviations of an image coordinate
-GNSS_SIGMA = 0.1  # metres
-ATTITUDE_SIGMA = np.radians(0.02)
+POSITION_SIGMA, ATTITUDE_SIGMA = 0.1, np.radians(0.02)  # metres, radians
+OPK = "omega-phi-kappa"
 PLAIN = 20.0  # times the noise, by which a slip stands out beside exchanged points
 ATTEMPTS = 20
 WIDE = replace(FILM, name="wide", principal_distance=88.0)
@@ -100,18 +101,20 @@ class Case:
 
     @property
     def photos(self) -> tuple[str, ...]:
-        """Photos of the first strip."""
         return self.inputs.strips[0].photos
 
     @property
     def spec(self) -> Spec:
-        """What was simulated."""
         return self.simulation.spec
 
     @property
     def kind(self) -> str:
-        """Kind of frame that the control has."""
         return {"EPSG:4326": "geographic"}.get(self.spec.ground.crs, self.spec.ground.crs.partition(":")[0])
+
+    @property
+    def metre(self) -> Floats:
+        """Size of a metre in the units of its frame, roughly."""
+        return np.array([1e-5, 1e-5, 1.0] if self.kind == "geographic" else [1.0, 1.0, 1.0])
 
     @property
     def noise(self) -> tuple[float, float]:
@@ -130,7 +133,6 @@ class Case:
         return np.flatnonzero(np.isin(control.ids, measured) & control.use.all(axis=1) & (control.check == check))
 
     def shows(self, photo: str) -> Flags:
-        """Image points of a photo."""
         o = self.inputs.observations
         return np.asarray(o.photo == o.photo_ids.index(photo))
 
@@ -143,23 +145,43 @@ NOBODY: frozenset[str] = frozenset()
 # ----------------------------------------------------------------------------------------------- strips and blocks
 
 
-def sound(seed: int) -> Case:
-    """Simulate a strip without a mistake."""
-    rng = np.random.default_rng([7, seed])
-    for attempt in range(ATTEMPTS):
-        spec = drawn(rng, seed * ATTEMPTS + attempt)
-        try:
-            simulation = simulate(spec)
-        except InputError:
-            continue  # the pass points of so few photos did not suffice
-        case = Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
-        if holds_both_ends(case) and not in_one_place(case):
-            return case
-    raise SystemExit(f"no strip can be made of seed {seed}")
+def given_as_simulated(_: np.random.Generator, simulation: Simulation) -> Inputs:
+    return inputs_of(simulation)
 
 
-def drawn(rng: np.random.Generator, seed: int) -> Spec:
-    """Draw what is to be simulated."""
+def layout(
+    stream: int | tuple[int, ...],
+    draw: Callable[[np.random.Generator], Spec],
+    *,
+    methods: tuple[str, ...] = (AUTO,),
+    given: Callable[[np.random.Generator, Simulation], Inputs] = given_as_simulated,
+    fits: Callable[[Case], bool] = lambda _: True,
+) -> Make:
+    """Simulate what is drawn and make a project of it; drawn again where so few points do not suffice.
+
+    stream: numbers of the stream of random numbers, beside the seed.
+    given: what is given of a simulation.
+    fits: whether a project will do.
+    """
+
+    def make(seed: int) -> Case:
+        rng = np.random.default_rng([*np.atleast_1d(stream).tolist(), seed])
+        for attempt in range(ATTEMPTS):
+            try:
+                simulation = simulate(replace(draw(rng), seed=seed * ATTEMPTS + attempt))
+                inputs = given(rng, simulation)
+            except InputError:
+                continue
+            settings = replace(settings_of(simulation), adjustment=str(rng.choice(methods)))
+            case = Case(simulation, inputs, settings, rng)
+            if fits(case):
+                return case
+        raise SystemExit(f"nothing can be made of seed {seed}")
+
+    return make
+
+
+def drawn(rng: np.random.Generator) -> Spec:
     camera = CAMERAS[rng.integers(len(CAMERAS))]
     scale = float(np.exp(rng.uniform(np.log(3000), np.log(40000))))
     height = scale * camera.principal_distance / 1000.0
@@ -171,9 +193,8 @@ def drawn(rng: np.random.Generator, seed: int) -> Spec:
     shares: tuple[dict[str, float], ...] = ({"xyz": 1.0}, {"xyz": 1.0}, {"xyz": 0.7, "xy": 0.1, "z": 0.2})
     ground = GROUNDS[rng.integers(len(GROUNDS))]
     use = shares[rng.integers(3)] if ground.crs != "geocentric" else shares[0]
-    layout = str(rng.choice(["bands", "bands", "bands", "corners", "corners+centre", "random"]))
+    kind = str(rng.choice(["bands", "bands", "bands", "corners", "corners+centre", "random"]))
     return Spec(
-        seed=seed,
         camera=camera,
         ground=ground,
         flight=Flight(
@@ -187,7 +208,7 @@ def drawn(rng: np.random.Generator, seed: int) -> Spec:
         terrain=Terrain(relief=relief, slope_percent=(float(rng.uniform(-5, 5)), float(rng.uniform(-5, 5)))),
         points=Points(rows=rows, extra_per_model=int(rng.integers(3, 15))),
         control=Control(
-            layout="bands" if len(use) > 1 else layout,
+            layout="bands" if len(use) > 1 else kind,
             bands=int(rng.integers(3 if len(use) > 1 else 2, 4)),
             per_band=3,
             count=int(rng.integers(8, 14)),
@@ -199,94 +220,65 @@ def drawn(rng: np.random.Generator, seed: int) -> Spec:
     )
 
 
-def like(stream: int, change: Callable[[np.random.Generator, Spec], Spec | None]) -> Make:
-    """Simulate other flights over what is drawn for strips; what the change refuses is drawn again."""
-
-    def make(seed: int) -> Case:
-        rng = np.random.default_rng([stream, seed])
-        for attempt in range(ATTEMPTS):
-            spec = change(rng, drawn(rng, seed * ATTEMPTS + attempt))
-            if spec is None:
-                continue
-            try:
-                simulation = simulate(replace(spec, gross_errors=()))
-            except InputError:
-                continue
-            return Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
-        raise SystemExit(f"nothing can be made of seed {seed}")
-
-    return make
-
-
-def as_block(rng: np.random.Generator, spec: Spec) -> Spec | None:
-    """Two or three strips over hills."""
+def in_block(rng: np.random.Generator) -> Spec:
+    """Draw two or three strips over hills; InputError for a frame without heights."""
+    spec = drawn(rng)
     if spec.ground.crs == "geocentric":
-        return None
+        raise InputError("heights are wanted")
     flight = replace(spec.flight, strips=int(rng.integers(2, 4)), side_lap_percent=float(rng.uniform(25, 40)))
     control = replace(spec.control, layout="bands", bands=3, use={"xyz": 1.0})
     hills = replace(spec.terrain, relief=max(spec.terrain.relief, 0.05 * spec.flying_height))
-    return replace(spec, flight=flight, control=control, terrain=hills, points=replace(spec.points, rows=5))
+    points = replace(spec.points, rows=5)
+    return replace(spec, flight=flight, control=control, terrain=hills, points=points, gross_errors=())
 
 
-def as_models(rng: np.random.Generator, spec: Spec) -> Spec:
-    """6 to 40 independent models."""
+def in_models(rng: np.random.Generator) -> Spec:
+    """Draw 6 to 40 independent models."""
+    spec = drawn(rng)
     flight = replace(spec.flight, photos=int(rng.integers(7, 42)))
     control = replace(spec.control, layout="bands", every=int(rng.integers(3, 16)), use={"xyz": 1.0})
-    return replace(spec, flight=flight, control=control, models=Models())
+    return replace(spec, flight=flight, control=control, models=Models(), gross_errors=())
 
 
-def at_the_edge_of_a_zone(rng: np.random.Generator, spec: Spec) -> Spec:
-    """Where grid north is three to five degrees away from true north."""
-    center = (15.0 + float(rng.choice([-1.0, 1.0]) * rng.uniform(3.5, 5.5)), float(rng.uniform(58.0, 66.0)))
-    return replace(spec, ground=Ground("EPSG:32633", center_deg=center))
+def at_the_edge_of_a_zone(rng: np.random.Generator) -> Spec:
+    """Draw a strip where grid north is three to five degrees away from true north."""
+    center = (15.0 + float(either(rng, 3.5, 5.5)), float(rng.uniform(58.0, 66.0)))
+    return replace(drawn(rng), ground=Ground("EPSG:32633", center_deg=center), gross_errors=())
 
 
-block = like(9, as_block)
-of_models = like(10, as_models)
+def with_gnss(_: np.random.Generator, simulation: Simulation) -> Inputs:
+    """Give the inputs with the measured positions of the cameras, where there are any."""
+    inputs, enu = inputs_of(simulation), simulation.gnss
+    if enu is None or simulation.spec.gnss is None:
+        return inputs
+    n = len(enu)
+    use, sigma, time = np.ones((n, 3), bool), np.tile(simulation.spec.gnss.sigma, (n, 1)), np.full(n, np.nan)
+    positions = CameraPositions(simulation.truth.photo_ids, inputs.frames[0], enu, use, sigma, time)
+    return replace(inputs, positions=positions)
 
 
-def with_ties(strips: int) -> Make:
-    """Simulate blocks of so many strips with many points, without a mistake."""
-
-    def make(seed: int) -> Case:
-        rng = np.random.default_rng([24, seed])
-        flight, points = Flight(photos=6, strips=strips), Points(extra_per_model=20)
-        simulation = simulate(Spec(seed=seed, flight=flight, control=Control(bands=3), points=points))
-        return Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
-
-    return make
-
-
-def with_positions(seed: int) -> Case:
-    """Simulate a strip with measured positions of its cameras."""
-    case, attempt = sound(seed), 0
-    while case.kind == "geocentric":
-        attempt += 1
-        case = sound(seed + 1_000_000 * attempt)
-    truth, metres = case.simulation.truth, [1e-5, 1e-5, 1.0] if case.kind == "geographic" else [1.0, 1.0, 1.0]
-    n = len(truth.photo_ids)
-    enu = truth.centers_ground + case.rng.normal(0.0, GNSS_SIGMA, (n, 3)) * metres
-    use, sigma, time = np.ones((n, 3), bool), np.full((n, 3), GNSS_SIGMA), np.full(n, np.nan)
-    positions = CameraPositions(truth.photo_ids, case.inputs.frames[0], enu, use, sigma, time)
-    return replace(case, inputs=replace(case.inputs, positions=positions))
+def oriented(
+    simulation: Simulation, enu: Floats, values: Floats, system: str = OPK, sigma: tuple[float, float] | None = None
+) -> Inputs:
+    """Give the inputs with orientations: a start, or observations of standard deviations in metres and radians."""
+    inputs, photos = inputs_of(simulation), simulation.truth.photo_ids
+    plan, turn = (np.full((len(enu), 3), each) for each in sigma or (np.nan, np.nan))
+    frame, observed = inputs.output or inputs.frames[0], sigma is not None
+    given = GivenOrientations(photos, frame, enu, values, system, plan, turn, observed)
+    return replace(inputs, orientations=given)
 
 
-def with_attitudes(seed: int) -> Case:
-    """Simulate a strip at the edge of a zone with measured orientations, whose angles refer to the grid."""
-    case = like(11, at_the_edge_of_a_zone)(seed)
-    truth = case.simulation.truth
-    n, read = len(truth.photo_ids), angles(truth.rotations_local, "omega-phi-kappa")
-    given = GivenOrientations(
-        photos=truth.photo_ids,
-        frame=case.inputs.frames[0],
-        enu=truth.centers_ground + case.rng.normal(0.0, GNSS_SIGMA, (n, 3)),
-        angles=read + case.rng.normal(0.0, ATTITUDE_SIGMA, (n, 3)),
-        system="omega-phi-kappa",
-        sigma=np.full((n, 3), GNSS_SIGMA),
-        sigma_angles=np.full((n, 3), ATTITUDE_SIGMA),
-        observed=True,
-    )
-    return replace(case, inputs=replace(case.inputs, orientations=given))
+def with_attitudes(rng: np.random.Generator, simulation: Simulation) -> Inputs:
+    """Give measured orientations, whose angles refer to the grid."""
+    truth, n = simulation.truth, len(simulation.truth.photo_ids)
+    enu = truth.centers_ground + rng.normal(0.0, POSITION_SIGMA, (n, 3))
+    values = angles(truth.rotations_local, OPK) + rng.normal(0.0, ATTITUDE_SIGMA, (n, 3))
+    return oriented(simulation, enu, values, sigma=(POSITION_SIGMA, ATTITUDE_SIGMA))
+
+
+def is_sound(case: Case) -> bool:
+    """Whether nothing must be told of the layout of its control and points."""
+    return holds_both_ends(case) and not in_one_place(case)
 
 
 def holds_both_ends(case: Case) -> bool:
@@ -326,17 +318,28 @@ def places(case: Case) -> tuple[Floats, Floats]:
     return xyz @ axis / length, xyz @ side / case.spec.base
 
 
+def with_ties(strips: int, gross: Callable[[np.random.Generator], tuple[GrossError, ...]] = lambda _: ()) -> Make:
+    """Make blocks of so many strips with many points."""
+    flight, points, control = Flight(photos=6, strips=strips), Points(extra_per_model=20), Control(bands=3)
+    return layout(24, lambda rng: Spec(flight=flight, points=points, control=control, gross_errors=gross(rng)))
+
+
+sound = layout(7, drawn, fits=is_sound)
+block = layout(9, in_block)
+of_models = layout(10, in_models)
+with_positions = layout(7, lambda rng: replace(drawn(rng), gnss=Gnss(use=True)), given=with_gnss, fits=is_sound)
+at_the_edge = layout(11, at_the_edge_of_a_zone, given=with_attitudes)
+
 # --------------------------------------------------------------------------------- mistakes in images and cameras
 
 
-def with_xy(case: Case, xy: Floats) -> Inputs:
-    """Give the inputs with other image coordinates."""
-    return replace(case.inputs, observations=replace(case.inputs.observations, xy=xy))
+def with_images(case: Case, **columns: object) -> Inputs:
+    return replace(case.inputs, observations=replace(case.inputs.observations, **columns))  # type: ignore[arg-type]
 
 
 def of_all_images(change: Callable[[Case, Floats], Floats]) -> Plant:
     """Change the image coordinates (n, 2) of all photos."""
-    return lambda case: (with_xy(case, change(case, case.inputs.observations.xy)), NOBODY)
+    return lambda case: (with_images(case, xy=change(case, case.inputs.observations.xy)), NOBODY)
 
 
 def of_one_photo(change: Callable[[Case, Floats], Floats], *, inside: bool = False) -> Plant:
@@ -346,7 +349,7 @@ def of_one_photo(change: Callable[[Case, Floats], Floats], *, inside: bool = Fal
         photos = case.photos[1:-1] if inside else [photo for strip in case.inputs.strips for photo in strip.photos]
         photo, xy = str(case.rng.choice(photos)), case.inputs.observations.xy.copy()
         xy[case.shows(photo)] = change(case, xy[case.shows(photo)])
-        return with_xy(case, xy), frozenset({photo})
+        return with_images(case, xy=xy), frozenset({photo})
 
     return plant
 
@@ -361,11 +364,6 @@ def either(rng: np.random.Generator, low: float, high: float, size: int | None =
     return rng.choice([-1.0, 1.0], size) * rng.uniform(low, high, size)
 
 
-def mirrored(case: Case, xy: Floats) -> Floats:
-    """Turn a photo over, or exchange its axes."""
-    return (xy * [1, -1], xy * [-1, 1], xy[:, ::-1])[case.rng.integers(3)]
-
-
 def shifted(case: Case, xy: Floats) -> Floats:
     """Shift by 5 mm, whatever that does."""
     way = case.rng.normal(size=2)
@@ -377,11 +375,6 @@ def bent(case: Case, xy: Floats) -> Floats:
     radius = 0.75 * float(np.hypot(*xy.T).max())
     k1 = either(case.rng, 0.005, 0.02) / radius**3
     return xy * (1.0 + k1 * (xy**2).sum(axis=1)[:, None])
-
-
-def from_a_corner(case: Case, xy: Floats) -> Floats:
-    """Count from a corner of the photo."""
-    return xy + np.array(case.spec.camera.format or (230.0, 230.0)) / 2.0
 
 
 def shrunk(low: float, high: float, axes: int = 2) -> Plant:
@@ -405,17 +398,17 @@ def marks_in_micrometres(case: Case) -> Planted | None:
     return replace(inputs, observations=changed[0], fiducials=changed[1]), NOBODY
 
 
+def with_cameras(inputs: Inputs, **fields: object) -> Inputs:
+    strips = [replace(each, camera=replace(each.camera, **fields)) for each in inputs.strips]  # type: ignore[arg-type]
+    return replace(inputs, strips=tuple(strips))
+
+
 def distance_times(change: Callable[[np.random.Generator], float]) -> Plant:
     """Give a principal distance that is off by a factor."""
-
-    def plant(case: Case) -> Planted:
-        times = change(case.rng)
-        cameras = [replace(each.camera, principal_distance=each.camera.principal_distance * times)
-                   for each in case.inputs.strips]  # fmt: skip
-        strips = [replace(each, camera=camera) for each, camera in zip(case.inputs.strips, cameras, strict=True)]
-        return replace(case.inputs, strips=tuple(strips)), NOBODY
-
-    return plant
+    return lambda case: (
+        with_cameras(case.inputs, principal_distance=case.spec.camera.principal_distance * change(case.rng)),
+        NOBODY,
+    )
 
 
 def without_format(plant: Plant) -> Plant:
@@ -423,8 +416,7 @@ def without_format(plant: Plant) -> Plant:
 
     def planted(case: Case) -> Planted | None:
         inputs, names = plant(case) or (case.inputs, NOBODY)
-        strips = tuple(replace(each, camera=replace(each.camera, format=None)) for each in inputs.strips)
-        return replace(inputs, strips=strips, fiducials=None), names
+        return replace(with_cameras(inputs, format=None), fiducials=None), names
 
     return planted
 
@@ -440,22 +432,14 @@ def distance_of_one_strip(case: Case) -> Planted:
     return replace(case.inputs, strips=tuple(strips)), frozenset({strips[off].id})
 
 
-def sigma_in_micrometres(case: Case) -> Planted:
-    """State the standard deviation of image coordinates in micrometres."""
-    o = case.inputs.observations
-    return replace(case.inputs, observations=replace(o, sigma=o.sigma * 1000.0)), NOBODY
-
-
 # ------------------------------------------------------------------------------------ mistakes in photos and ids
 
 
 def with_photos(case: Case, photos: list[str]) -> Inputs:
-    """Give the inputs with another list of photos."""
     return replace(case.inputs, strips=(replace(case.inputs.strips[0], photos=tuple(photos)),))
 
 
 def pair_exchanged(case: Case) -> Planted:
-    """Exchange two neighbours in the list."""
     photos = list(case.photos)
     place = int(case.rng.integers(len(photos) - 1))
     photos[place], photos[place + 1] = photos[place + 1], photos[place]
@@ -463,7 +447,6 @@ def pair_exchanged(case: Case) -> Planted:
 
 
 def moved(case: Case) -> Planted | None:
-    """List one photo somewhere else."""
     photos = list(case.photos)
     photo = photos.pop(int(case.rng.integers(len(photos))))
     elsewhere = [k for k in range(len(photos) + 1) if abs(k - case.photos.index(photo)) > 1]
@@ -474,7 +457,6 @@ def moved(case: Case) -> Planted | None:
 
 
 def shuffled(case: Case) -> Planted:
-    """List all photos in a wrong order."""
     photos = list(case.photos)
     while photos in (list(case.photos), list(case.photos)[::-1]):
         case.rng.shuffle(photos)
@@ -487,18 +469,12 @@ def with_points(case: Case, photos: Iterable[str], order: Callable[[int], NDArra
     for photo in photos:
         rows = np.flatnonzero(case.shows(photo))
         point[rows] = point[rows[order(len(rows))]]
-    return replace(case.inputs, observations=replace(case.inputs.observations, point=point))
+    return with_images(case, point=point)
 
 
 def ids_in_the_next_row(case: Case) -> Planted:
-    """Write the ids of one photo one row too low."""
     photo = str(case.rng.choice(case.photos))
     return with_points(case, [photo], lambda rows: np.roll(np.arange(rows), 1)), frozenset({photo})
-
-
-def numbered_anew(case: Case) -> Planted:
-    """Give the points of all photos ids in any order."""
-    return with_points(case, case.photos, case.rng.permutation), NOBODY
 
 
 def no_overlap(case: Case) -> Planted:
@@ -527,7 +503,6 @@ def measured_again(case: Case, rows: NDArray[np.intp], *, photo: str = "", point
 
 
 def twice(case: Case) -> Planted:
-    """Give one photo a second time under another name, measured again."""
     place = int(case.rng.integers(len(case.photos)))
     copied = measured_again(case, np.flatnonzero(case.shows(case.photos[place])), photo="copy")
     photos = [*case.photos[: place + 1], "copy", *case.photos[place + 1 :]]
@@ -535,7 +510,6 @@ def twice(case: Case) -> Planted:
 
 
 def two_ids(case: Case) -> Planted:
-    """Measure a point a second time under another id."""
     o = case.inputs.observations
     place = int(case.rng.integers(len(case.photos) - 1))
     both = set(o.point[case.shows(case.photos[place])]) & set(o.point[case.shows(case.photos[place + 1])])
@@ -578,7 +552,6 @@ def one_id(case: Case, one: int, other: int, keep: Flags | None = None) -> Plant
 
 
 def unknown_points(case: Case) -> Flags:
-    """Points of the observations that are not given."""
     return ~np.isin(case.inputs.observations.point_ids, case.inputs.control.ids)
 
 
@@ -640,7 +613,6 @@ def same_id_far_away(case: Case) -> Planted:
 
 
 def with_control(case: Case, **columns: object) -> Inputs:
-    """Give the inputs with other columns of the control."""
     return replace(case.inputs, control=replace(case.inputs.control, **columns))  # type: ignore[arg-type]
 
 
@@ -662,7 +634,6 @@ def enough(case: Case, least: int = 6) -> bool:
 
 
 def axes_exchanged(case: Case) -> Planted | None:
-    """Exchange two axes of the control."""
     control, order = case.inputs.control, [1, 0, 2]
     if case.kind == "geocentric":
         return None
@@ -670,28 +641,10 @@ def axes_exchanged(case: Case) -> Planted | None:
 
 
 def another_crs(case: Case) -> Planted | None:
-    """Name a coordinate reference system of another country."""
-    if case.kind != "EPSG":
-        return None
-    crs = str(case.rng.choice(["EPSG:2154", "EPSG:31468", "EPSG:27700", "EPSG:21781", "EPSG:32650"]))
-    if lies_there(case, crs):
-        return None
-    return replace(case.inputs, frames=(replace(case.inputs.frames[0], crs=crs),)), NOBODY
-
-
-def lies_there(case: Case, crs: str) -> bool:
-    """Whether the control lies in the area of a coordinate reference system, or less than half of it away."""
-    from pyproj import CRS, Transformer
-
-    area = CRS(crs).area_of_use
-    control = case.inputs.control
-    plan = control.enu[control.use[:, 0], :2]
-    lon, lat = Transformer.from_crs(crs, CRS(crs).geodetic_crs, always_xy=True).transform(*plan.T)
-    if area is None:
-        return False
-    wide, high = (area.east - area.west) / 2, (area.north - area.south) / 2
-    inside = (lon > area.west - wide) & (lon < area.east + wide) & (lat > area.south - high) & (lat < area.north + high)
-    return bool(inside.any())
+    """Name a coordinate reference system of another country, where such coordinates lie nowhere."""
+    crs = str(case.rng.choice(["EPSG:31468", "EPSG:27700", "EPSG:21781"]))
+    frames = (replace(case.inputs.frames[0], crs=crs),)
+    return (replace(case.inputs, frames=frames), NOBODY) if case.kind == "EPSG" else None
 
 
 def in_two_lists(change: Callable[[Case, Floats], Floats], kinds: str = "EPSG local") -> Plant:
@@ -709,13 +662,12 @@ def in_two_lists(change: Callable[[Case, Floats], Floats], kinds: str = "EPSG lo
     return plant
 
 
-def elsewhere(case: Case, enu: Floats) -> Floats:
+def farther(case: Case, enu: Floats) -> Floats:
     """Lie in another frame, two to eight bases away."""
     return enu + np.array([*case.rng.uniform(2.0, 8.0, 2) * case.spec.base * case.rng.choice([-1, 1], 2), 0.0])
 
 
 def higher(low: float, high: float) -> Callable[[Case, Floats], Floats]:
-    """Lie higher or lower by some metres."""
     return lambda case, enu: enu + np.array([0.0, 0.0, either(case.rng, low, high)])
 
 
@@ -761,17 +713,30 @@ def slip_of_a_digit(case: Case, *, check: bool = False, least: float = 0.0) -> P
     return with_control(case, enu=enu), frozenset({control.ids[row]})
 
 
-def digit_too_many(case: Case) -> Planted | None:
-    """Write one digit of a projected coordinate twice."""
-    control = case.inputs.control
-    if case.kind != "EPSG" or not enough(case, 8):
-        return None
-    row, axis = int(case.rng.choice(case.full())), int(case.rng.integers(2))
-    text = f"{control.enu[row, axis]:.3f}"
+def of_one_given(change: Callable[[Case, Floats], Floats]) -> Plant:
+    """Change the projected coordinates (3,) of one of eight control points."""
+
+    def plant(case: Case) -> Planted | None:
+        if case.kind != "EPSG" or not enough(case, 8):
+            return None
+        row, enu = int(case.rng.choice(case.full())), case.inputs.control.enu.copy()
+        enu[row] = change(case, enu[row].copy())
+        return with_control(case, enu=enu), frozenset({case.inputs.control.ids[row]})
+
+    return plant
+
+
+def digit_twice(case: Case, enu: Floats) -> Floats:
+    axis = int(case.rng.integers(2))
+    text = f"{enu[axis]:.3f}"
     place = int(case.rng.integers(text.index(".")))
-    enu = control.enu.copy()
-    enu[row, axis] = float(text[: place + 1] + text[place:])
-    return with_control(case, enu=enu), frozenset({control.ids[row]})
+    enu[axis] = float(text[: place + 1] + text[place:])
+    return enu
+
+
+def in_other_columns(case: Case, enu: Floats) -> Floats:
+    """Take the columns in another order; east and north differ in size."""
+    return enu[list([(1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)][case.rng.integers(4)])]
 
 
 def of_two_given(change: Callable[[Floats, int, int], Floats], wrong: slice) -> Plant:
@@ -789,13 +754,11 @@ def of_two_given(change: Callable[[Floats, int, int], Floats], wrong: slice) -> 
 
 
 def swapped(enu: Floats, one: int, other: int) -> Floats:
-    """Exchange two rows."""
     enu[[one, other]] = enu[[other, one]]
     return enu
 
 
 def copied(enu: Floats, one: int, other: int) -> Floats:
-    """Copy one row to another."""
     enu[other] = enu[one]
     return enu
 
@@ -816,22 +779,6 @@ def ids_of_given(order: Callable[[Case, tuple[str, ...]], list[str]]) -> Plant:
     return lambda case: (
         (with_control(case, ids=tuple(order(case, case.inputs.control.ids))), NOBODY) if enough(case, 8) else None
     )
-
-
-def other_columns_of_one(case: Case) -> Planted | None:
-    """Give one point its coordinates in another order; seen where east and north differ in size."""
-    control = case.inputs.control
-    if case.kind != "EPSG" or not enough(case, 8):
-        return None
-    row = int(case.rng.choice(case.full()))
-    enu = control.enu.copy()
-    enu[row] = enu[row, list([(1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)][case.rng.integers(4)])]
-    return with_control(case, enu=enu), frozenset({control.ids[row]})
-
-
-def sigma_of_given(case: Case) -> Planted:
-    """State standard deviations of given points in millimetres."""
-    return with_control(case, sigma=case.inputs.control.sigma * 1000.0), NOBODY
 
 
 def kept(wanted: Callable[[Case, Floats, Floats], Flags]) -> Plant:
@@ -856,7 +803,7 @@ def near_the_line(case: Case, _: Floats, across: Floats) -> Flags:
 # ---------------------------------------------------------------------------------- given angles, camera positions
 
 
-def of_angles(read: Callable[[Case, Floats], Floats], system: str = "omega-phi-kappa", tilt: float = 0.0) -> Plant:
+def of_angles(read: Callable[[Case, Floats], Floats], system: str = OPK, tilt: float = 0.0) -> Plant:
     """Give a start whose omega, phi, kappa (n, 3) were read in another way, where that turns the photos.
 
     By more than three times what noise does, and by more than harms a start.
@@ -865,71 +812,61 @@ def of_angles(read: Callable[[Case, Floats], Floats], system: str = "omega-phi-k
     """
 
     def plant(case: Case) -> Planted | None:
-        truth, spec = case.simulation.truth, case.inputs.output or case.inputs.frames[0]
+        truth = case.simulation.truth
         if case.spec.flight.attitude_sigma_deg[0] < tilt:
             return None
-        values = read(case, angles(truth.rotations_local, "omega-phi-kappa"))
+        values = read(case, angles(truth.rotations_local, OPK))
         steps = truth.rotations_local.transpose(0, 2, 1) @ from_angles(values, system)
         off = np.arccos(np.clip((np.trace(steps, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0))
         if np.sqrt((off**2).mean()) <= max(3.0 * case.noise[1] / case.spec.base, HARMLESS):
             return None
-        nan = np.full((len(values), 3), np.nan)
-        given = GivenOrientations(truth.photo_ids, spec, truth.centers_ground, values, system, nan, nan, observed=False)
-        return replace(case.inputs, orientations=given), NOBODY
+        return oriented(case.simulation, truth.centers_ground, values, system), NOBODY
 
     return plant
 
 
 def against_true_north(case: Case) -> Planted | None:
-    """Give angles of a projected frame against true north: all kappa are off by the meridian convergence."""
+    """Give angles of a projected frame against true north: all photos are turned by the meridian convergence."""
     from pyproj import Proj
 
     given = case.inputs.orientations
     if given is None:
         return None
     convergence = Proj(case.spec.ground.crs).get_factors(*case.spec.ground.center_deg).meridian_convergence
-    # grid north lies east of true north by the convergence, and kappa counts to the left
-    north = given.angles - [0.0, 0.0, np.radians(convergence)]
+    # grid north lies east of true north by the convergence, and angles count to the left
+    turn = from_angles(np.radians([[0.0, 0.0, -convergence]]), given.system)[0]
+    north = angles(turn @ from_angles(given.angles, given.system), given.system)
     return replace(case.inputs, orientations=replace(given, angles=north)), NOBODY
 
 
-def of_positions(change: Callable[[Case, Floats], Floats], *, all_named: bool = False) -> Plant:
-    """Change the measured positions (m, 3) of the cameras."""
+def of_positions(change: Callable[[Case, Floats], Floats]) -> Plant:
+    """Change the measured positions (m, 3) of cameras; those that are changed must be named."""
 
     def plant(case: Case) -> Planted | None:
         given = case.inputs.positions
         if given is None:
             return None
-        positions = replace(given, enu=change(case, given.enu))
-        return replace(case.inputs, positions=positions), frozenset(case.photos if all_named else ())
+        enu = change(case, given.enu.copy())
+        names = np.array(given.photos)[(enu != given.enu).any(axis=1)]
+        return replace(case.inputs, positions=replace(given, enu=enu)), frozenset(names.tolist())
 
     return plant
 
 
 def offset(case: Case, low: float, high: float) -> Floats:
     """Draw an offset in all axes, in units of the noise, in the units of the frame."""
-    metres = either(case.rng, low, high, 3) * max(*case.noise, 0.1)
-    return metres * ([1e-5, 1e-5, 1.0] if case.kind == "geographic" else 1.0)
+    return either(case.rng, low, high, 3) * max(*case.noise, 0.1) * case.metre
 
 
-def drifted(case: Case, enu: Floats) -> Floats:
-    """Drift from the first photo to the last."""
-    return enu + np.linspace(0.0, 1.0, len(enu))[:, None] * offset(case, 40.0, 80.0)
+def one_high(case: Case, enu: Floats) -> Floats:
+    """Lift or lower one camera inside the strip by half the flying height."""
+    enu[case.rng.integers(1, len(enu) - 1), 2] += 0.5 * case.spec.flying_height * case.rng.choice([-1, 1])
+    return enu
 
 
-def one_position_high(case: Case) -> Planted | None:
-    """Give one camera inside the strip a height that is off by half the flying height."""
-    row = int(case.rng.integers(1, len(case.photos) - 1))
-    step = 0.5 * case.spec.flying_height * float(case.rng.choice([-1, 1]))
-    planted = of_positions(lambda _, enu: enu + np.outer(np.arange(len(enu)) == row, [0.0, 0.0, step]))(case)
-    return planted and (planted[0], frozenset({case.simulation.truth.photo_ids[row]}))
-
-
-def positions_exchanged(case: Case) -> Planted | None:
-    """Exchange the positions of two neighbours."""
-    row = int(case.rng.integers(len(case.photos) - 1))
-    planted = of_positions(lambda _, enu: swapped(enu.copy(), row, row + 1))(case)
-    return planted and (planted[0], frozenset(case.simulation.truth.photo_ids[row : row + 2]))
+def neighbours_swapped(case: Case, enu: Floats) -> Floats:
+    row = int(case.rng.integers(len(enu) - 1))
+    return swapped(enu, row, row + 1)
 
 
 # ------------------------------------------------------------------------------------------------------- the table
@@ -1002,16 +939,15 @@ MISTAKES = (
     Mistake("y down read as y up", of_all_images(lambda _, xy: xy * [1, -1]), ("P103", "P401")),
     Mistake("negatives read as positives", of_all_images(lambda _, xy: xy * [-1, 1]), ("P103", "P401")),
     Mistake("x and y of the images exchanged", of_all_images(lambda _, xy: xy[:, ::-1]), ("P103", "P401")),
-    Mistake("one photo mirrored", of_one_photo(mirrored), ("P104",)),
+    Mistake("one photo mirrored",
+            of_one_photo(lambda case, xy: (xy * [1, -1], xy * [-1, 1], xy[:, ::-1])[case.rng.integers(3)]), ("P104",)),
     Mistake("one photo shifted by 5 mm", of_one_photo(shifted), ("P109",), 2),
     Mistake("one photo shifted by 5 mm, block", of_one_photo(shifted), ("P109",), 2, block),
     Mistake("fiducial marks in another unit", marks_in_micrometres, ("P106",)),
     Mistake("principal distance off by 10 or 1000",
-            distance_times(lambda rng: float(rng.choice([10.0, 0.1, 1000.0, 0.001]))),
-            ("P105",)),
+            distance_times(lambda rng: float(rng.choice([10.0, 0.1, 1000.0, 0.001]))), ("P105",)),
     Mistake("principal distance of another lens",
-            distance_times(lambda rng: float(rng.choice([0.58, 0.73, 1.37, 2.0]))),
-            ("P105", "P107"), 1),
+            distance_times(lambda rng: float(rng.choice([0.58, 0.73, 1.37, 2.0]))), ("P105", "P107"), 1),
     Mistake("principal distance off by 1 to 3 %", distance_times(lambda rng: 1.0 + float(either(rng, 0.01, 0.03))),
             ("P107", "P105"), 1),
     Mistake("principal distance of one strip off by 10 %", distance_of_one_strip, ("P105",), 1, block),
@@ -1019,8 +955,7 @@ MISTAKES = (
     Mistake("film 0.1 to 0.3 % short or long one way", shrunk(0.001, 0.003), ("P112",), 1),
     Mistake("film 0.03 to 0.07 % short or long in x", shrunk(0.0003, 0.0007, 1), ("P112",), 1),
     Mistake("principal point off by 0.05 to 0.3 mm",
-            of_all_images(lambda case, xy: xy + either(case.rng, 0.05, 0.3, 2)),
-            ("P111",), 2, block),
+            of_all_images(lambda case, xy: xy + either(case.rng, 0.05, 0.3, 2)), ("P111",), 2, block),
     Mistake("two neighbours exchanged in the list", pair_exchanged, ("P201",)),
     Mistake("a photo listed elsewhere", moved, ("P201",)),
     Mistake("all photos out of order", shuffled, ("P201",)),
@@ -1029,19 +964,21 @@ MISTAKES = (
     Mistake("a photo at another height", of_one_photo(lambda _, xy: xy / 1.5, inside=True), ("P205",), 1),
     Mistake("a photo left out of the list", photo_missing, ("P206",)),
     Mistake("camera positions below ground",
-            of_positions(lambda case, enu: enu - [0.0, 0.0, 1.2 * case.spec.flying_height], all_named=True),
+            of_positions(lambda case, enu: enu - [0.0, 0.0, 1.2 * case.spec.flying_height]),
             ("P204",), 1, with_positions),
-    Mistake("their heights in feet", of_positions(lambda _, enu: enu / [1.0, 1.0, FOOT], all_named=True),
-            ("P205",), 1, with_positions),
-    Mistake("one height of them off by half", one_position_high, ("P205", *OFF), 1, with_positions),
-    Mistake("two camera positions exchanged", positions_exchanged, ("P206", "P207", *OFF), 1, with_positions),
+    Mistake("their heights in feet", of_positions(lambda _, enu: enu / [1.0, 1.0, FOOT]), ("P205",), 1, with_positions),
+    Mistake("one height of them off by half", of_positions(one_high), ("P205", *OFF), 1, with_positions),
+    Mistake("two camera positions exchanged", of_positions(neighbours_swapped),
+            ("P206", "P207", *OFF), 1, with_positions),
     Mistake("camera positions in reversed order", of_positions(lambda _, enu: enu[::-1]), ("P208",), 1, with_positions),
     Mistake("camera positions moved by one photo",
             of_positions(lambda case, enu: np.roll(enu, case.rng.choice([-1, 1]), axis=0)),
             ("P208",), 1, with_positions),
     Mistake("camera positions off by a common offset", of_positions(lambda case, enu: enu + offset(case, 20.0, 60.0)),
             ("P208",), 3, with_positions),
-    Mistake("camera positions that drift", of_positions(drifted), ("P208",), 3, with_positions),
+    Mistake("camera positions that drift",
+            of_positions(lambda case, enu: enu + np.linspace(0, 1, len(enu))[:, None] * offset(case, 40, 80)),
+            ("P208",), 3, with_positions),
     Mistake("one id for two points", same_id, ("P301",), 3),
     Mistake("one id for two points of two strips", same_id_in_two_strips, ("P301",), 3, block),
     Mistake("one id of two strips, polynomials", same_id_in_two_strips, ("P301",), 3, block, "polynomial"),
@@ -1049,19 +986,18 @@ MISTAKES = (
     Mistake("one id in strips that do not overlap", same_id_far_away, ("P301",), 3, with_ties(3)),
     Mistake("two ids for one point", two_ids, ("P302",)),
     Mistake("ids of one photo in the next row", ids_in_the_next_row, ("P303",)),
-    Mistake("points in another order on each photo", numbered_anew, ("P303",)),
+    Mistake("points in another order on each photo",
+            lambda case: (with_points(case, case.photos, case.rng.permutation), NOBODY), ("P303",)),
     Mistake("axes of the control exchanged", axes_exchanged, ("P401", "P103")),
     Mistake("an axis of a local system backwards",
-            of_all_given(lambda case, enu: enu * ([-1, 1, 1], [1, -1, 1])[case.rng.integers(2)], "local"),
-            ("P401",)),
+            of_all_given(lambda case, enu: enu * ([-1, 1, 1], [1, -1, 1])[case.rng.integers(2)], "local"), ("P401",)),
     Mistake("crs of another country", another_crs, ("P402",)),
     Mistake("control in feet (projected)",
-            of_all_given(lambda case, enu: enu / case.rng.choice([FOOT, US_FOOT]), "EPSG"),
-            ("P403",)),
+            of_all_given(lambda case, enu: enu / case.rng.choice([FOOT, US_FOOT]), "EPSG"), ("P403",)),
     Mistake("control times 0.1 to 0.001 (projected)", of_all_given(factor(0.1, 0.01, 0.001), "EPSG"), ("P402",)),
     Mistake("one of two lists in feet", in_two_lists(lambda _, enu: enu / FOOT, "local"), ("P403",), 1),
-    Mistake("one of two lists in another frame", in_two_lists(elsewhere), ("P407",), 2),
-    Mistake("one of two lists in another frame, block", in_two_lists(elsewhere), ("P407",), 2, block),
+    Mistake("one of two lists in another frame", in_two_lists(farther), ("P407",), 2),
+    Mistake("one of two lists in another frame, block", in_two_lists(farther), ("P407",), 2, block),
     Mistake("heights of two kinds in two lists", in_two_lists(higher(15, 60)), ("P404",), 1),
     Mistake("heights of two kinds in two lists, block", in_two_lists(higher(15, 60)), ("P404",), 1, block),
     Mistake("second list 0.3 m up or down, block", in_two_lists(higher(0.3, 0.3)), ("P404", "P407"), 1, block),
@@ -1077,22 +1013,24 @@ MISTAKES = (
     Mistake("slip of a digit, polynomials", slip_of_a_digit, ("P406", *OFF), 1, adjustment="polynomial"),
     Mistake("slip of a digit, models", slip_of_a_digit, ("P406", *OFF), 1, of_models),
     Mistake("slip of a digit, check point", partial(slip_of_a_digit, check=True, least=PLAIN), ("P406",)),
-    Mistake("a digit written twice", digit_too_many, ("P406", *OFF), 1),
+    Mistake("a digit written twice", of_one_given(digit_twice), ("P406", *OFF), 1),
     Mistake("slip of a digit, two others exchanged", slip_beside_exchanged, ("P406", "P408", *OFF)),
     Mistake("two control points exchanged", exchanged, ("P408",), 1),
     Mistake("ids of given points in the next row", ids_of_given(lambda _, ids: [*ids[-1:], *ids[:-1]]), ("P409",)),
     Mistake("given points with coordinates of others",
-            ids_of_given(lambda case, ids: [ids[k] for k in case.rng.permutation(len(ids))]),
-            ("P409",)),
-    Mistake("one given point in other columns", other_columns_of_one, ("P406", *OFF), 1),
+            ids_of_given(lambda case, ids: [ids[k] for k in case.rng.permutation(len(ids))]), ("P409",)),
+    Mistake("one given point in other columns", of_one_given(in_other_columns), ("P406", *OFF), 1),
     Mistake("row of a given point copied", row_copied, ("P410",)),
     Mistake("all check points shifted", checks_shifted, ("P411",)),
     Mistake("all check points shifted, block", checks_shifted, ("P411",), make=block),
     Mistake("all check points shifted, models", checks_shifted, ("P411",), make=of_models),
-    Mistake("standard deviation of images in micrometres", sigma_in_micrometres, ("P108",)),
-    Mistake("standard deviation of control in millimetres", sigma_of_given, ("P108",)),
-    Mistake("image coordinates from a corner", of_all_images(from_a_corner), ("P101",)),
-    Mistake("one photo from a corner", of_one_photo(from_a_corner), ("P101",)),
+    Mistake("standard deviation of images in micrometres",
+            lambda case: (with_images(case, sigma=case.inputs.observations.sigma * 1000.0), NOBODY), ("P108",)),
+    Mistake("standard deviation of control in millimetres",
+            lambda case: (with_control(case, sigma=case.inputs.control.sigma * 1000.0), NOBODY), ("P108",)),
+    Mistake("image coordinates from a corner", of_all_images(lambda case, xy: xy + np.divide(case.spec.format, 2)),
+            ("P101",)),
+    Mistake("one photo from a corner", of_one_photo(lambda case, xy: xy + np.divide(case.spec.format, 2)), ("P101",)),
     Mistake("control at one end", kept(lambda _, along, __: along < THIRD), ("P501",)),
     Mistake("control on one line", kept(near_the_line), ("P502",)),
     Mistake("control in one half", kept(lambda _, along, __: along < HALF), ("P501", "P503")),
@@ -1100,10 +1038,9 @@ MISTAKES = (
     Mistake("angles in another system", of_angles(lambda _, values: values, "alpha-omega-kappa", tilt=1.0), ("P602",)),
     Mistake("angles with another sense of kappa", of_angles(lambda _, values: values * [1, 1, -1], tilt=1.0),
             ("P602",)),
-    Mistake("angles against true north in a grid", against_true_north, ("P602",), 1, with_attitudes),
+    Mistake("angles against true north in a grid", against_true_north, ("P602",), 1, at_the_edge),
 )  # fmt: skip
 
 
 def mistake(name: str) -> Mistake:
-    """Find a kind of mistake by its name."""
     return next(each for each in MISTAKES if each.name == name)
