@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from benchmarks import planted
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
@@ -165,6 +166,18 @@ def test_causes_prints_a_row_for_each_kind_and_layout_beside_the_goals() -> None
     assert re.search(r"^true cause first: \d+\.\d % of [23] that can be told \(goal: 85 %\)$", out, re.MULTILINE)
     assert len(re.findall(r"^(?:corners|strips)[\w ,]+ +1 +0 +0 +0  $", out, re.MULTILINE)) == 2
     assert re.search(r"^alarms: 0\.00 % of 2 sound projects \(goal: at most 0\.5 %\), 0 refused", out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "told"),
+    [(0.001, 0.003, True), (1e-8, 1e-7, False), (3.0, 4.0, True)],
+    ids=["seen", "not", "refused"],
+)
+def test_a_planted_mistake_counts_where_the_sum_of_squares_grows(low: float, high: float, told: bool) -> None:
+    film = planted.Mistake("film", planted.shrunk(low, high), ("P112",), columns=1)
+    wrong = film.plant(film.make(43003))
+    assert wrong is not None
+    assert film.can_be_told(43003, wrong[0]) is told
 
 
 @pytest.mark.slow
