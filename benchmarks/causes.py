@@ -44,6 +44,7 @@ from benchmarks.planted import (
     Case,
     Make,
     Mistake,
+    apart,
     images,
     layout,
     oriented,
@@ -409,8 +410,8 @@ LAYOUTS: dict[str, tuple[Make, frozenset[str]]] = {  # with what may be told
     ),
     "independent models": (layout(17, models, methods=("auto", "polynomial")), frozenset()),
     "oblique mounts": (layout(18, wide, methods=METHODS, given=aside), WEAK),  # not all control is seen
-    "oblique blocks": (layout(28, wide_block, given=aside), WEAK),
-    "convergent strips": (layout(29, wide, given=convergent), WEAK),
+    "oblique blocks": (layout(28, wide_block, given=aside, fits=apart), WEAK),
+    "convergent strips": (layout(29, wide, given=convergent, fits=apart), WEAK),
     "self-calibration": (layout(19, in_block, given=calibrated), frozenset()),
     "systematic errors of 5 µm, strips": (layout(20, long_strip, methods=METHODS, given=smooth_errors), COMMON),
     "systematic errors of 5 µm, blocks": (layout(30, in_block, given=smooth_errors), COMMON),
@@ -567,10 +568,13 @@ def all_planted(count: int, first: int, words: list[str], *, verbose: bool) -> N
     """Print the table of planted mistakes, and its sums beside their goals."""
     head = f"{'mistake':<48} {'runs':>5} {'told':>5} {'first':>7} {'named':>7} {'check':>7}  "
     print(head + " ".join(f"{key:>6}" for key in ("lost", *ACCUSED)))
-    total: Counter[str] = Counter()
+    total, of_columns = Counter[str](), Counter[str]()
     for mistake in MISTAKES:
         if chosen(mistake.name, words):
-            total.update(plant(mistake, count, first, verbose=verbose))
+            counts = plant(mistake, count, first, verbose=verbose)
+            total.update(counts)
+            of_columns.update(counts if mistake.columns else {})
+    print(row("those that are columns of the design", of_columns))
     print(row("all", total))
     runs, able = max(total["runs"], 1), max(total["told"], 1)
     print(f"true cause first: {100 * total['first'] / able:.1f} % of {able} that can be told (goal: 85 %)")

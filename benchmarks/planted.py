@@ -278,7 +278,7 @@ def with_attitudes(rng: np.random.Generator, simulation: Simulation) -> Inputs:
 
 def is_sound(case: Case) -> bool:
     """Whether nothing must be told of the layout of its control and points."""
-    return holds_both_ends(case) and not in_one_place(case)
+    return holds_both_ends(case) and apart(case)
 
 
 def holds_both_ends(case: Case) -> bool:
@@ -293,16 +293,15 @@ def holds_both_ends(case: Case) -> bool:
     return max(low, 1.0 - high) <= BEYOND * (high - low)
 
 
-def in_one_place(case: Case) -> bool:
-    """Whether two points lie so near to each other that no measurement tells them apart: one point under two ids."""
-    o = case.inputs.observations
-    near = TOLD_APART * case.spec.image.sigma_um / 1000.0
+def apart(case: Case) -> bool:
+    """Whether all points lie so far from each other that measurements tell them apart: none is one under two ids."""
+    o, near = case.inputs.observations, TOLD_APART * case.spec.image.sigma_um / 1000.0
     for photo in range(len(o.photo_ids)):
         xy = o.xy[o.photo == photo]
         d = np.abs(xy[:, None, :] - xy[None, :, :]).max(axis=2)
         if (d[np.triu_indices(len(xy), 1)] < near).any():
-            return True
-    return False
+            return False
+    return True
 
 
 def places(case: Case) -> tuple[Floats, Floats]:
