@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from benchmarks import planted
 from tests.loops import nonempty
 from tests.source_tree import ROOT
 
@@ -153,10 +154,30 @@ def test_screening_prints_how_the_time_grows() -> None:
 
 
 @pytest.mark.slow
-def test_false_alarms_prints_a_row_for_each_layout() -> None:
-    out = printed("false_alarms.py", "--count", "1", "--first", "7", "corners", "GNSS")
-    assert len(re.findall(r"^(?:corners|blocks|strips|GNSS)[\w ,]+ +1 +0", out, re.MULTILINE)) == 4
-    assert re.search(r"^all +4 +0 +0\.00 %$", out, re.MULTILINE)
+def test_causes_prints_a_row_for_each_kind_and_layout_beside_the_goals() -> None:
+    options = ("--first", "43003", "short or long one way", "heights in feet", "corners", "strips held by GNSS")
+    out = printed("causes.py", *options)
+    rows = re.findall(
+        r"^(film|their|heights)[\w .%,]+? +1 +([01])((?: +(?:\d+ %|-)){3})(?: +[.1]){4}$", out, re.MULTILINE
+    )
+    assert [name for name, _, _ in rows] == ["film", "their", "heights"]
+    assert rows[0][1] == "1"
+    assert rows[0][2].split()[:2] == ["100", "%"]
+    assert re.search(r"^true cause first: \d+\.\d % of [23] that can be told \(goal: 85 %\)$", out, re.MULTILINE)
+    assert len(re.findall(r"^(?:corners|strips)[\w ,]+ +1 +0 +0 +0  $", out, re.MULTILINE)) == 2
+    assert re.search(r"^alarms: 0\.00 % of 2 sound projects \(goal: at most 0\.5 %\), 0 refused", out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "told"),
+    [(0.001, 0.003, True), (1e-8, 1e-7, False), (3.0, 4.0, True)],
+    ids=["seen", "not", "refused"],
+)
+def test_a_planted_mistake_counts_where_the_sum_of_squares_grows(low: float, high: float, told: bool) -> None:
+    film = planted.Mistake("film", planted.shrunk(low, high), ("P112",), columns=1)
+    wrong = film.plant(film.make(43003))
+    assert wrong is not None
+    assert film.can_be_told(43003, wrong[0]) is told
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from benchmarks import plausibility
+from benchmarks import planted
 from photostrip.pipeline.inputs import CameraPositions
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import Control, Flight, GrossError, Spec, Terrain
@@ -131,12 +131,11 @@ def test_a_principal_distance_off_by_a_percent_is_named() -> None:
 @pytest.mark.parametrize(("seed", "rejected"), [(8810027, 15), (8930004, 30)])
 def test_a_camera_of_one_strip_off_by_ten_percent_is_named(seed: int, rejected: int) -> None:
     """Its unknown did not converge, and up to 173 image points were rejected in its place."""
-    case = plausibility.block(seed)
-    planted = plausibility.distance_of_one_strip(case)
-    assert planted is not None
-    result = triangulate(planted[0], replace(case.settings, adjustment="bundle"))
+    case = planted.block(seed)
+    inputs, strips = planted.distance_of_one_strip(case)
+    result = triangulate(inputs, replace(case.settings, adjustment="bundle"))
     (finding,) = result.findings
-    assert (finding.code, set(finding.strips)) == ("P105", set(planted[1]))
+    assert (finding.code, set(finding.strips)) == ("P105", strips)
     assert result.bundle is not None
     rejections = result.bundle.screened.rejections
     assert len(rejections) <= rejected
@@ -148,10 +147,10 @@ def test_a_camera_of_one_strip_off_by_ten_percent_is_named(seed: int, rejected: 
 @pytest.mark.parametrize("seed", [8810170, 8810441])
 def test_doubted_control_may_be_a_principal_distance_off_by_percents(seed: int) -> None:
     """Photos that are tilted bend the strip by more than its stretch: one control point was doubted, and used."""
-    case = plausibility.sound(seed)
-    planted = plausibility.distance_by_percents(case)
-    assert planted is not None
-    (finding,) = triangulate(planted[0], case.settings).findings
+    case = planted.sound(seed)
+    wrong = planted.mistake("principal distance off by 1 to 3 %").plant(case)
+    assert wrong is not None
+    (finding,) = triangulate(wrong[0], case.settings).findings
     given = case.inputs.strips[0].camera.principal_distance
     assert finding.code == "P107"
     assert float(finding.evidence["would_fit_mm"]) == pytest.approx(given, rel=0.006)

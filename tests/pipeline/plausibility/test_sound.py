@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from benchmarks import false_alarms
+from benchmarks import causes
 from photostrip.pipeline.inputs import Inputs, Settings
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.plausibility.given_control import GivenControl
@@ -63,7 +63,7 @@ def test_the_bend_of_a_long_strip_is_no_stretch_of_its_heights(photos: int, came
     ],
 )
 def test_photos_laid_side_by_side_prove_little(layout: str, seed: int) -> None:
-    made = false_alarms.LAYOUTS[layout](seed)
+    made = causes.LAYOUTS[layout][0](seed)
     assert [each.code for each in gate.of_inputs(made.inputs, made.settings)] == []
 
 
@@ -76,7 +76,7 @@ def test_photos_laid_side_by_side_prove_little(layout: str, seed: int) -> None:
     ],
 )
 def test_what_stretches_no_heights_is_no_principal_distance(layout: str, seed: int) -> None:
-    made = false_alarms.LAYOUTS[layout](seed)
+    made = causes.LAYOUTS[layout][0](seed)
     assert told(made.inputs, made.settings) == []
 
 
