@@ -17,7 +17,7 @@ from photostrip.result.document import document_of
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, accuracy, exit_code, headline_rms, verdict_of
 from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import Control, Flight, Spec, Terrain
+from photostrip.simulation.spec import Control, Flight, Points, Spec, Terrain
 from tests.results import Document, case, solved, spec
 from tests.simulated import inputs_of, settings_of
 
@@ -253,6 +253,22 @@ def test_a_principal_distance_one_percent_off_over_relief_is_not_good(seed: int)
     assert document["precision"]["check"]["tests"][0]["p"] < 0.001
     assert document["status"] == LOOK
     assert any(text.startswith("the check points are farther off") for text in document["verdict"]["look_at"])
+
+
+@pytest.mark.parametrize(("noise", "status"), [(0.0, LOOK), (0.012, LOOK), (0.1, FAILED)])
+def test_measurements_that_contradict_each_other_everywhere_are_no_result(noise: float, status: str) -> None:
+    """Two strips on their common points alone, the images 2.6 and 20 times as far off as stated."""
+    inputs = inputs_of(simulate(Spec(seed=5, flight=Flight(photos=6, strips=2), points=Points(extra_per_model=8))))
+    seen = inputs.observations
+    xy = seen.xy + np.random.default_rng(5).normal(0.0, noise, seen.xy.shape)
+    nothing = inputs.control.take(np.zeros(0, np.intp))
+    wrong = replace(inputs, control=nothing, observations=replace(seen, xy=xy))
+    document = solved(wrong, Settings(adjustment="bundle")).document
+    assert document["status"] == status
+    assert any("times worse than stated" in text for text in document["verdict"]["look_at"]) == (noise > 0.0)
+    assert exit_code(document["status"], strict=False) == (status == FAILED)
+    if status == FAILED:
+        assert quiet(document).startswith("FAILED: the measurements contradict their stated standard deviations.")
 
 
 # ------------------------------------------------------------------------------------------------------------ pairs
