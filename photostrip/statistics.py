@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from scipy.special import betainc, chdtri, chndtrinc, fdtrc, ndtri, stdtr, stdtrit
+from scipy.special import chdtrc, chdtri, chndtrinc, fdtrc, ndtri, stdtr, stdtrit
 
 from photostrip.arrays import Floats, Numbers
 
-# A sound result calls for a second look with this probability at the most, for whatever reason: sigma0, pairs, points
-# that the adjustment has not seen, given points that stand out, deformed models, control against a strip's covariance.
-# Each of these six has the same share of it.
-SECOND_LOOK = 0.05
-TEST_LEVEL = SECOND_LOOK / 6
+# A sound result calls for a second look with this probability at the most, by all tests of the verdict together:
+# sigma0, pairs, points that the adjustment has not seen, given points that stand out, deformed models. Each of these
+# five questions has the same share of it, and the tests of a question share that.
+SECOND_LOOK = 0.01
+TEST_LEVEL = SECOND_LOOK / 5
+HARDLY = 0.05  # probability below which the points that were not seen agree hardly, though the verdict lets them pass
 SIGMA_FROM_MEDIAN = 1.4826  # standard deviation over the median of |x|, of a normal distribution
 
 
@@ -33,13 +36,28 @@ def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
     return float(fdtrc(dof_numerator, dof_denominator, max(f, 0.0)))
 
 
+def chi2_p_value(squares: float, dof: float) -> float:
+    """Upper tail of chi-square: the probability of a larger sum of squares by chance; 1 without redundancy."""
+    return float(chdtrc(dof, max(squares, 0.0))) if dof > 0 else 1.0
+
+
+def squares_p_value(squares: float, correlations: Sequence[Floats]) -> float:
+    """Probability of a larger sum of squares of standard normal variables that go together.
+
+    correlations: of the variables; one matrix for each set of them that is independent of the others.
+
+    The sum has the cumulants tr R, 2 tr R^2, 8 tr R^3; the chi-square of the same skewness stands for it.
+    Source: [Imhof 1961].
+    """
+    mean = sum(float(np.trace(each)) for each in correlations)
+    second = sum(float((each**2).sum()) for each in correlations)
+    third = sum(float(((each @ each) * each).sum()) for each in correlations)
+    dof = second**3 / third**2
+    return chi2_p_value(dof + (squares - mean) * (dof / second) ** 0.5, dof)
+
+
 def chi2_quantile(probability: float, dof: float) -> float:
     return float(chdtri(dof, 1 - probability))
-
-
-def binomial_p_value(count: float, number: float, probability: float) -> float:
-    """Probability of `count` or more among `number` cases of a probability; the numbers need not be whole."""
-    return float(betainc(count, number - count + 1, probability)) if count > 0 else 1.0
 
 
 def noncentrality(significance: float, power: float, dof: float) -> float:

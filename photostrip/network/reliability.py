@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from photostrip.network.solution import BundleSolution, Cofactors
 
 IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"
-SIGMA0_LEVEL = 0.05  # probability that the test of sigma0 fails with right standard deviations
+SIGMA0_LEVEL = 0.05  # at which a search takes stated standard deviations for too small
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ class Sigma0Test:
 
     sigma0: float  # standard deviation of unit weight found
     redundancy: int
-    # lower, upper: limits of sigma0 between which it lies with the probability 1 - ``SIGMA0_LEVEL``; NaN without
+    # lower, upper: limits of sigma0 between which it lies with right standard deviations, at a level; NaN without
     # redundancy
     lower: float
     upper: float
@@ -145,12 +145,12 @@ class Sigma0Test:
         return self.sigma0 > self.upper
 
 
-def sigma0_test(solution: BundleSolution) -> Sigma0Test:
+def sigma0_test(solution: BundleSolution, level: float = SIGMA0_LEVEL) -> Sigma0Test:
     """Test sigma0 against 1: chi-square, both sides."""
     f = solution.redundancy
     if f < 1:
         return Sigma0Test(sigma0=solution.sigma0, redundancy=f, lower=float("nan"), upper=float("nan"))
-    ends = (chi2_quantile(p, f) for p in (SIGMA0_LEVEL / 2, 1 - SIGMA0_LEVEL / 2))
+    ends = (chi2_quantile(p, f) for p in (level / 2, 1 - level / 2))
     lower, upper = (float(np.sqrt(end / f)) for end in ends)
     return Sigma0Test(sigma0=solution.sigma0, redundancy=f, lower=lower, upper=upper)
 

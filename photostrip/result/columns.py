@@ -48,7 +48,7 @@ reliability_csv = partial(
 
 def points_csv(unit: str) -> list[Column]:
     """List the columns of points.csv for a unit of angles; the keys are those of flat records."""
-    names = "point=id role x y z sigma_x sigma_y sigma_z rays models image_rms_um cov_xy cov_xz cov_yz"
+    names = "point=id role x y z sigma_x sigma_y sigma_z rays models checked image_rms_um cov_xy cov_xz cov_yz"
     (azimuth,) = columns("points", "ellipse_azimuth_deg")
     name, decimals = f"ellipse_azimuth_{unit}", AZIMUTH_DECIMALS[unit]
     azimuth = Column(name, name, replace(azimuth.quantity, unit=unit, decimals=decimals))

@@ -19,7 +19,16 @@ from photostrip.result.adjustment import (
     strips,
 )
 from photostrip.result.numbers import natural_rank
-from photostrip.result.points import cross_validation, given, ground, image_coordinates, lost_say, photos, precision
+from photostrip.result.points import (
+    checked,
+    cross_validation,
+    given,
+    ground,
+    image_coordinates,
+    lost_say,
+    photos,
+    precision,
+)
 from photostrip.result.statement.evidence import statement_of
 from photostrip.result.verdict import verdict_of
 
@@ -38,12 +47,16 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     found = given.differences(result)
     numbers = summary.summary_of(result, found)
     taken_out, said = rejected.rejected_of(result), (*notes, *result.notes)
+    counts = summary.counts_of(result, sum(len(image.rows) for image in images))
+    points = ground.points_of(result, photos.point_rms(result, images), rank)
+    unchecked = checked.unchecked_notes(points, taken_out, counts["image_points"])
+    lost = lost_say.lost_say_notes(result, images, taken_out, said)
     body: Document = {
         "adjustment": conventions.adjustment_of(result),
         "frame": ground.frame_of(result),
         "summary": numbers,
         "tolerances": summary.tolerances_of(result, numbers),
-        "counts": summary.counts_of(result, sum(len(image.rows) for image in images)),
+        "counts": counts | checked.counts_of(points),
         "conventions": conventions.conventions_of(result),
         "settings": conventions.settings_of(result),
         "corrections": conventions.corrections_of(result),
@@ -62,13 +75,13 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "rejected": taken_out,
         "not_determined": ground.not_determined_of(result),
         "findings": [_finding(each) for each in result.findings],
-        "notes": [_note(note) for note in (*said, *lost_say.lost_say_notes(result, images, taken_out, said))],
+        "notes": [_note(note) for note in (*said, *lost, *unchecked)],
         "models": links.models_of(result) if result.model_strips else pairs.models_of(result),
         **({"links": links.links_of(result)} if result.model_strips else {}),
         **deformation.deformations_of(result),
         "junctions": junctions.junctions_of(result),
         "photos": photos.photos_of(result, images),
-        "points": ground.points_of(result, photos.point_rms(result, images), rank),
+        "points": points,
         "residuals": bundle.with_reliability(result, images, photos.residuals_of(result, images)),
         "parallaxes": pairs.parallaxes_of(result, rank),
         **({"link_residuals": links.residuals_of(result, rank)} if result.model_strips else {}),

@@ -6,21 +6,22 @@ It is made from the finished document, so that a saved result has the same verdi
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import compress, groupby
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Any
 
 from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
 from photostrip.notes import LOST_SAY, Document, before, counted, listed
+from photostrip.result import own_tests
+from photostrip.result.quantities import records
 from photostrip.result.records import column_of
-from photostrip.statistics import SECOND_LOOK, TEST_LEVEL, chi2_quantile, f_p_value
+from photostrip.statistics import HARDLY, SECOND_LOOK, TEST_LEVEL, normal_quantile
 
+Tests = Mapping[str, float]  # probabilities by chance, of ``own_tests``
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
 
-LEAST_STATED = 0.005  # micrometres, which the document rounds to nothing
-SIGMA0_RATIO = 1.5  # of sigma0 to the stated standard deviation
-PAIR_RATIO = 1.5  # of a pair's sigma0 to that of the others, or to the stated one, when chance does not explain it
+PAIR_RATIO = 1.5  # of a pair's sigma0, or of image residuals, to that of the others, or to what is stated
 PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
 POOR_CONTROL = 5.0  # rms of the control's residuals in standard deviations; a long strip bends by that much
 MANY_REJECTED, MANY_OF_PHOTO = 0.05, 0.2  # share of the points in pairs, of those of a photo
@@ -34,13 +35,17 @@ NAMED = 3  # pairs, photos, findings or notes of one kind that are told; the giv
 
 def verdict_of(document: Document) -> Document:
     """Return status, accuracy in a sentence and what to look at, from a document that has no verdict yet."""
-    errors = list(_findings(document, "error"))
-    failed, (lost, others) = [*_tolerances(document), *errors], _warnings(document)
+    tests = own_tests.probabilities(document)
+    errors, sigma0 = list(_findings(document, "error")), list(_sigma0(document, tests))
+    failed = [*_tolerances(document), *(errors or (sigma0 if _hopeless(document) else ()))]
+    lost, others = _warnings(document)
     look_at = [
         *failed,
         *_findings(document, "warning"),
         *_kinds(document, lost, "note"),
-        *(() if errors else _numbers(document)),  # of data that contradict themselves as a whole they say the same
+        *(
+            () if errors else (each for each in _numbers(document, tests) if each not in failed)
+        ),  # of data that contradict themselves as a whole they say the same
         *_common_deformation(document, in_metres=not errors),
         *(() if errors else _deformed(document)),
         *_rejected(document),
@@ -48,7 +53,15 @@ def verdict_of(document: Document) -> Document:
     ]
     verification = _verification(document)
     status = FAILED if failed else LOOK if look_at else GOOD if verification["verified"] else UNVERIFIED
-    return {"status": status, "accuracy": accuracy(document), **verification, "look_at": look_at}
+    agreement = "" if errors else _agreement(document, tests)
+    return {
+        "status": status,
+        "accuracy": accuracy(document),
+        "agreement": agreement,
+        **verification,
+        "tests": records("verdict.tests", {"test": list(tests), "p": list(tests.values()), "level": TEST_LEVEL}),
+        "look_at": look_at,
+    }
 
 
 def _verification(document: Document) -> Document:
@@ -74,7 +87,7 @@ def _cure(document: Document) -> str:
     return "measure points whose coordinates are known, and give them with `role: check`"
 
 
-def _numbers(document: Document) -> Iterator[str]:
+def _numbers(document: Document, tests: Tests) -> Iterator[str]:
     """Say where differences, residuals and standard deviations do not go together."""
     noted = (each for each in document["notes"] if each["code"] in WRONG_CONTROL)
     named = {point for each in (*_open_findings(document), *noted) for point in each["points"]}
@@ -82,12 +95,12 @@ def _numbers(document: Document) -> Iterator[str]:
     yield from _odd(document, "control", named)
     yield from _odd(document, "check", named)
     if not named.issuperset(name for (name,) in _given(document, "check", "id")):
-        yield from _checks(document)
+        yield from _checks(document, tests)
     yield from _odd(document, "cross_validation", named)
-    yield from _cross_validation(document)
-    yield from _sigma0(document)
-    yield from _pairs(document)
-    yield from _photos(document)
+    yield from _cross_validation(document, tests)
+    yield from _sigma0(document, tests)
+    yield from _pairs(document, tests)
+    yield from _photos(document, tests)
 
 
 def exit_code(status: str, *, strict: bool) -> int:
@@ -206,24 +219,33 @@ def _odd(document: Document, role: str, named: set[str]) -> Iterator[str]:
     yield f"{who}; the others have an rms of {others}"
 
 
-def _checks(document: Document) -> Iterator[str]:
+def _checks(document: Document, tests: Tests) -> Iterator[str]:
     """Say when the check points contradict the standard deviations of the points."""
     check = document.get("precision", {}).get("check")
     if not check:
         ratio = document["summary"]["check"]["normalised"]
         if ratio is not None and ratio > POOR_CONTROL:
             yield f"the check points are {ratio:.1f} times farther off than expected from the precision of one model"
-        return
-    chances = [check[name]["p"] for name in PARTS if check[name]["count"]] + [test["p"] for test in check["tests"]]
-    if chances and min(chances) < _unseen_level(document) / len(chances):
-        yield _contradiction("the check points", document, check, "rms", min(chances) * len(chances))
+    elif tests.get(own_tests.CHECKS, 1.0) < _unseen_level(document):
+        yield _contradiction("the check points", document, check, "rms", tests[own_tests.CHECKS])
 
 
-def _cross_validation(document: Document) -> Iterator[str]:
+def _cross_validation(document: Document, tests: Tests) -> Iterator[str]:
     """Say when control that was left out contradicts the standard deviations of the points."""
-    found = document.get("cross_validation")
-    if found and found["p"] is not None and found["p"] < _unseen_level(document):
-        yield _contradiction("control points left out in turn", document, found, "ratio", found["p"])
+    if tests.get(own_tests.LEFT_OUT, 1.0) < _unseen_level(document):
+        found = document["cross_validation"]
+        yield _contradiction("control points left out in turn", document, found, "ratio", tests[own_tests.LEFT_OUT])
+
+
+def _agreement(document: Document, tests: Tests) -> str:
+    """Say how far what took no part agrees with the standard deviations, where it does not contradict them."""
+    who = {own_tests.CHECKS: "the check points", own_tests.LEFT_OUT: "control points left out in turn"}
+    said = []
+    for name, subject in who.items():
+        if (p := tests.get(name)) is not None and p >= _unseen_level(document):
+            hardly = "hardly contradict" if p < HARDLY else "do not contradict"
+            said.append(f"{subject} {hardly} the standard deviations of the points, p = {p:.2g}")
+    return "; ".join(said)
 
 
 def _contradiction(who: str, document: Document, found: Document, ratio: str, chance: float) -> str:
@@ -240,12 +262,11 @@ def _contradiction(who: str, document: Document, found: Document, ratio: str, ch
 
 
 def _unseen_level(document: Document) -> float:
-    """Return the level of the test of the check points, or of the control left out in turn; they share it.
+    """Return the level of the test of the check points, and of the control left out in turn.
 
-    Where something larger than the noise is known to be left out, they decide on that alone.
+    Where something larger than the noise is known to be left out, less evidence is enough.
     """
-    both = "cross_validation" in document and any(_counts(document, "check"))
-    return (SECOND_LOOK if _known_cause(document) else TEST_LEVEL) / (2 if both else 1)
+    return HARDLY if _known_cause(document) else TEST_LEVEL
 
 
 def _known_cause(document: Document) -> str:
@@ -253,52 +274,43 @@ def _known_cause(document: Document) -> str:
     return "; the Earth's curvature is left out: try `earth_curvature: model`" if left_out else ""
 
 
-def _stated(document: Document) -> float:
-    """Return the stated standard deviation of an image or model coordinate, micrometres."""
-    return max(float(document["summary"]["sigma_given_um"]), LEAST_STATED)
-
-
-def _worse_than(given: float, found: float | None, redundancy: int) -> bool:
-    """Whether a standard deviation is larger than given, by much and by more than chance."""
-    ratio = (found or 0.0) / given
-    return ratio > SIGMA0_RATIO and ratio**2 > chi2_quantile(1 - TEST_LEVEL, redundancy) / redundancy
-
-
-def _sigma0(document: Document) -> Iterator[str]:
-    summary = document["summary"]
-    found, given = summary["sigma0_um"], _stated(document)
-    if _worse_than(given, found, summary["redundancy"]):
+def _sigma0(document: Document, tests: Tests) -> Iterator[str]:
+    summary, ratio = document["summary"], own_tests.sigma0_ratio(document)
+    if tests[own_tests.SIGMA0] < TEST_LEVEL:
         kind = "model" if summary.get("model_scale") else "image"
+        times = f"{ratio:.1f}" if ratio > PAIR_RATIO else f"{ratio:.2f}"
         yield (
-            f"the {kind} coordinates are {found / given:.1f} times worse than stated: sigma0 {found:.1f} µm, "
-            f"stated {given:.1f} µm"
+            f"the {kind} coordinates are {times} times worse than stated: sigma0 {summary['sigma0_um']:.1f} µm, "
+            f"stated {own_tests.stated(document):.1f} µm"
         )
 
 
-def _pairs(document: Document) -> Iterator[str]:
+def _hopeless(document: Document) -> bool:
+    """Whether observations are as far off on the average as the largest of so many good ones: nothing holds then."""
+    redundancy = document["summary"]["redundancy"]
+    largest = normal_quantile(1 - SECOND_LOOK / (2 * max(redundancy, 1)))
+    return redundancy > 0 and own_tests.sigma0_ratio(document) > largest
+
+
+def _pairs(document: Document, tests: Tests) -> Iterator[str]:
     """Name the pairs that are worse than the others, or than stated, by more than chance."""
-    given = _stated(document)
+    given = own_tests.stated(document)
     # said of the whole project already, or explained by what the photos have in common
-    quiet = any(True for _ in _sigma0(document)) or bool(document.get("bundle", {}).get("calibration"))
-    models = document["models"]
-    columns = (column_of(models, key) for key in ("sigma0_um", "redundancy"))
-    pairs = [each for each in zip(*columns, range(len(models)), strict=True) if each[0] is not None]
-    level = TEST_LEVEL / max(2 * len(pairs), 1)  # two tests of each pair
-    squares, redundancy = sum(own * found**2 for found, own, _ in pairs), sum(own for _, own, _ in pairs)
-    odd = []
-    for found, own, place in pairs:
-        left = redundancy - own
-        others = (max(squares - own * found**2, 0.0) / left) ** 0.5 if left else 0.0
-        if (others and found > PAIR_RATIO * others and f_p_value((found / others) ** 2, own, left) < level) or (
-            not quiet and found > PAIR_RATIO * given and (found / given) ** 2 * own > chi2_quantile(1 - level, own)
-        ):
-            odd.append((found, others, place))
-    odd.sort(key=itemgetter(0), reverse=True)
-    for found, others, place in odd[:NAMED]:
-        pair, beside = models[place], f", the other pairs have {others:.1f} µm" if others else ""
+    quiet = tests[own_tests.SIGMA0] < TEST_LEVEL or bool(document.get("bundle", {}).get("calibration"))
+    odd = [
+        pair
+        for pair in own_tests.pairs(document)
+        if (pair.among < TEST_LEVEL and pair.found > PAIR_RATIO * pair.others)
+        or (not quiet and pair.beside_stated < TEST_LEVEL and pair.found > PAIR_RATIO * given)
+    ]
+    odd.sort(key=attrgetter("found"), reverse=True)
+    for pair in odd[:NAMED]:
+        row, beside = document["models"][pair.place], ""
+        if pair.others:
+            beside = f", the other pairs have {pair.others:.1f} µm"
         yield (
-            f"photos {pair['left']} and {pair['right']}: sigma0 {found:.1f} µm, stated {given:.1f} µm{beside}; the "
-            f"largest y parallax is at point {pair['max_parallax_point']}"
+            f"photos {row['left']} and {row['right']}: sigma0 {pair.found:.1f} µm, stated {given:.1f} µm{beside}; the "
+            f"largest y parallax is at point {row['max_parallax_point']}"
         )
     yield from _more(len(odd), "pair")
 
@@ -306,7 +318,7 @@ def _pairs(document: Document) -> Iterator[str]:
 def _common_deformation(document: Document, *, in_metres: bool) -> Iterator[str]:
     """Name what all models have in common; in data that contradict themselves metres mean nothing."""
     for name, common in document.get("common_deformation", {}).items():
-        if common["p"] is not None and common["p"] < TEST_LEVEL / 4:  # twist, bending; of all models, of single ones
+        if common["p"] is not None and 2 * len(TERMS) * common["p"] < TEST_LEVEL:
             size = f" {common['at_corner_m']:+.3f} m at a corner against the middle in the mean," if in_metres else ""
             yield (
                 f"{common['models']} models are deformed alike ({name}):{size} t = {common['t']:.1f}; a lens, the film "
@@ -316,7 +328,7 @@ def _common_deformation(document: Document, *, in_metres: bool) -> Iterator[str]
 
 def _deformed(document: Document) -> Iterator[str]:
     """Name models that are bent or twisted beyond chance."""
-    odd = [row for row in document.get("deformations", []) if row.get("p", 1.0) < TEST_LEVEL / 2]
+    odd = [row for row in document.get("deformations", []) if 2 * row.get("p", 1.0) < TEST_LEVEL]
     odd.sort(key=lambda row: -max(abs(row[name]["at_corner_m"]) for name in TERMS))
     for row in odd[:NAMED]:
         name = max(TERMS, key=lambda name: abs(row[name]["t"]))
@@ -333,12 +345,12 @@ def _more(number: int, one: str, kind: str = "") -> Iterator[str]:
         yield f"{counted(number - NAMED, f'more {one}')}{kind} like these"
 
 
-def _photos(document: Document) -> Iterator[str]:
+def _photos(document: Document, tests: Tests) -> Iterator[str]:
     """Weigh all image residuals; name photos of large ones, then those that lost much, as by a shift of all points."""
-    whole, given, used = document["summary"]["image_rms_um"], _stated(document), document["counts"]["image_points_used"]
-    # of fewer redundant coordinates than there are, so that chance makes them smaller than this
-    if not any(_sigma0(document)) and _worse_than(given, whole, 2 * used):
-        ratio, text = whole / given, f"rms {whole:.1f} µm, stated {given:.1f} µm"
+    whole, given = document["summary"]["image_rms_um"], own_tests.stated(document)
+    ratio = own_tests.residuals_ratio(document)
+    if ratio > PAIR_RATIO and tests[own_tests.RESIDUALS] < TEST_LEVEL <= tests[own_tests.SIGMA0]:
+        text = f"rms {whole:.1f} µm, stated {given:.1f} µm"
         yield f"the image residuals under the final orientation are {ratio:.1f} times as large as stated: {text}"
     rejected = {(row["photo"], row["point"]) for row in document["rejected"] if not row.get("readmitted")}
     lost, poor, losing = Counter(photo for photo, _ in rejected), [], []

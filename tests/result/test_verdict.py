@@ -17,8 +17,7 @@ from photostrip.result.document import document_of
 from photostrip.result.points.standing_out import stand_out
 from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, accuracy, exit_code, headline_rms, verdict_of
 from photostrip.simulation.simulation import simulate
-from photostrip.simulation.spec import Control, Flight, Spec, Terrain
-from photostrip.statistics import binomial_p_value
+from photostrip.simulation.spec import Control, Flight, Points, Spec, Terrain
 from tests.results import Document, case, solved, spec
 from tests.simulated import inputs_of, settings_of
 
@@ -35,7 +34,7 @@ def with_checks(plan: int, height: int) -> Document:
 
 
 def quiet(document: Document) -> str:
-    return to_text("", chosen_sections(document, quiet=True), 200)
+    return " ".join(to_text("", chosen_sections(document, quiet=True), 200).split())
 
 
 @pytest.mark.slow
@@ -92,17 +91,30 @@ def test_check_points_beyond_their_standard_deviations_are_not_good(adjustment: 
     assert document["status"] == LOOK
 
 
-@pytest.mark.slow
-def test_few_inside_is_enough() -> None:
-    """None of two points inside the ellipse, and the squares of all coordinates nothing out of the way."""
+def test_one_part_is_enough() -> None:
+    """Heights 2.4 times as far off as expected, and the squares of all coordinates nothing out of the way."""
+    found = with_check_p(plan=0.7, height=0.0004, together=0.03)
+    assert found["status"] == LOOK
+    assert "probability 0.1 % by chance" in found["look_at"][0]
+    assert found["agreement"] == ""
+
+
+@pytest.mark.parametrize(("height", "said"), [(0.21, "do not contradict"), (0.004, "hardly contradict")])
+def test_what_the_check_points_say_is_told_with_its_probability(height: float, said: str) -> None:
+    """Three tests share the level: the least probability counts three times."""
+    found = with_check_p(plan=0.7, height=height, together=0.5)
+    assert found["status"] == GOOD
+    expected = f"the check points {said} the standard deviations of the points, p = {3 * height:.2g}"
+    assert found["agreement"] == expected
+
+
+def with_check_p(*, plan: float, height: float, together: float) -> Document:
+    """Return the verdict on a sound result whose check points have these probabilities by chance."""
     document = moved(0, 0.0)
     check = document["precision"]["check"]
-    few = {"count": 2, "inside_95": 0, "rms": 2.0, "p": binomial_p_value(2, 2, 0.05)}
-    test = {**check["tests"][0], "p": 0.03}
-    changed = {**check, "plan": few, "tests": [test]}
-    found = verdict_of({**document, "precision": {**document["precision"], "check": changed}})
-    assert found["status"] == LOOK
-    assert "in plan 2.0 times, 0 of 2 inside the 95 % ellipse" in found["look_at"][0]
+    parts = {name: {**check[name], "p": p} for name, p in (("plan", plan), ("height", height))}
+    changed = {**check, **parts, "tests": [{**check["tests"][0], "p": together}]}
+    return verdict_of({**document, "precision": {**document["precision"], "check": changed}})
 
 
 def test_a_cause_that_is_known_needs_less_evidence() -> None:
@@ -241,6 +253,22 @@ def test_a_principal_distance_one_percent_off_over_relief_is_not_good(seed: int)
     assert document["precision"]["check"]["tests"][0]["p"] < 0.001
     assert document["status"] == LOOK
     assert any(text.startswith("the check points are farther off") for text in document["verdict"]["look_at"])
+
+
+@pytest.mark.parametrize(("noise", "status"), [(0.0, LOOK), (0.012, LOOK), (0.1, FAILED)])
+def test_measurements_that_contradict_each_other_everywhere_are_no_result(noise: float, status: str) -> None:
+    """Two strips on their common points alone, the images 2.6 and 20 times as far off as stated."""
+    inputs = inputs_of(simulate(Spec(seed=5, flight=Flight(photos=6, strips=2), points=Points(extra_per_model=8))))
+    seen = inputs.observations
+    xy = seen.xy + np.random.default_rng(5).normal(0.0, noise, seen.xy.shape)
+    nothing = inputs.control.take(np.zeros(0, np.intp))
+    wrong = replace(inputs, control=nothing, observations=replace(seen, xy=xy))
+    document = solved(wrong, Settings(adjustment="bundle")).document
+    assert document["status"] == status
+    assert any("times worse than stated" in text for text in document["verdict"]["look_at"]) == (noise > 0.0)
+    assert exit_code(document["status"], strict=False) == (status == FAILED)
+    if status == FAILED:
+        assert quiet(document).startswith("FAILED: the measurements contradict their stated standard deviations.")
 
 
 # ------------------------------------------------------------------------------------------------------------ pairs

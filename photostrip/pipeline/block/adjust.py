@@ -31,6 +31,7 @@ from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart
 from photostrip.pipeline.strips.models import LinkedModels
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.statistics import TEST_LEVEL
 
 REFILLED = 1e-9  # metres by which targets of plan or height points may still move
 REFILLS = 3
@@ -205,7 +206,7 @@ def _searched(
         raise
     for shared in screened.common:
         block = replace(block, problem=taken_up(block.problem, shared))
-    sigma0 = reliability.sigma0_test(screened.solution)
+    sigma0 = reliability.sigma0_test(screened.solution, TEST_LEVEL)
     found = _Estimated(block=block, screened=screened, sigma0=sigma0, asked=asked)
     return _with_components(found, settings) if settings.bundle.variance_components else found
 
@@ -236,7 +237,7 @@ def _as_before(before: Bundle, block: BlockProblem, settings: Settings) -> _Esti
     problem = variance_components.scaled(problem, before.components, block.level)
     screened = ScreenedBundle.of(problem, supported(problem, block.begin), settings.bundle)
     screened = replace(screened, common=before.screened.common)
-    sigma0 = reliability.sigma0_test(screened.solution)
+    sigma0 = reliability.sigma0_test(screened.solution, TEST_LEVEL)
     return _Estimated(
         block=replace(block, problem=problem),
         screened=screened,

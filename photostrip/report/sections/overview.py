@@ -114,6 +114,7 @@ def _stages(document: Document) -> Rows:
         yield "image residuals", f"rms {micrometres(summary['image_rms_um'])} µm"
     if "precision" in document:
         yield from _precision(document["precision"])
+    yield from _checked(document["counts"].get("points_checked"))
 
 
 def _pairs(document: Document) -> Rows:
@@ -195,6 +196,13 @@ def _bundle(block: Document) -> str:
         )
     free = "free network, " if block["free_network"] else ""
     return f"{free}σ0 {fixed(block['sigma0'], 3)}, test {said}; {counted(out, 'observation')} rejected"
+
+
+def _checked(number: Document | None) -> Rows:
+    """Say of how many points an error along the base would not show; results of older versions do not know."""
+    if number and (number["across"] or number["none"]):
+        text = f"{counted(number['across'], 'point')} checked only across the base, {number['none']} not at all"
+        yield "unchecked", f"{text}; {number['along']} along it too"
 
 
 def _precision(block: Document) -> Rows:

@@ -30,6 +30,8 @@ def headline(document: Document) -> str:
     wrong = sum(each["severity"] == "error" and not each["accepted"] for each in document.get("findings", []))
     if wrong:
         reasons.append(f"the data contradict themselves, {counted(wrong, 'finding')}")
+    if not reasons:
+        reasons = ["the measurements contradict their stated standard deviations"]
     unverified = document["verdict"].get("verification", "")  # results of older versions have none
     return HEADLINES[document["status"]].format(number=number, failed="; ".join(reasons), unverified=unverified)
 
@@ -37,7 +39,7 @@ def headline(document: Document) -> str:
 def accuracy(document: Document) -> Words:
     """Return the sentence on what is left at the check points, or at the control."""
     verdict = document["verdict"]
-    texts = [verdict["accuracy"]]
+    texts = [verdict["accuracy"], *filter(None, [verdict.get("agreement")])]
     if document["status"] != "unverified" and not verdict.get("verified", True):
         texts.append(verdict["verification"])
     return Words(" ".join(f"{text[0].upper()}{text[1:]}." for text in texts))

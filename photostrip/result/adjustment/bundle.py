@@ -21,6 +21,7 @@ from photostrip.result.numbers import PER_RADIAN, rms
 from photostrip.result.points.photos import ImageResiduals
 from photostrip.result.quantities import grouped, record, records
 from photostrip.result.records import Records, as_records
+from photostrip.statistics import TEST_LEVEL
 from photostrip.units import MICROMETRES
 
 OBSERVED = (reliability.IMAGE, reliability.CONTROL, reliability.POSITION, reliability.ATTITUDE)
@@ -113,7 +114,7 @@ def _sigma0(found: Bundle) -> Document:
         "redundancy": test.redundancy,
         "lower": test.lower,
         "upper": test.upper,
-        "level": reliability.SIGMA0_LEVEL,
+        "level": TEST_LEVEL,
         "passed": test.passed if np.isfinite(test.lower) else None,
     }
 

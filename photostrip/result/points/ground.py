@@ -11,6 +11,7 @@ from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
 from photostrip.pipeline.results import ROLES, Result
 from photostrip.result.numbers import RoundedColumn, natural_rank, to_decimals
+from photostrip.result.points.checked import CHECKED, checked_of
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns
 from photostrip.result.quantities import coordinate_decimals, records
@@ -58,6 +59,7 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> Records:
         **point_columns(result),
         "rays": points.rays,
         "models": models[points.number],
+        "checked": Named(CHECKED, checked_of(result, models[points.number]).astype(np.int8)),
         "image_rms_um": image_rms[points.number] * 1000.0,
     }
     return records("points", columns).taken(np.argsort(rank[points.number]))

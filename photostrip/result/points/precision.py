@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
 from photostrip.arrays import Floats
@@ -14,7 +16,8 @@ from photostrip.result.points.given import Differences
 from photostrip.result.points.own_precision import chances, turned
 from photostrip.result.quantities import record, records
 from photostrip.result.records import Records
-from photostrip.statistics import binomial_p_value, chi2_quantile, normal_quantile
+from photostrip.statistics import chi2_quantile, normal_quantile, squares_p_value
+from photostrip.strip.error_propagation.check_errors import CheckErrors
 
 ROWS, COLUMNS = np.triu_indices(6)
 OUTSIDE = 0.05  # share of sound differences that lie outside their ellipse or interval
@@ -189,8 +192,9 @@ def _check(result: Result, found: Differences) -> Document:
     """Compare the differences at check points with what the covariances let expect; empty without check points.
 
     The covariance of a difference is that of the point and that of the given coordinate. Errors go together along a
-    strip: the test of all of them is made with their joint covariance, and points that lie outside are counted as so
-    many as are independent. Points that stand out take no part in these tests: they have been named.
+    strip: all of them are tested with their joint covariance, which weighs most what is known best, and their rms in
+    plan and in height, in which bends of a strip weigh most, against what their correlations let expect. Points that
+    stand out take no part in these tests: they have been named.
     """
     rows, values = found.checks
     if result.precision is None or np.isnan(values).all():
@@ -200,13 +204,11 @@ def _check(result: Result, found: Differences) -> Document:
     names = [strip.strip.id for strip in result.strips] if result.bundle is None else [""]
     kept = [None if errors is None else errors.without(left_out) for errors in result.precision.checks]
     tests = {name: errors for name, errors in zip(names, kept, strict=False) if errors is not None}
-    coordinates = sum(errors.coordinates for errors in tests.values())
-    share = sum(errors.independent for errors in tests.values()) / max(coordinates, 1)
     sound = values[[name not in left_out for name in ids]]
     points = {"id": ids, "plan": values[:, 0], "height": values[:, 1], **chances(values)}
     return {
-        "plan": _inside(sound[:, 0], INSIDE["plan"], 2, share),
-        "height": _inside(sound[:, 1], INSIDE["height"], 1, share),
+        "plan": _inside(sound[:, 0], INSIDE["plan"], 2) | {"p": _larger(result, tests.values(), (0, 1))},
+        "height": _inside(sound[:, 1], INSIDE["height"], 1) | {"p": _larger(result, tests.values(), (2,))},
         "points": records("precision.check.points", points),
         "tests": [
             {
@@ -222,10 +224,21 @@ def _check(result: Result, found: Differences) -> Document:
     }
 
 
-def _inside(values: Floats, limit: float, coordinates: int, share: float) -> Document:
+def _larger(result: Result, tests: Iterable[CheckErrors], axes: Sequence[int]) -> float | None:
+    """Probability of a larger rms of the differences, each over its own standard deviation; None where it is unknown.
+
+    The axes of geocentric lists are neither plan nor height.
+    """
+    if any(frame.kind == "geocentric" for frame in result.frames):
+        return None
+    parts = [errors.take(rows) for errors in tests if len(rows := np.flatnonzero(np.isin(errors.axis, axes)))]
+    squares = sum(part.own_squares for part in parts)
+    return squares_p_value(squares, [part.correlation for part in parts]) if parts else None
+
+
+def _inside(values: Floats, limit: float, coordinates: int) -> Document:
     """Count the differences within their 95 % ellipse or interval; their rms, of one coordinate."""
     known = values[~np.isnan(values)]
     size = np.sqrt(np.mean(known**2) / coordinates) if len(known) else None
     inside = int((np.abs(known) <= limit).sum())
-    chance = binomial_p_value(share * (len(known) - inside), share * len(known), OUTSIDE)
-    return {"count": len(known), "inside_95": inside, "rms": size, "p": chance}
+    return {"count": len(known), "inside_95": inside, "rms": size}

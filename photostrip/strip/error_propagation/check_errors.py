@@ -62,6 +62,14 @@ class CheckErrors:
 
         The mean of n squares of standard normal variables with correlations r has the variance 2 sum(r^2) / n^2.
         """
+        return self.coordinates**2 / float((self.correlation**2).sum())
+
+    @property
+    def correlation(self) -> Floats:
         sigma = np.sqrt(np.diag(self.covariance))
-        correlation = self.covariance / sigma / sigma[:, None]
-        return self.coordinates**2 / float((correlation**2).sum())
+        return self.covariance / sigma / sigma[:, None]
+
+    @property
+    def own_squares(self) -> float:
+        """Sum of the squares of the differences, each over its own standard deviation."""
+        return float((self.difference**2 / np.diag(self.covariance)).sum())
