@@ -293,10 +293,11 @@ def _hopeless(document: Document) -> bool:
 
 
 def _pairs(document: Document, tests: Tests) -> Iterator[str]:
-    """Name the pairs that are worse than the others, or than stated, by more than chance."""
+    """Name the pairs that are worse than the others, or than stated, by more than chance; a bundle needs none."""
+    if "bundle" in document:
+        return
     given = own_tests.stated(document)
-    # said of the whole project already, or explained by what the photos have in common
-    quiet = tests[own_tests.SIGMA0] < TEST_LEVEL or bool(document.get("bundle", {}).get("calibration"))
+    quiet = tests[own_tests.SIGMA0] < TEST_LEVEL  # said of the whole project already
     odd = [
         pair
         for pair in own_tests.pairs(document)

@@ -13,8 +13,9 @@ from photostrip.notes import Note
 from photostrip.pipeline.results import Bundle
 from photostrip.rejection import Rejection
 
-OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustment
+OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle, which tests and holds all rays itself
     "bundle-proposed",
+    "contradicting-joint",
     "control-image",
     "control-rejected",
     "degree-reduced",
@@ -22,8 +23,12 @@ OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustme
     "little-control",
     "little-redundancy",
     "long-strip",
+    "masked-errors",
+    "no-check",
     "not-resected",
+    "rays-not-tested",
     "weak-control",
+    "weak-joint",
     "weak-pair",
 }
 

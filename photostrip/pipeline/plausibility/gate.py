@@ -6,7 +6,7 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,19 +31,20 @@ from photostrip.pipeline.plausibility.evidence import EvidenceStrip
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import ImageEvidence, of_images
 from photostrip.plausibility import accepted
-from photostrip.plausibility.photos import flight, flight_order, identity, rotations, units
+from photostrip.plausibility.photos import flight, flight_order, identity, rotations, shared_ids, units
+from photostrip.plausibility.photos.shared_ids import OrientedRays
 from photostrip.points import PhotoPoints, locate
+from photostrip.strip.resection.collinearity import KnownPhotos
 
 if TYPE_CHECKING:
-    from photostrip.pipeline.results import Result
+    from photostrip.pipeline.results import Bundle, Result, StripResult
     from photostrip.strip.independent_models.formation import FormedModels
 
 STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give
 OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 OF_SLIPS = "P406"  # findings on single digits of given coordinates
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
-OF_STRIPS = ("P201", "P202", "P206", "P207", "P301", "P304")
-OF_HEIGHTS = "P205"  # findings on perspective centres above the others, given or, without a key, of a strip
+OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
 OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
 
 
@@ -63,10 +64,8 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
 
 def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment being done."""
-    from photostrip.pipeline.common_points import compared_strips  # a check has no adjusted strips
-    from photostrip.pipeline.plausibility import shared_control, slips
+    from photostrip.pipeline.plausibility import shared_control, slips  # a check has no adjusted strips
     from photostrip.plausibility.control.shared_by_control import StretchedHeights
-    from photostrip.plausibility.photos import tied_strips
 
     inputs, settings = result.inputs, result.settings
     if inputs.models is not None:
@@ -94,15 +93,16 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         named = {name for each in findings for name in each.points}
         findings += [each for each in slips.of_rejected(result, predicted, control) if named.isdisjoint(each.points)]
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
-    for each in formed:
+    for each, strip in zip(formed, result.photo_strips, strict=True):
         findings += _of_formed(each, points)
+        findings += _of_flight(each) if result.bundle is None else _of_adjusted_flight(strip)
+    findings += _of_shared_ids(result, stages, formed)
     in_metres = not any(each.is_error for each in findings)
     if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
         checks = inputs.control.check
         findings += units.find_wrong_sigmas_of_given(predicted.off[checks], inputs.control.sigma[checks])
-    for ties in compared_strips(stages, points.point_ids):
-        findings += tied_strips.find_shared_ids_of_strips(ties, joined=result.bundle is not None)
-    findings += given_cameras.centers(inputs, points, images.strips, directory)
+    given = given_cameras.centers(inputs, points, images.strips, directory)
+    findings += [each for each in given if result.bundle is None or _contradicted(each, result.bundle)]
     findings += _of_rotations(result, formed, directory)
     if result.bundle is not None:
         from photostrip.pipeline.plausibility import shared_errors  # a strip needs nothing of a bundle
@@ -147,7 +147,7 @@ def of_failure(
         findings += control_layout.weak_layout(inputs, settings, images, control, directory)
         whole = [each for each in formed if each is not None]
         for each in whole:
-            findings += _of_formed(each, points)
+            findings += [*_of_formed(each, points), *_of_flight(each), *_shared_ids(each, points)]
         findings += given_cameras.centers(inputs, images.observations, images.strips, directory, starts=True)
         findings += given_cameras.angles(inputs, whole, points, directory)
         broken = [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]
@@ -162,12 +162,8 @@ def of_failure(
 def _told(findings: Iterable[Finding], inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
     """Leave out what strips say of themselves that were found among photos in no order: they only start a bundle."""
     found = {strip.id for strip in inputs.strips if not strip.listed}
-    told = (each for each in findings if found.isdisjoint(each.strips) or not _of_strip_alone(each))
+    told = (each for each in findings if found.isdisjoint(each.strips) or each.code not in OF_STRIPS)
     return accepted(told, settings.accept)
-
-
-def _of_strip_alone(finding: Finding) -> bool:
-    return finding.code in OF_STRIPS or (finding.code == OF_HEIGHTS and not finding.key)
 
 
 def _given_control(inputs: Inputs, directory: Path | None, frames: Sequence[GroundFrame] = ()) -> GivenControl | None:
@@ -269,15 +265,77 @@ def _of_ids(strips: Sequence[Strip], images: ImageEvidence) -> list[Finding]:
 def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     """Look at a formed strip: its perspective centres, and the ids of its points."""
     strip, formed = each.strip, each.formed
-    whole = each.whole.formed  # rays that contradict each other may be those of two points
     sigma = np.median(observations.sigma)
     findings = units.find_wrong_sigmas(each.orientation.sigma0, sigma, strip.id)
-    findings += flight.find_odd_centers(formed.centers, each.depth, each.up, strip.photos, strip.id)
-    names = observations.point_ids
-    findings += identity.find_shared_ids(each.orientation, whole, names, strip.photos, sigma, strip.id)
     focal = strip.camera.principal_distance
     findings += identity.find_double_ids(observations, formed, focal, strip.photos, strip.id, sigma)
     return findings
+
+
+def _of_flight(each: EvidenceStrip) -> Iterator[Finding]:
+    """Look at the perspective centres of a formed strip."""
+    return flight.find_odd_centers(each.formed.centers, each.depth, each.up, each.strip.photos, each.strip.id)
+
+
+def _of_adjusted_flight(strip: StripResult) -> Iterator[Finding]:
+    """Look at the perspective centres of a strip as a bundle has left them."""
+    centers = strip.of_photos.resection.centers
+    depth = np.full(len(centers), np.median(centers[:, 2]) - np.median(strip.xyz[:, 2]))  # the Earth bends both alike
+    return flight.find_odd_centers(centers, depth, np.array([0.0, 0.0, 1.0]), strip.strip.photos, strip.strip.id)
+
+
+def _of_shared_ids(result: Result, stages: Iterable[StripResult], formed: Iterable[EvidenceStrip]) -> Iterator[Finding]:
+    """Look for ids that stand for two points: in a bundle, or in each strip and between strips.
+
+    stages: the strips as they were formed; formed: those of photos.
+    """
+    points = result.refined.observations
+    if result.bundle is not None:
+        rays, photos = _rays_of(result.bundle, points), result.bundle.block.problem.photo_ids
+        yield from shared_ids.find_shared_ids(rays, points.point_ids, photos)
+        return
+    from photostrip.pipeline.common_points import compared_strips  # a check has no adjusted strips
+    from photostrip.plausibility.photos import tied_strips
+
+    for each in formed:
+        yield from _shared_ids(each, points)
+    for ties in compared_strips(tuple(stages), points.point_ids):
+        yield from tied_strips.find_shared_ids_of_strips(ties)
+
+
+def _shared_ids(each: EvidenceStrip, observations: PhotoPoints) -> Iterator[Finding]:
+    """Look for ids that stand for two points of a formed strip."""
+    strip, formed, o = each.strip, each.formed, observations
+    photos = strip.oriented(formed.centers, formed.rotations)
+    rays = OrientedRays.of_strip(photos, strip.positions(o), o.point, o.xy, o.sigma)
+    return shared_ids.find_shared_ids(rays, o.point_ids, strip.photos, (strip.id,))
+
+
+def _rays_of(bundle: Bundle, observations: PhotoPoints) -> OrientedRays:
+    """Rays of a bundle; those that it rejected did not go with the others."""
+    solution, problem = bundle.screened.solution, bundle.block.problem
+    focal = problem.cameras.focal[problem.cameras.of_photo]
+    return OrientedRays(
+        photos=KnownPhotos(solution.centers, solution.rotations, focal),
+        photo=problem.images.photo,
+        point=problem.images.point,
+        xy=observations.xy[bundle.block.rows],
+        sigma=problem.images.sigma * max(bundle.unit, 1.0),
+        wrong=~bundle.screened.selection.images,
+    )
+
+
+def _contradicted(finding: Finding, bundle: Bundle) -> bool:
+    """Whether a bundle did not go with all given positions of the photos of a finding, or took up what they share."""
+    from photostrip.network.hypotheses import DRIFT, OFFSET, ORDER  # a strip needs nothing of a bundle
+    from photostrip.network.reliability import POSITION
+
+    screened, problem = bundle.screened, bundle.block.problem
+    rows = [
+        each.row for each in (*screened.rejections, *screened.held) if each.kind == POSITION and not each.readmitted
+    ]
+    named = {problem.photo_ids[n] for n in problem.positions.photo[rows].tolist()}
+    return not named.isdisjoint(finding.photos) or any(each.kind in (OFFSET, DRIFT, ORDER) for each in screened.common)
 
 
 def _of_rotations(result: Result, formed: Sequence[EvidenceStrip], directory: Path | None) -> list[Finding]:

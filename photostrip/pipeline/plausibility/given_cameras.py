@@ -127,41 +127,47 @@ def _of_strip(strip: Strip, plan: LevelPlan, shown: Shown, photo_ids: Sequence[s
     if not photos:
         return
     xyz = plan.centers[rows[rows >= 0]]
-    height, scale = _ground_below(locate(photos, photo_ids), plan, shown)
+    height, ratio = _ground_below(locate(photos, photo_ids), xyz, plan, shown, strip.camera.principal_distance)
     usual = float(np.ptp(xyz[:, :2], axis=0).max())
     depth = xyz[:, 2] - height if np.isfinite(height).all() else np.full(len(photos), max(usual, 1.0))
     findings = list(flight.find_odd_centers(xyz, depth, np.array([0.0, 0.0, 1.0]), photos, strip.id))
     below = {photo for each in findings if each.code == "P204" for photo in each.photos}
-    wanted = scale * strip.camera.principal_distance
-    known = (wanted > 0) & (depth > 0) & np.isfinite(height)
-    if not below and known.sum() >= LEAST_HEIGHTS:
-        ratio = np.median(depth[known] / wanted[known])
-        if not 1.0 / MOST_HEIGHT_RATIO < ratio < MOST_HEIGHT_RATIO:
-            findings = [_other_height(strip, plan, photos, depth[known], wanted[known])]
+    known = np.isfinite(ratio) & (depth > 0)
+    times = np.median(ratio[known]) if known.sum() >= LEAST_HEIGHTS else 1.0
+    if not below and not 1.0 / MOST_HEIGHT_RATIO < times < MOST_HEIGHT_RATIO:
+        findings = [_other_height(strip, plan, photos, depth[known], depth[known] / ratio[known])]
     for each in findings:
         fix = FIXES[each.code] if each.code != "P205" or len(each.photos) == 1 else each.fix
         yield replace(each, message=f"{plan.key}: {each.message}", fix=fix, key=plan.key)
 
 
-def _ground_below(photos: Numbers, plan: LevelPlan, shown: Shown) -> tuple[Floats, Floats]:
-    """Height of the ground under each photo, and metres on the ground in a millimetre of the photo."""
-    height, scale = np.full(len(photos), np.nan), np.full(len(photos), np.nan)
+def _ground_below(
+    photos: Numbers, centers: Floats, plan: LevelPlan, shown: Shown, focal: float
+) -> tuple[Floats, Floats]:
+    """Height of the ground under each photo, and how many times too far its centre is given from the control it shows.
+
+    The angles between rays say that, whichever way the camera looks.
+    """
+    height, ratio = np.full(len(photos), np.nan), np.full(len(photos), np.nan)
     order = np.argsort(shown.photo, kind="stable")
     first, last = np.searchsorted(shown.photo[order], photos), np.searchsorted(shown.photo[order], photos, "right")
     for place in np.flatnonzero(first < last).tolist():
         rows = order[first[place] : last[place]]
         ground = plan.control[shown.number[rows]]
         height[place] = np.median(ground[:, 2])
-        far = _spread(shown.xy[rows])
-        scale[place] = _spread(ground[:, :2]) / far if len(rows) > 1 and far > 0 else np.nan
+        given = _spread(ground - centers[place])
+        measured = _spread(np.column_stack([shown.xy[rows], np.full(len(rows), -focal)]))
+        ratio[place] = measured / given if len(rows) > 1 and given > 0 and measured > 0 else np.nan
     known = np.isfinite(height)
     if known.any():
         height = np.interp(np.arange(len(photos)), np.flatnonzero(known), height[known])
-    return height, scale
+    return height, ratio
 
 
-def _spread(points: Floats) -> float:
-    return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum()))
+def _spread(rays: Floats) -> float:
+    """Spread of directions."""
+    unit = rays / np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-12)
+    return float(np.sqrt(((unit - unit.mean(axis=0)) ** 2).sum()))
 
 
 def _other_height(strip: Strip, plan: LevelPlan, photos: Sequence[str], depth: Floats, wanted: Floats) -> Finding:

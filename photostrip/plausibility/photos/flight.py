@@ -1,7 +1,7 @@
 """Perspective centres of a formed strip: heights, base lengths and base directions that do not go with the others.
 
 All is measured against the strip itself, in units of its flying height and of its usual base, so that a wrong control
-does not disturb it.
+does not disturb it; and against the scatter of the flight, which is large where wind moves a small aircraft.
 """
 
 from __future__ import annotations
@@ -10,17 +10,17 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from photostrip.arrays import Flags, Floats, Numbers
+from photostrip.arrays import Floats, Numbers
 from photostrip.notes import Finding, listed
 from photostrip.plausibility.finding import found
+from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
 
 MOST_HEIGHT_OFF = 0.2  # of the flying height, from the line of the neighbours
 LONG_BASE, SHORT_BASE = 1.75, 0.5  # of the usual base
 TURNED_DEG = 30.0  # of a base against its neighbours
 BESIDE = 3  # bases on either side that say what is usual
 LEAST_PHOTOS = 4
-STEP_SHARE = 0.3  # of a limit: what goes beyond it among the neighbours has a step of that size somewhere
-SHORT_FLIGHT = 30  # photos of which each is looked at
+LEVEL = 0.01  # of one false name in a flight that scatters
 
 
 def find_odd_centers(
@@ -58,14 +58,14 @@ def _below(photos: Sequence[str], depth: Floats, below: Numbers, names: tuple[st
 
 
 def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
-    bend = np.zeros(len(height))
-    bend[1:-1] = height[1:-1] - (height[:-2] + height[2:]) / 2.0
-    for number in _worth_a_look(np.abs(bend) > STEP_SHARE * MOST_HEIGHT_OFF * flying):
+    step = np.diff(height, 2) / flying
+    for number in range(len(photos)):
         near = _beside(number, len(photos))
         line = _robust_line(np.array(near, float), height[near])
         off = float(height[number] - line[0] - line[1] * number) / flying
         inside = near[0] < number < near[-1]  # at an end a line is extended
-        if abs(off) > (MOST_HEIGHT_OFF if inside else 2.0 * MOST_HEIGHT_OFF):
+        limit = MOST_HEIGHT_OFF if inside else 2.0 * MOST_HEIGHT_OFF
+        if abs(off) > max(limit, _by_chance(step, range(number - 2, number + 1))):
             message = (
                 f"the perspective centre of photo {photos[number]} lies {100 * abs(off):.0f} % of the flying height "
                 f"{'above' if off > 0 else 'below'} those of its neighbours"
@@ -75,12 +75,11 @@ def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[
             yield found("P205", message, fix, evidence, photos=(photos[number],), strips=names)
 
 
-def _worth_a_look(conspicuous: Flags) -> list[int]:
-    """Return what stands near something conspicuous; everything of a short flight."""
-    if len(conspicuous) <= SHORT_FLIGHT:
-        return list(range(len(conspicuous)))
-    around = np.convolve(conspicuous, np.ones(2 * BESIDE + 1), "same")
-    return [int(number) for number in np.flatnonzero(np.round(around))]
+def _by_chance(step: Floats, own: range) -> float:
+    """How far chance brings one of a flight whose steps from one to the next, all but its own, scatter so much."""
+    others = np.delete(step, [row for row in own if 0 <= row < len(step)])
+    sigma = SIGMA_FROM_MEDIAN * float(np.median(np.abs(others))) if len(others) else 0.0
+    return normal_quantile(1.0 - LEVEL / (2.0 * (len(step) + 1))) * sigma
 
 
 def _beside(number: int, count: int) -> list[int]:
@@ -96,11 +95,11 @@ def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
 
 
 def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
-    step = np.abs(np.diff(np.log(np.maximum(length, 1e-12))))
-    for number in _worth_a_look(np.append(step, 0.0) > STEP_SHARE * np.log(LONG_BASE)):
+    step = np.diff(np.log(np.maximum(length, 1e-12)))
+    for number in range(len(length)):
         usual = np.median(length[_beside(number, len(length))])
         ratio = float(length[number]) / max(usual, 1e-12)
-        if SHORT_BASE < ratio < LONG_BASE:
+        if SHORT_BASE < ratio < LONG_BASE or abs(np.log(ratio)) < _by_chance(step, range(number - 1, number + 1)):
             continue
         pair = (photos[number], photos[number + 1])
         message = f"the base of photos {pair[0]} and {pair[1]} is {ratio:.2f} times as long as those beside it"
@@ -110,13 +109,18 @@ def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> I
 
 def _directions(bases: Floats, up: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
     unit = bases / np.maximum(np.linalg.norm(bases, axis=1, keepdims=True), 1e-12)
-    cosine = (unit[1:] * unit[:-1]).sum(axis=1)
-    for number in _worth_a_look(np.append(cosine, 1.0) < np.cos(np.radians(STEP_SHARE * TURNED_DEG))):
+    step = _turns(unit[:-1], unit[1:], up)
+    for number in range(len(bases)):
         usual = np.median(unit[_beside(number, len(bases))], axis=0)
-        turn = np.degrees(np.arctan2(np.cross(usual, bases[number]) @ up, usual @ bases[number]))
-        if abs(turn) <= TURNED_DEG:
+        turn = float(_turns(usual, bases[number], up))
+        if abs(turn) <= max(TURNED_DEG, _by_chance(step, range(number - 1, number + 1))):
             continue
         pair = (photos[number], photos[number + 1])
         message = f"the base of photos {pair[0]} and {pair[1]} turns by {turn:+.0f} degrees against those beside it"
         fix = "does the strip bend there? else: is a photo listed in the wrong place or measured wrongly?"
-        yield found("P207", message, fix, {"turn_deg": float(turn)}, photos=pair, strips=names)
+        yield found("P207", message, fix, {"turn_deg": turn}, photos=pair, strips=names)
+
+
+def _turns(one: Floats, other: Floats, up: Floats) -> Floats:
+    """Give the turns about a direction from each of some bases to another, degrees."""
+    return np.asarray(np.degrees(np.arctan2(np.cross(one, other) @ up, (one * other).sum(axis=-1))))

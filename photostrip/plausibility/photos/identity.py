@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.sparse import coo_array
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.notes import Finding
 from photostrip.plausibility.finding import found
 from photostrip.points import ControlPoints, PhotoPoints, located
-from photostrip.strip.relative_orientation.orientation import Orientation
+from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.strip.strip_formation.strip import FormedStrip
 
-MOST_X_OVER_Y = 5.0  # times the y parallax: how large an error of the x parallax may be
-LEAST_APART_SHARE = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it
 SAME_PLACE_SIGMAS = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
 SAME_HEIGHT_FACTOR = 3.0  # times that in height, times height over base
 MOST_BY_CHANCE = 0.002  # points that may lie at the same place by chance in the whole strip; else nothing is said
@@ -24,55 +23,6 @@ TINY = 1e-12
 MOST_COPIED = 100  # that are looked for, at most
 COPIED_SIGMAS = 20.0  # standard deviations of an image coordinate between two points that cannot be one
 SAME_IMAGE_SIGMAS = 3.5  # standard deviations of the mean difference of image coordinates on common photos
-
-
-def find_shared_ids(
-    orientation: Orientation,
-    formed: FormedStrip,
-    names: Sequence[str],
-    photos: Sequence[str],
-    sigma: float,
-    strip_id: str,
-) -> Iterator[Finding]:
-    """Find ids that stand for two points: two pairs without a common photo put it at two places.
-
-    What a pair says is believed within what its y parallax lets expect along the base.
-
-    names: ids of the points by number.
-    sigma: standard deviation of an image coordinate, mm.
-    """
-    rows = np.flatnonzero(np.isfinite(formed.model_xyz).all(axis=1))
-    pair = orientation.pairs.pair[rows]
-    order = np.lexsort((pair, orientation.point[rows]))
-    rows, pair = rows[order], pair[order]
-    point = orientation.point[rows]
-    apart = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] > pair[:-1] + 1))
-    distance = np.linalg.norm(formed.model_xyz[rows[apart + 1]] - formed.model_xyz[rows[apart]], axis=1)
-    depth = np.linalg.norm(formed.model_xyz[rows[apart]] - formed.centers[pair[apart]], axis=1)
-    done: set[int] = set()
-    parallax = np.maximum(np.abs(orientation.parallax[rows]), sigma)
-    base = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)[pair]
-    doubt = MOST_X_OVER_Y * parallax / orientation.pairs.focal  # of an x parallax, in units of the distance
-    believed = LEAST_APART_SHARE * (pair[apart + 1] - pair[apart]) * depth
-    believed += sum(doubt[each] * depth**2 / base[each] for each in (apart, apart + 1))
-    for k in np.flatnonzero(distance > believed).tolist():
-        number = int(point[apart[k]])
-        if number in done:
-            continue
-        done.add(number)
-        one, two = (tuple(photos[int(pair[apart[k] + more]) :][:2]) for more in (0, 1))
-        share = float(distance[k] / depth[k])
-        message = (
-            f"point {names[number]} stands for two points: photos {' and '.join(one)} put it {100 * share:.0f} % of "
-            f"the flying height away from where photos {' and '.join(two)} put it"
-        )
-        evidence = {
-            "distance_over_flying_height": share,
-            "parallax_mm": float(np.abs(orientation.parallax[rows[apart[k]]])),
-            "other_parallax_mm": float(np.abs(orientation.parallax[rows[apart[k] + 1]])),
-        }
-        fix = f"give one of the two another id on photos {' and '.join(two)}"
-        yield found("P301", message, fix, evidence, points=(names[number],), photos=(*one, *two), strips=(strip_id,))
 
 
 def find_double_ids(
@@ -114,13 +64,22 @@ def find_shared_ids_in_images(
 ) -> Iterator[Finding]:
     """Find ids that two groups of photos put at places far from each other along the strip.
 
+    Nothing is said where photos that can be oriented on each other put all that they share at places as far from each
+    other: they were not flown along a line.
+
     rows: (m,), image points of the strip.
     along: (m,), where the photo of each puts its point along the strip, bases.
     """
     order = np.lexsort((along, observations.point[rows]))
     rows, along = rows[order], along[order]
     point = observations.point[rows]
-    for k in np.flatnonzero((point[1:] == point[:-1]) & (np.diff(along) > FAR_BASES)).tolist():
+    far = np.flatnonzero((point[1:] == point[:-1]) & (np.diff(along) > FAR_BASES)).tolist()
+    if not far:
+        return
+    common, apart = _common_points(observations, rows, along)
+    if (apart[common >= MINIMUM_POINTS] > FAR_BASES).any():
+        return
+    for k in far:
         same = np.flatnonzero(point == point[k])
         groups = [rows[same[same <= k]], rows[same[same > k]]]
         if min(len(each) for each in groups) < LEAST_RAYS:
@@ -201,6 +160,14 @@ def find_copied_points(control: ControlPoints, observations: PhotoPoints) -> Ite
         names = (control.ids[a], control.ids[b])
         message = f"given points {' and '.join(names)} have the same coordinates, and {where}"
         yield found("P410", message, "was the row of one of them copied?", evidence, points=names)
+
+
+def _common_points(observations: PhotoPoints, rows: Numbers, along: Floats) -> tuple[Floats, Floats]:
+    """Count the points that each two photos have in common; how far apart both put them in the mean, bases."""
+    at, size = (observations.photo[rows], observations.point[rows]), len(observations.photo_ids)
+    one, place = (coo_array((each, at), (size, len(observations.point_ids))).tocsr() for each in (along**0, along))
+    count, both = (one @ one.T).toarray(), (place @ one.T).toarray()
+    return np.asarray(count, float), np.asarray(np.abs(both - both.T) / np.maximum(count, 1.0), float)
 
 
 def _depth(formed: FormedStrip) -> float:

@@ -71,16 +71,13 @@ def _of_few(ties: TiesOfStrips) -> OddTies:
     return OddTies(rows=np.flatnonzero(far > limit), unsure=np.zeros(0, np.intp), far=far, limit=limit)
 
 
-def find_shared_ids_of_strips(ties: TiesOfStrips, *, joined: bool = False) -> Iterator[Finding]:
-    """Find ids of two points by the ties of two strips, and ties of which that or a wrong image coordinate is true.
-
-    joined: the strips were adjusted together, which tests the image coordinates.
-    """
+def find_shared_ids_of_strips(ties: TiesOfStrips) -> Iterator[Finding]:
+    """Find ids of two points by the ties of two strips, and ties of which that or a wrong image coordinate is true."""
     odd = odd_ties(ties)
     if odd is None:
         return
     one, other = ties.strips
-    for row in odd.rows.tolist() if joined else [*odd.rows.tolist(), *odd.unsure.tolist()]:
+    for row in [*odd.rows.tolist(), *odd.unsure.tolist()]:
         far, name, sure = float(odd.far[row]), ties.names[row], row in odd.rows
         apart = (
             f"strip {other} puts it {far:.4g} m away from where strip {one} puts it{_others(np.delete(odd.far, row))}"

@@ -83,14 +83,21 @@ def two_that_meet(xy: Floats, sigma: Floats, photo: Numbers, photos: KnownPhotos
 
     xy, sigma: (m, r, 2), ideal image coordinates and their standard deviations, mm; photo: (m, r), r at least two.
     """
-    (m, r), two = photo.shape, np.column_stack(np.triu_indices(photo.shape[1], 1))
+    xyz = where_two_meet(xy, photo, photos)
+    (m, r), pairs = photo.shape, xyz.shape[1]
+    seen = project(np.repeat(xyz.reshape(-1, 3), r, axis=0), photos, np.repeat(photo, pairs, axis=0).ravel())
+    off = np.abs(xy[:, None] - seen.reshape(m, pairs, r, 2)) / sigma[:, None]
+    best = np.log1p(np.nan_to_num(off.max(axis=3), nan=np.inf)).sum(axis=2).argmin(axis=1)
+    return np.asarray(xyz[np.arange(m), best], float)
+
+
+def where_two_meet(xy: Floats, photo: Numbers, photos: KnownPhotos) -> Floats:
+    """Places (m, r (r - 1) / 2, 3) where each two of the r rays of m points meet; NaN: nowhere."""
+    two = np.column_stack(np.triu_indices(photo.shape[1], 1))
     direction = np.concatenate([xy, -photos.focal[photo][..., None]], axis=2)
     direction = np.einsum("mrij,mrj->mri", photos.rotations[photo], direction)
     xyz, _ = meeting(photos.centers[photo][:, two].reshape(-1, 2, 3), direction[:, two].reshape(-1, 2, 3))
-    seen = project(np.repeat(xyz, r, axis=0), photos, np.repeat(photo, len(two), axis=0).ravel())
-    off = np.abs(xy[:, None] - seen.reshape(m, len(two), r, 2)) / sigma[:, None]
-    best = np.log1p(np.nan_to_num(off.max(axis=3), nan=np.inf)).sum(axis=2).argmin(axis=1)
-    return np.asarray(xyz.reshape(m, len(two), 3)[np.arange(m), best], float)
+    return np.asarray(xyz.reshape(len(photo), len(two), 3), float)
 
 
 def _solved(normal: Floats, right: Floats) -> tuple[Floats, Flags]:

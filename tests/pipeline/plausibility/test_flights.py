@@ -1,0 +1,86 @@
+"""What is sound is called so however it was flown: corridors in the wind, oblique cameras, orbits, dense points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import photostrip
+from tests.flown import Flown, corridor, orbit, project, snake, turn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tests.flown import Project
+
+
+def told(made: Project) -> tuple[list[str], list[str]]:
+    """Codes that `check` and `run` tell."""
+    document, tables = made
+    checked = photostrip.check(document, tables=tables)
+    result = photostrip.run(document, tables=tables)
+    return [each.code for each in checked.findings], [each["code"] for each in result.document["findings"]]
+
+
+@pytest.mark.parametrize(
+    "fly",
+    [
+        corridor,
+        lambda rng: corridor(rng, height=100.0, wind=0.03),
+        lambda rng: corridor(rng, ahead=40.0),
+        orbit,
+    ],
+    ids=["corridor", "wind", "oblique", "orbit"],
+)
+def test_a_sound_flight_has_no_finding(fly: Callable[[np.random.Generator], Flown]) -> None:
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        made = project(rng, fly(rng))
+        assert told(made) == ([], [])
+        document, tables = made
+        result = photostrip.run(document, tables=tables)
+        assert result.document["verdict"]["look_at"] == []
+
+
+def test_photos_listed_as_one_strip_though_they_were_flown_in_three_share_no_ids() -> None:
+    rng = np.random.default_rng(0)
+    document, tables = project(rng, snake(rng), rays=200)
+    assert "P301" not in [each.code for each in photostrip.check(document, tables=tables).findings]
+
+
+def test_dense_points_with_heavy_tails_share_no_ids() -> None:
+    rng = np.random.default_rng(0)
+
+    def noise(shape: tuple[int, int]) -> np.ndarray[Any, np.dtype[np.float64]]:
+        wrong = rng.random(shape[0]) < 0.01
+        return rng.standard_t(4, shape) + 20.0 * rng.normal(size=shape) * wrong[:, None]
+
+    before, after = told(project(rng, corridor(rng, ahead=30.0), rays=400, noise=noise))
+    assert "P301" not in before + after
+
+
+@pytest.mark.parametrize("ahead", [0.0, 40.0])
+def test_an_id_of_two_points_is_named_however_the_cameras_look(ahead: float) -> None:
+    rng = np.random.default_rng(3)
+    document, tables = project(rng, corridor(rng, ahead=ahead))
+    point, photo = (np.array(tables["images.csv"][key]) for key in ("point", "photo"))
+    shown = {name: set(photo[point == name]) for name in np.unique(point).tolist() if name.startswith("P")}
+    one, other = (
+        next(name for name, on in shown.items() if len(on) > 2 and {photo[0] for photo in on} == {strip})
+        for strip in "13"
+    )
+    tables["images.csv"]["point"] = np.where(point == other, one, point).tolist()
+    found = photostrip.run(document, tables=tables).document["findings"]
+    assert [(each["code"], each["points"]) for each in found] == [("P301", [one])]
+
+
+def test_given_angles_that_are_scattered_are_no_other_unit() -> None:
+    """All angles are small: the smaller a unit makes what scatters, the better it fits."""
+    rng = np.random.default_rng(0)
+    flown = corridor(rng)
+    north = flown.centers[:, [1, 0, 2]] * (-1.0, 1.0, 1.0)
+    level = np.array([turn(rng, 1.5) for _ in north])
+    before, after = told(project(rng, Flown(north, level, flown.strips), rough=8.0))
+    assert before + after == []
