@@ -87,7 +87,15 @@ def pairs(document: Document) -> list[Pair]:
         others = (max(squares - own * found**2, 0.0) / left) ** 0.5 if left else 0.0
         among = f_p_value((found / others) ** 2, own, left) if others and own else 1.0
         alone = chi2_p_value((found / given) ** 2 * own, own)
-        pairs.append(Pair(place, found, others, min(1.0, among * tests), min(1.0, alone * tests)))
+        pairs.append(
+            Pair(
+                place=place,
+                found=found,
+                others=others,
+                among=min(1.0, among * tests),
+                beside_stated=min(1.0, alone * tests),
+            )
+        )
     return pairs
 
 

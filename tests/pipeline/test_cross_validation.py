@@ -17,7 +17,7 @@ from photostrip.pipeline.precision import check_points
 from photostrip.pipeline.strips import forming
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.report.sections.accuracy_report import sections_of
-from photostrip.result.verdict import GOOD, LOOK, UNVERIFIED
+from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Models
 from photostrip.strip.gross_errors.control import control_screening
@@ -121,7 +121,7 @@ def test_control_that_contradicts_what_is_predicted_is_not_good() -> None:
     control = replace(inputs.control, enu=inputs.control.enu + rng.normal(0, 1.0, inputs.control.enu.shape))
     settings = replace(TURNED, bundle=replace(TURNED.bundle, screening="none"))
     document = solved(replace(inputs, control=control), settings).document
-    assert document["status"] == LOOK
+    assert document["status"] == FAILED
     assert any(
         text.startswith("control points left out in turn are farther") for text in document["verdict"]["look_at"]
     )

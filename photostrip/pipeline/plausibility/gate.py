@@ -313,13 +313,17 @@ def _shared_ids(each: EvidenceStrip, observations: PhotoPoints) -> Iterator[Find
 
 def _rays_of(bundle: Bundle, observations: PhotoPoints) -> OrientedRays:
     """Rays of a bundle; those that it rejected did not go with the others."""
-    solution, problem = bundle.screened.solution, bundle.block.problem
+    from photostrip.network.self_calibration import image_shift  # a strip needs nothing of a bundle
+
+    solution = bundle.screened.solution
+    problem = replace(bundle.block.problem, cameras=bundle.screened.problem.cameras)  # with what was taken up
     focal = problem.cameras.focal[problem.cameras.of_photo]
+    xy, photo = observations.xy[bundle.block.rows], problem.images.photo
     return OrientedRays(
         photos=KnownPhotos(solution.centers, solution.rotations, focal),
-        photo=problem.images.photo,
+        photo=photo,
         point=problem.images.point,
-        xy=observations.xy[bundle.block.rows],
+        xy=xy + image_shift(problem, solution.common, xy, photo),
         sigma=problem.images.sigma * max(bundle.unit, 1.0),
         wrong=~bundle.screened.selection.images,
     )

@@ -45,7 +45,14 @@ class OrientedRays:
         position: (n,), photo of each image point in the strip; -1 for others.
         """
         rows = np.flatnonzero(position >= 0)
-        rays = cls(photos, position[rows], point[rows], xy[rows], sigma[rows], np.zeros(len(rows), bool))
+        rays = cls(
+            photos=photos,
+            photo=position[rows],
+            point=point[rows],
+            xy=xy[rows],
+            sigma=sigma[rows],
+            wrong=np.zeros(len(rows), bool),
+        )
         met = rays.meeting(~rays.wrong, int(point.max(initial=0)) + 1)
         off, several = rays.off(met.xyz), met.rays[rays.point] > 1
         fitting = off[np.isfinite(off)]
@@ -118,9 +125,13 @@ def _two_places(rays: OrientedRays, asked: Numbers) -> Iterator[tuple[Numbers, T
         count = len(rows) * pairs
         flat = np.repeat(rows, pairs, axis=0).ravel()
         tried = OrientedRays(
-            rays.photos, rays.photo[flat], np.repeat(np.arange(count), size), rays.xy[flat], rays.sigma[flat],
-            rays.wrong[flat],
-        )  # fmt: skip
+            photos=rays.photos,
+            photo=rays.photo[flat],
+            point=np.repeat(np.arange(count), size),
+            xy=rays.xy[flat],
+            sigma=rays.sigma[flat],
+            wrong=rays.wrong[flat],
+        )
         one = where_two_meet(rays.xy[rows], rays.photo[rows], rays.photos).reshape(-1, 3)
         one = tried.meeting(tried.off(one) <= rays.limit, count).xyz
         first = tried.off(one)
@@ -138,4 +149,5 @@ def _two_places(rays: OrientedRays, asked: Numbers) -> Iterator[tuple[Numbers, T
         for row, best in enumerate(chance.argmin(axis=1).tolist()):
             at = row * pairs + best
             if sound[at]:
-                yield rows[row], TwoPlaces(here[at], one[at], other[at], float(chance[row, best]))
+                places = TwoPlaces(here=here[at], one=one[at], other=other[at], chance=float(chance[row, best]))
+                yield rows[row], places
