@@ -45,6 +45,7 @@ ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group have one of their own
 REVERSED, FORWARDS, BACKWARDS = "reversed", "forwards", "backwards"  # rows of positions that belong to other photos
 ORDERS = REVERSED, FORWARDS, BACKWARDS
+AT_A_TIME = 2  # hypotheses whose columns are worked on together
 ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most in common
 LEAST_SHARE = 1e-6  # of a column that the other unknowns leave to it, for it to be asked about at all
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
@@ -172,18 +173,17 @@ def likeliest(
     problem, in_vain = solution.prepared.problem, {each.name for each in refused}
     lines = [line for line in HYPOTHESES if line not in OF_IMAGES or (cameras and not problem.of_models)]
     asked = [[each for each in line(solution) if each.name not in in_vain] for line in lines]
-    every = [each for line in asked for each in line]
-    if not every:
-        return []
-    number = len(every) + (len(OF_PHOTOS) * problem.photos if cameras else 0)
-    gains = [_gain(solution, *each) for each in zip(every, _explained(solution, every), strict=True)]
-    found = [
-        Likely.of(_with_shift(each, gain, solution), gain.squares / unit**2, len(gain.value), number)
-        for each, gain in zip(every, gains, strict=True)
-    ]
-    ends = np.cumsum([len(line) for line in asked])
-    by_line = (found[end - len(line) : end] for line, end in zip(asked, ends.tolist(), strict=True) if line)
-    return [most_likely(line, level) for line in by_line]
+    number = sum(len(line) for line in asked) + (len(OF_PHOTOS) * problem.photos if cameras else 0)
+    found = []
+    for line in asked:
+        gains = [_gain(solution, *each) for each in zip(line, _explained(solution, line), strict=True)]
+        likely = [
+            Likely.of(_with_shift(each, gain, solution), gain.squares / unit**2, len(gain.value), number)
+            for each, gain in zip(line, gains, strict=True)
+        ]
+        if likely:
+            found.append(most_likely(likely, level))
+    return found
 
 
 def most_likely(found: Sequence[Likely], level: float) -> Likely:
@@ -241,18 +241,21 @@ def _with_shift(hypothesis: Hypothesis, gain: _Gain, solution: BundleSolution) -
     return replace(hypothesis, shift=tuple(shift.tolist()), sigma=tuple(sigma.tolist()))
 
 
-def _explained(solution: BundleSolution, asked: Sequence[Hypothesis]) -> list[Explained]:
-    """Lay out the normal equations of each hypothesis alone, from one product with the columns of all."""
-    columns = [_columns(solution, each) for each in asked]
-    every = Columns(
-        rays=csr_array(hstack([each.rays for each in columns])),
-        control=np.concatenate([each.control for each in columns], axis=2),
-        positions=np.concatenate([each.positions for each in columns], axis=2),
-    )
-    ends = np.cumsum([each.control.shape[2] for each in columns])
-    found = solution.factored.explained(every)
-    own = [np.arange(end - each.control.shape[2], end) for each, end in zip(columns, ends, strict=True)]
-    return [Explained(found.pull[each], found.normal[np.ix_(each, each)], found.squares[each]) for each in own]
+def _explained(solution: BundleSolution, asked: Sequence[Hypothesis]) -> Iterator[Explained]:
+    """Lay out the normal equations of each hypothesis alone; some at a time, for the sake of memory."""
+    for start in range(0, len(asked), AT_A_TIME):
+        columns = [_columns(solution, each) for each in asked[start : start + AT_A_TIME]]
+        every = Columns(
+            rays=csr_array(hstack([each.rays for each in columns])),
+            control=np.concatenate([each.control for each in columns], axis=2),
+            positions=np.concatenate([each.positions for each in columns], axis=2),
+        )
+        found = solution.factored.explained(every)
+        end = 0
+        for each in columns:
+            own = np.arange(end, end + each.control.shape[2])
+            end += len(own)
+            yield Explained(pull=found.pull[own], normal=found.normal[np.ix_(own, own)], squares=found.squares[own])
 
 
 def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
