@@ -73,7 +73,7 @@ def intersect_points(
 
 
 def _summed(values: Floats, point: Numbers, count: int) -> Floats:
-    flat = values.reshape(len(values), -1)
+    flat = values.reshape(len(values), int(np.prod(values.shape[1:])))
     sums = np.column_stack([np.bincount(point, column, count) for column in flat.T])
     return np.asarray(sums.reshape(count, *values.shape[1:]), np.float64)
 

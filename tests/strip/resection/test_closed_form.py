@@ -192,3 +192,11 @@ def test_the_triangles_are_of_the_nine_points_farthest_out() -> None:
     sets = _triples(np.concatenate([within, ring]) + np.array([70.0, 60.0]))
     assert min(each.min() for each in sets) >= 9
     assert sets[0].tolist() in [[9, 12, 15], [10, 13, 16], [11, 14, 17]] or np.ptp(np.sort(sets[0])) == 6
+
+
+def test_points_without_any_ray_are_nowhere() -> None:
+    nothing = np.zeros(0, np.intp)
+    photos = KnownPhotos(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.ones(2))
+    found = intersect_points(np.zeros((0, 2)), np.zeros((0, 2)), (nothing, nothing), photos, 3)
+    assert np.isnan(found.xyz).all()
+    assert found.rays.tolist() == [0, 0, 0]
