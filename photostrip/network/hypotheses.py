@@ -21,7 +21,7 @@ from scipy.sparse import csr_array, hstack
 from scipy.special import fdtrc, gammaincc, gammaln
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE
+from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, values_of
 from photostrip.network.calibration import POINT as PRINCIPAL_POINT
 from photostrip.network.normal_equations import Columns, Explained
 from photostrip.network.problem import BundleProblem, PositionObservations
@@ -176,13 +176,13 @@ def likeliest(
     number = sum(len(line) for line in asked) + (len(OF_PHOTOS) * problem.photos if cameras else 0)
     found = []
     for line in asked:
-        gains = [_gain(solution, *each) for each in zip(line, _explained(solution, line), strict=True)]
+        gains = [_gain(each) for each in _explained(solution, line)]
         likely = [
             Likely.of(_with_shift(each, gain, solution), gain.squares / unit**2, len(gain.value), number)
             for each, gain in zip(line, gains, strict=True)
         ]
         if likely:
-            found.append(most_likely(likely, level))
+            found.append(most_likely(sorted(likely, key=lambda each: each.freedom), level))  # the plainest first
     return found
 
 
@@ -210,25 +210,14 @@ class _Gain(NamedTuple):
     sigma: Floats  # (k,): their standard deviations, for a sigma0 of 1
 
 
-def _gain(solution: BundleSolution, hypothesis: Hypothesis, explained: Explained) -> _Gain:
+def _gain(explained: Explained) -> _Gain:
     """Solve for the coefficients of one hypothesis."""
     pull, normal, size = explained
     if not len(pull) or (np.diag(normal) < LEAST_SHARE * size).any():
         return _Gain(0.0, np.zeros(len(pull)), np.full(len(pull), np.inf))
     inverse = np.linalg.pinv(normal, rcond=LEAST_SHARE, hermitian=True)
     value = inverse @ pull
-    squares = float(pull @ value)
-    problem = solution.prepared.problem
-    if hypothesis.kind == DISTANCE and problem.cameras.focal[hypothesis.number] + value[0] <= 0.0:
-        squares = 0.0  # heights that count downwards are no lens
-    if (
-        hypothesis.kind == SCALE
-        and problem.cameras.focal[problem.cameras.of_photo[hypothesis.number]] + value[0] <= 0.0
-    ):
-        squares = 0.0
-    if hypothesis.kind in {POINT, SHIFT} and np.abs(value).max() > np.abs(problem.images.xy).max():
-        squares = 0.0  # no photo lies beside all that it shows
-    return _Gain(squares, value, np.sqrt(np.diag(inverse)))
+    return _Gain(float(pull @ value), value, np.sqrt(np.diag(inverse)))
 
 
 def _with_shift(hypothesis: Hypothesis, gain: _Gain, solution: BundleSolution) -> Hypothesis:
@@ -356,6 +345,14 @@ def place(problem: BundleProblem, hypothesis: Hypothesis) -> tuple[int, list[int
     if hypothesis.kind in OF_PHOTOS:
         return int(problem.cameras.of_photo[hypothesis.number]), OF_PHOTOS[hypothesis.kind]
     return hypothesis.number, OF_CAMERAS[hypothesis.kind]
+
+
+def impossible(solution: BundleSolution) -> bool:
+    """Whether a camera came out that cannot be: heights that count downwards, a photo beside all that it shows."""
+    problem = solution.prepared.problem
+    values = values_of(problem.cameras, solution.common)
+    beside = np.abs(values[:, PRINCIPAL_POINT]).max(initial=0.0) > np.abs(problem.images.xy).max(initial=0.0)
+    return bool(beside or (problem.cameras.focal + values[:, PRINCIPAL_DISTANCE] <= 0.0).any())
 
 
 def given_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:

@@ -93,8 +93,8 @@ def _group(kind: str, error: Floats, sigma: Floats, cofactors: Floats) -> Group:
     return Group(kind=kind, error=np.where(given, error, np.nan), sigma=known, redundancy=redundancy)
 
 
-def explained_by_rays(error: Floats, cofactor: Floats, sigma: Floats) -> Floats:
-    """Say what the sum of squares falls by without each ray: v' Qvv^-1 v in the directions that others control, (n,).
+def explained_by(error: Floats, cofactor: Floats, sigma: Floats) -> Floats:
+    """Say what the sum of squares falls by without each row: v' Qvv^-1 v in the directions that others control, (n,).
 
     error, sigma: (n, c): residuals and standard deviations. cofactor: (n, c, c): of the residuals.
     """

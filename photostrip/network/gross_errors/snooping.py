@@ -23,9 +23,9 @@ from photostrip.network.datum import is_free
 from photostrip.network.gross_errors.point_decisions import cause_of_all
 from photostrip.network.gross_errors.ray_decisions import Adjusted, RayDecisions, decide_rays
 from photostrip.network.gross_errors.ray_log import ROBUST, START, RayLog, WrongRays
-from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OFFSET, Hypothesis, Likely
+from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OF_PHOTOS, OFFSET, Hypothesis, Likely
 from photostrip.network.problem import BundleProblem, PositionObservations
-from photostrip.network.reliability import CONTROL, IMAGE, Limit
+from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, Limit
 from photostrip.network.selection import Selection, restarted, selected, supported
 from photostrip.network.settings import BundleSettings
 from photostrip.network.solution import BundleSolution, Cofactors
@@ -86,8 +86,8 @@ def screen_bundle(
     ``begin`` takes part at first, the rest is put in at the end where it fits; the rays ``kept`` (n,) stay in whatever
     the tests say, and so does what photos, points or the datum would be open without.
 
-    A hypothesis that was taken up while given coordinates went is doubted: the search is made again without it, and
-    what explains everything by less counts.
+    A hypothesis that was taken up while given coordinates went is doubted, and so is one about a single photo, whose
+    outliers add up to it: the search is made again without it, and what explains everything by less counts.
 
     rough: only the rays matter: adjust as well as their tests need it; two that only go together have ``BOTH_GO``.
     """
@@ -95,9 +95,11 @@ def screen_bundle(
         return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)), settings)
     search = _Search(problem, begin, settings, kept, rough=rough)
     done = _searched(search, begin)
-    if not (search.common or search.refused) or all(each.kind == IMAGE or each.readmitted for each in done.rejections):
+    taken = [*search.common, *search.refused]
+    lost = any(each.kind != IMAGE and not each.readmitted for each in done.rejections)
+    if not (taken and lost) and not any(each.kind in OF_PHOTOS for each in taken):
         return done
-    other = _Search(problem, begin, settings, kept, rough=rough, refused=[*search.common, *search.refused])
+    other = _Search(problem, begin, settings, kept, rough=rough, refused=taken)
     try:
         without = _searched(other, begin)
     except GeometryError:
@@ -108,12 +110,13 @@ def screen_bundle(
 
 def _left_and_explained(done: ScreenedBundle, unit: float, level: float) -> float:
     """Sum of squares that is left, and what each cause that was found must have explained to be found."""
-    observations, common = done.problem, len(done.common)
+    observations = done.problem
+    photos = sum(each.kind in OF_PHOTOS for each in done.common)
     given = int(sum(np.isfinite(each.sigma).sum() for each in (observations.control, observations.positions)))
     rays_out = sum(each.kind == IMAGE and not each.readmitted for each in done.rejections)
     given_out = sum(each.kind != IMAGE and not each.readmitted for each in done.rejections)
-    asked = rays_out, given_out, common
-    numbers = len(done.selection.images), given + given_out, len(OF_CAMERAS)
+    asked = rays_out, given_out, photos, len(done.common) - photos
+    numbers = len(done.selection.images), given + given_out, len(OF_PHOTOS) * observations.photos, len(OF_CAMERAS)
     price = sum(count * 2.0 * np.log(number / level) for count, number in zip(asked, numbers, strict=True))
     return float(done.solution.chi_square / unit**2 + price)
 
@@ -288,6 +291,9 @@ class _Search:
             except GeometryError:  # what is left would not hold the photos
                 self.refused.append(each.hypothesis)
                 continue
+            if hypotheses.impossible(found.solution):
+                self.refused.append(each.hypothesis)
+                continue
             tried[each.hypothesis.name] = each.hypothesis, found, self.problem
         self.problem = before
         if not tried:
@@ -342,15 +348,29 @@ class _Search:
         if not len(worst):
             return 0.0
         if not isinstance(worst, WrongRays):
-            given = int(np.isfinite(done.problem.control.sigma).sum() + np.isfinite(done.problem.positions.sigma).sum())
-            return hypotheses.log_probability_of_any(worst[0].value ** 2, 1, given)
+            return self._log_p_of_given(done, worst[0])
         place = np.cumsum(done.selection.images) - 1
         rows = place[worst.row[done.selection.images[worst.row]]]
         error, cofactor = done.solution.image_residuals[rows], done.precision.image_residuals[rows]
-        squares = reliability.explained_by_rays(error, cofactor, done.problem.images.sigma[rows])
-        return hypotheses.log_probability_of_any(
-            float(squares.max(initial=0.0)) / done.limit.unit**2, error.shape[1], len(done.problem.images)
-        )
+        squares = reliability.explained_by(error, cofactor, done.problem.images.sigma[rows]).max(initial=0.0)
+        rays = len(done.problem.images)
+        return hypotheses.log_probability_of_any(float(squares) / done.limit.unit**2, error.shape[1], rays)
+
+    def _log_p_of_given(self, done: ScreenedBundle, worst: Rejection) -> float:
+        """Rank a given coordinate, by itself or with all that is given of its point or photo."""
+        problem, solution, precision = done.problem, done.solution, done.precision
+        error, cofactor, sigma = {
+            CONTROL: (solution.control_residuals, precision.control_residuals, problem.control.sigma),
+            POSITION: (solution.position_residuals, precision.position_residuals, problem.positions.sigma),
+            ATTITUDE: (solution.attitude_residuals, precision.attitude_residuals, problem.attitudes.sigma),
+        }[worst.kind]
+        row = worst.row
+        used = np.flatnonzero(np.isfinite(sigma[row]))
+        parts = error[row, used], cofactor[row][np.ix_(used, used)], sigma[row, used]
+        whole = reliability.explained_by(*(each[None] for each in parts)) / done.limit.unit**2
+        rows = len(problem.control) + len(problem.positions) + len(problem.attitudes)
+        alone = hypotheses.log_probability_of_any(worst.value**2, 1, 3 * rows)
+        return min(alone, hypotheses.log_probability_of_any(float(whole[0]), len(used), rows))
 
     def _without_rays(self, done: ScreenedBundle, worst: WrongRays) -> ScreenedBundle:
         """Take rays out; points without which nothing would hold some photos stay, whatever the tests say."""

@@ -28,7 +28,7 @@ from photostrip.network.hypotheses import (
 )
 from photostrip.network.reliability import CONTROL
 from photostrip.network.self_calibration import Parameter
-from photostrip.notes import Finding
+from photostrip.notes import Finding, listed
 from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
 from photostrip.pipeline.plausibility.shared_control import shifted_list
@@ -52,7 +52,11 @@ def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
     yield from (_lens(each, bundle, inputs) for each in shared if each.kind == LENS)
     yield from (_point(each, bundle, inputs) for each in shared if each.kind == POINT)
     yield from (_film(each, bundle, inputs) for each in shared if each.kind == FILM)
-    yield from (_photo(each, bundle, inputs) for each in shared if each.kind in OF_PHOTOS)
+    of_photos = [each for each in shared if each.kind in OF_PHOTOS]
+    if len(of_photos) == 1:
+        yield _photo(of_photos[0], bundle, inputs)
+    elif of_photos:
+        yield _photos(of_photos, bundle, inputs)
     yield from (_order(each, bundle) for each in shared if each.kind == ORDER)
     of_positions = [each for each in shared if each.kind in {OFFSET, DRIFT}]
     if of_positions:
@@ -189,6 +193,21 @@ def _photo(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
     )
     strips = [strip.id for strip in inputs.strips if name in strip.photos]
     return found("P109", message, fix, numbers, photos=(name,), strips=strips)
+
+
+def _photos(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Finding:
+    """Name the cameras of photos that go with the others only by shifts of their own: no single photo is to blame."""
+    names = tuple(dict.fromkeys(bundle.screened.problem.photo_name(each.number) for each in errors))
+    strips = [strip for strip in inputs.strips if not set(names).isdisjoint(strip.photos)]
+    cameras = list(dict.fromkeys(strip.camera.name for strip in strips))
+    message = (
+        f"{len(names)} photos of camera {listed(cameras)} go with the others only where their image coordinates are "
+        f"shifted or enlarged, each by itself ({listed(names)}): what is given of the camera, or of these photos, is "
+        "wrong"
+    )
+    fix = "look at principal distance and principal point of the camera, and at the fiducial marks of these photos"
+    of_strips = [strip.id for strip in strips]
+    return found("P111", message, fix, {"photos": len(names)}, strips=of_strips, key=f"cameras.{cameras[0]}")
 
 
 def _strips_of(camera: str, inputs: Inputs) -> list[str]:
