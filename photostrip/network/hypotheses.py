@@ -6,8 +6,9 @@ one by one they go. Each hypothesis is a few columns H of the design: with the m
 M = I - A Q A', the sum of squares would fall by w'H (H'M H)^-1 H'w with it. That fall has a probability, with
 the number of hypotheses counted, and is compared with those of single observations on one rank.
 
-A line of ``HYPOTHESES`` is all that a hypothesis needs here: who may be wrong, and its columns; ``taken_up`` says what
-the adjustment then does. Source: derived, see docs/sources.md.
+A line of ``HYPOTHESES`` says who may be wrong, ``_columns`` how it would show, ``taken_up`` what the adjustment then
+does. The order of positions is no column: its errors are as large as the network, and it is asked about without them.
+Source: derived, see docs/sources.md.
 """
 
 from __future__ import annotations
@@ -167,7 +168,7 @@ def likeliest(
 
     unit: standard deviation of unit weight in force.
     level: as of ``most_likely``.
-    cameras: whether cameras may be asked about.
+    cameras: whether cameras, and photos for themselves, may be asked about.
     refused: what has been taken up in vain.
     """
     problem, in_vain = solution.prepared.problem, {each.name for each in refused}
