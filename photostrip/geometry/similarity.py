@@ -56,6 +56,22 @@ class Similarity:
         return cls(scale, rotation, center_b - scale * rotation @ center_a)
 
 
+def similar(source: Floats, target: Floats, points: Floats) -> Floats:
+    """Move points (n, 3) by each of t least-squares similarities of k corresponding points (t, k, 3); (t, n, 3).
+
+    Source: as ``Similarity.from_points``.
+    """
+    center_a, center_b = source.mean(axis=1, keepdims=True), target.mean(axis=1, keepdims=True)
+    da, db = source - center_a, target - center_b
+    u, values, vt = np.linalg.svd(db.transpose(0, 2, 1) @ da)
+    sign = np.ones((len(source), 3))
+    sign[:, 2] = np.sign(np.linalg.det(u @ vt))
+    rotation = (u * sign[:, None]) @ vt
+    size = np.maximum((da**2).sum(axis=(1, 2)), np.finfo(float).tiny)
+    scale = (values * sign).sum(axis=1) / size
+    return center_b + scale[:, None, None] * (points - center_a) @ rotation.transpose(0, 2, 1)
+
+
 class PairScales(NamedTuple):
     """Scales between two systems from the distances of all pairs of points."""
 

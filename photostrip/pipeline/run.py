@@ -52,6 +52,7 @@ def triangulate(
         require_whole(inputs, ground.control)
         # 1 interior orientation
         photo = orient_interior(inputs, settings)
+        gate.require_images(inputs, settings, photo)
         result = _walk_of_any_order(inputs, settings, ground, photo)
     except (InputError, GeometryError) as error:
         error.findings = gate.of_failure(inputs, settings, directory, photo, ground)

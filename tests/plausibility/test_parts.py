@@ -13,9 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from photostrip.plausibility.control import layout
 from photostrip.plausibility.control.digits import slip
-from photostrip.plausibility.control.plan_fit import fit_robustly, fit_similarity, upright
-from photostrip.plausibility.control.straightening import Rays
 from photostrip.plausibility.photos import flight, flight_order, rotations
+from photostrip.plausibility.photos.robust_fit import fit_robustly
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec, Terrain
 from tests.simulated import inputs_of
@@ -191,22 +190,6 @@ def test_angles_in_another_system() -> None:
 # --------------------------------------------------------------------------------------------------------- fits
 
 
-@given(st.integers(0, 10_000), st.booleans())
-@settings(max_examples=30, deadline=None)
-def test_a_strip_is_laid_on_control_of_which_a_third_is_wrong(seed: int, mirrored: bool) -> None:
-    rng = np.random.default_rng(seed)
-    w = rng.uniform(0, 10, 12) + 1j * rng.uniform(-1, 1, 12)
-    turn = 50.0 * np.exp(1j * rng.uniform(-3, 3))
-    plan = turn * (np.conj(w) if mirrored else w) + (3e5 + 5e6j)
-    plan[:4] += rng.uniform(100, 1e5, 4) * np.exp(1j * rng.uniform(-3, 3, 4))
-    right, wrong = fit_similarity(w, plan, mirrored=mirrored), fit_similarity(w, plan, mirrored=not mirrored)
-    assert right is not None
-    assert wrong is not None
-    assert right.median < 1e-6
-    assert wrong.median > 1.0
-    assert right.turn == pytest.approx(turn, rel=1e-9)
-
-
 @given(st.integers(0, 10_000))
 @settings(max_examples=30, deadline=None)
 def test_a_fit_is_not_disturbed_by_wrong_values(seed: int) -> None:
@@ -217,32 +200,6 @@ def test_a_fit_is_not_disturbed_by_wrong_values(seed: int) -> None:
     fit = fit_robustly(columns, values, np.ones(15, bool), 0.01)
     assert np.flatnonzero(fit.odd).tolist() == [2, 7, 11]
     assert fit.coefficient == pytest.approx([3.0, -2.0, 1.0], abs=0.06)
-
-
-def test_image_residuals_and_how_a_step_moves_them() -> None:
-    rng = np.random.default_rng(8)
-    rotations = Rotation.from_euler("xyz", rng.normal(0, 0.1, (4, 3))).as_matrix()
-    centers, place = np.column_stack([np.arange(4.0), rng.normal(0, 0.1, (4, 2))]), np.array([1.3, 0.4, -2.0])
-    axes = (rotations.transpose(0, 2, 1) @ (place - centers)[:, :, None])[:, :, 0]
-    xy = -153.0 * axes[:, :2] / axes[:, 2:]  # the camera looks along -z
-    rays = Rays(xy, np.full(4, 0.005), centers, rotations, 153.0)
-    residual, jacobian = rays.residuals(place)
-    assert np.abs(residual).max() < 1e-10
-    assert rays.shown(place)
-    assert not rays.shown(np.array([1.3, 0.4, 5.0]))  # above the cameras
-    for axis in range(3):
-        step = 1e-6 * np.eye(3)[axis]
-        numeric = (rays.residuals(place + step)[0] - rays.residuals(place - step)[0]) / 2e-6
-        assert jacobian[:, :, axis] == pytest.approx(numeric, abs=1e-5)
-
-
-def test_a_strip_is_set_upright() -> None:
-    axes = Rotation.from_euler("XYZ", [[30, 20, 10], [31, 19, 200]], degrees=True).as_matrix()[:, :, 2]
-    turn = upright(axes)
-    assert turn @ turn.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.linalg.det(turn) == pytest.approx(1.0)
-    mean = axes.mean(axis=0)
-    assert turn @ mean / np.linalg.norm(mean) == pytest.approx([0, 0, 1], abs=1e-12)
 
 
 def test_the_spread_of_a_fit_is_that_of_another_measurement() -> None:

@@ -6,7 +6,7 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,22 +14,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.errors import GeometryError, InputError
+from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
-from photostrip.pipeline.inputs import Inputs, MeasuredModels, ModelStrip, Settings, Strip
+from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings
 from photostrip.pipeline.plausibility import (
     control_layout,
     evidence,
     given_cameras,
     given_control,
 )
-from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+from photostrip.pipeline.plausibility.control_readings import find_distance
 from photostrip.pipeline.plausibility.given_control import GivenControl
-from photostrip.pipeline.plausibility.image_evidence import ImageEvidence, of_images
+from photostrip.pipeline.plausibility.image_evidence import of_images, of_units
+from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import accepted
 from photostrip.plausibility.photos import flight, flight_order, identity, rotations, shared_ids, units
 from photostrip.plausibility.photos.shared_ids import OrientedRays
@@ -37,89 +38,32 @@ from photostrip.points import PhotoPoints, locate
 from photostrip.strip.resection.collinearity import KnownPhotos
 
 if TYPE_CHECKING:
+    from photostrip.pipeline.plausibility.predicted import Predicted
     from photostrip.pipeline.results import Bundle, Result, StripResult
-    from photostrip.strip.independent_models.formation import FormedModels
+    from photostrip.pipeline.strips.models import LinkedModels
 
-STRETCH_MODELS = 10  # photos of a stretch of models: what plotters measure bends more than what images give
 OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
-OF_SLIPS = "P406"  # findings on single digits of given coordinates
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
 OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
-OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
+ALIKE = "P410"  # coordinates that are those of others
+OUT_OF_ORDER = "P201"  # of a strip put in order by the layout of its photos alone bases prove nothing
+OF_CAMERAS = ("P105", "P107", "P110", "P111", "P112")  # findings on cameras: control that is misread looks like it
 
 
 def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None) -> tuple[Finding, ...]:
-    """Find what the data say against themselves before anything is adjusted."""
-    if inputs.models is not None:
-        return _of_unadjusted_models(inputs, inputs.models, settings, directory)
-    images = of_images(inputs, settings)
-    findings = [*images.findings, *_of_ids(images.strips, images)]
-    findings += given_cameras.centers(inputs, images.observations, images.strips, directory)
-    unformed = [None] * len(images.strips)
-    control = _given_control(inputs, directory)
-    findings += _of_control(control, images, images.strips, unformed, tried={})
-    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
-    return _told(findings, inputs, settings)
+    """Find what the data say against themselves before anything is adjusted: strips are formed, and laid on control."""
+    return _of_data(inputs, settings, directory, None, _given_control(inputs, directory), starts=False)
 
 
-def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
-    """Find what the data say against themselves, the adjustment being done."""
-    from photostrip.pipeline.plausibility import shared_control, slips  # a check has no adjusted strips
-    from photostrip.plausibility.control.shared_by_control import StretchedHeights
+def require_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates) -> None:
+    """Refuse images of which no camera can be the source: an adjustment would blame what is given for them.
 
-    inputs, settings = result.inputs, result.settings
-    if inputs.models is not None:
-        return _of_adjusted_models(result, inputs.models, directory)
-    points = result.refined.observations
-    photo = PhotoCoordinates(result.measured, result.interior)
-    images = replace(of_images(inputs, settings, photo), observations=points)
-    control = _given_control(inputs, directory, _plain_frames(settings, result.frames))
-    stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
-    formed = [
-        evidence.EvidenceStrip(each.strip, each.orientation, each.formed) for each in (s.of_photos for s in stages)
-    ]
-    predicted = slips.Predicted(result)
-    doubtful = [each for each in formed if slips.is_doubtful(each, result, predicted)]
-    strips = tuple(each.strip for each in doubtful)  # a photo that is a strip of its own forms nothing
-    doubts = [note for note in result.notes if note.code in slips.OF_DOUBTED_CONTROL]
-    doubted = {note.strip for note in doubts}
-    stretched = {
-        each.strip.id: isinstance(each.shared, StretchedHeights) or each.strip.id in doubted for each in stages
-    }
-    tried = {} if result.bundle is not None else stretched  # a bundle tries another distance itself
-    of_control = _of_control(control, images, strips, doubtful, tried)
-    findings = [*images.findings, *(of_control if control is None else slips.confirmed(of_control, predicted, control))]
-    if control is not None and not any(each.is_error for each in findings):
-        named = {name for each in findings for name in each.points}
-        findings += [each for each in slips.of_rejected(result, predicted, control) if named.isdisjoint(each.points)]
-    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
-    for each, strip in zip(formed, result.photo_strips, strict=True):
-        findings += _of_formed(each, points)
-        findings += _of_flight(each) if result.bundle is None else _of_adjusted_flight(strip)
-    findings += _of_shared_ids(result, stages, formed)
-    in_metres = not any(each.is_error for each in findings)
-    if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
-        checks = inputs.control.check
-        findings += units.find_wrong_sigmas_of_given(predicted.off[checks], inputs.control.sigma[checks])
-    given = given_cameras.centers(inputs, points, images.strips, directory)
-    findings += [each for each in given if result.bundle is None or _contradicted(each, result.bundle)]
-    findings += _of_rotations(result, formed, directory)
-    if result.bundle is not None:
-        from photostrip.pipeline.plausibility import shared_errors  # a strip needs nothing of a bundle
-
-        of_groups = list(shared_errors.of_bundle(result.bundle, inputs))
-        if any(each.code in OF_LISTS for each in of_groups):  # all of the block says it best
-            findings = [each for each in findings if each.code not in OF_LISTS]
-        if not any(each.is_error for each in findings):  # of control that is misread a camera explains much
-            explained = {each.key for each in of_groups if each.key}
-            findings = [each for each in findings if each.key not in explained] + of_groups
-    examined = [each for each in stages if each.strip in strips]
-    findings += shared_control.find_shared_errors(examined, findings, joined=result.bundle is not None)
-    if not any(each.is_error for each in findings) and not slips.strips_with_kept_exchanges(
-        findings, predicted, inputs.control.ids
-    ):
-        findings += shared_control.find_shifted_checks(result)
-    return _told(findings, inputs, settings)
+    Raises InputError with the first finding of image coordinates in another unit, or of a lens that nobody makes.
+    """
+    for each in of_units(inputs, settings, photo) if inputs.models is None else ():
+        if each.is_error and not each.accepted:
+            message = f"{each.message}; nothing is adjusted, unless `accept: [{each.code}]` says that it is right"
+            raise InputError(Fault(message, code="images-refused", key=each.key, expected=each.fix))
 
 
 def of_failure(
@@ -135,28 +79,100 @@ def of_failure(
     Returns nothing when the evidence cannot be put together either.
     """
     try:
-        if inputs.models is not None:
-            return _of_unadjusted_models(inputs, inputs.models, settings, directory)
-        images = of_images(inputs, settings, photo)
-        points = evidence.ideal(images.observations, images.cameras, settings)
-        formed = [evidence.form(strip, points, settings) for strip in images.strips]
         frames = () if ground is None else _plain_frames(settings, ground.control)
-        control = _given_control(inputs, directory, frames)
-        tried = dict.fromkeys([strip.id for strip in images.strips], True)
-        findings = [*images.findings, *_of_control(control, images, images.strips, formed, tried)]
-        findings += control_layout.weak_layout(inputs, settings, images, control, directory)
-        whole = [each for each in formed if each is not None]
-        for each in whole:
-            findings += [*_of_formed(each, points), *_of_flight(each), *_shared_ids(each, points)]
-        findings += given_cameras.centers(inputs, images.observations, images.strips, directory, starts=True)
-        findings += given_cameras.angles(inputs, whole, points, directory)
-        broken = [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]
-        findings += _of_ids(broken, images)
-        for strip in broken:
-            findings += flight_order.find_other_scale(images.observations, strip.id, strip.photos)
-        return _told(findings, inputs, settings)
+        return _of_data(inputs, settings, directory, photo, _given_control(inputs, directory, frames), starts=True)
     except (GeometryError, InputError, np.linalg.LinAlgError):
         return ()  # the failure itself is what must be reported
+
+
+def _of_data(
+    inputs: Inputs,
+    settings: Settings,
+    directory: Path | None,
+    photo: PhotoCoordinates | None,
+    control: GivenControl | None,
+    *,
+    starts: bool,
+) -> tuple[Finding, ...]:
+    """Look at all that is given, each strip formed by itself.
+
+    starts: whether given orientations that are only a start count as well: they matter where a run fails.
+    """
+    if inputs.models is not None:
+        return _of_unadjusted_models(inputs.models, settings, control)
+    images = of_images(inputs, settings, photo)
+    points = evidence.ideal(images.observations, images.cameras, settings)
+    formed = [evidence.form(strip, points, settings) for strip in images.strips]
+    whole = [each for each in formed if each is not None]
+    findings = [*images.findings, *_of_control(control, points, whole, settings, slips=True)]
+    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
+    moved = {name for each in images.findings if each.code == OUT_OF_ORDER for name in each.strips}
+    for each in whole:
+        findings += [*_of_formed(each, points), *_shared_ids(each, points)]
+        findings += () if each.strip.id in moved else _of_flight(each)
+    findings += given_cameras.centers(inputs, images.observations, images.strips, directory, starts=starts)
+    findings += given_cameras.angles(inputs, whole, points, directory)
+    broken = [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]
+    for strip in broken:
+        findings += flight_order.find_other_scale(images.observations, strip.id, strip.photos)
+        if control is not None and not images.findings:
+            findings += find_distance(strip, points, control.points, control.read_in, settings)
+    return _told(findings, inputs, settings)
+
+
+def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
+    """Find what the data say against themselves, the adjustment being done."""
+    from photostrip.pipeline.plausibility import predicted as by_result
+    from photostrip.pipeline.plausibility import shared_control  # a check has no adjusted strips
+
+    inputs, settings = result.inputs, result.settings
+    control = _given_control(inputs, directory, _plain_frames(settings, result.frames))
+    predicted = by_result.Predicted(result)
+    if inputs.models is not None:
+        return _of_adjusted_models(result, inputs.models, control, predicted)
+    points = result.refined.observations
+    photo = PhotoCoordinates(result.measured, result.interior)
+    images = replace(of_images(inputs, settings, photo), observations=points)
+    stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
+    formed = [evidence.as_formed(each.of_photos, points) for each in stages]
+    causes = [] if result.bundle is None else _causes(result.bundle, inputs)
+    misread = any(each.code in OF_CAMERAS for each in causes)  # perhaps
+    doubtful = [each for each in formed if misread or by_result.is_doubtful(each, result, predicted)]
+    findings = [*images.findings]
+    findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None)
+    if control is not None and not any(each.is_error for each in findings):
+        named = {name for each in findings for name in each.points}
+        findings += [each for each in by_result.of_result(result, predicted, control) if named.isdisjoint(each.points)]
+    findings += control_layout.weak_layout(inputs, settings, images, control, directory)
+    for each, strip in zip(formed, result.photo_strips, strict=True):
+        findings += _of_formed(each, points)
+        findings += _of_flight(each) if result.bundle is None else _of_adjusted_flight(strip)
+    findings += _of_shared_ids(result, stages, formed)
+    in_metres = not any(each.is_error for each in findings)
+    if in_metres and any(units.is_measured(each.orientation.sigma0) for each in formed):
+        checks = inputs.control.check
+        findings += units.find_wrong_sigmas_of_given(predicted.off[checks], inputs.control.sigma[checks])
+    given = given_cameras.centers(inputs, points, images.strips, directory)
+    findings += [each for each in given if result.bundle is None or _contradicted(each, result.bundle)]
+    findings += _of_rotations(result, formed, directory)
+    if any(each.code in OF_LISTS for each in causes):  # all of the block says it best
+        findings = [each for each in findings if each.code not in OF_LISTS]
+    if not any(each.is_error or each.code == ALIKE for each in findings):  # a camera explains much of misread control
+        explained = {each.key for each in causes if each.key}
+        findings = [each for each in findings if each.key not in explained] + causes
+    shown = {each.strip.id for each in doubtful}
+    findings += shared_control.find_shared_errors(
+        [each for each in stages if each.strip.id in shown], findings, joined=result.bundle is not None
+    )
+    if not any(each.is_error for each in findings):
+        findings += shared_control.find_shifted_checks(result)
+    return _told(findings, inputs, settings)
+
+
+def _causes(bundle: Bundle, inputs: Inputs) -> list[Finding]:
+    from photostrip.pipeline.plausibility import shared_errors  # a strip needs nothing of a bundle
+
+    return list(shared_errors.of_bundle(bundle, inputs))
 
 
 def _told(findings: Iterable[Finding], inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
@@ -185,84 +201,70 @@ def _plain_frames(settings: Settings, frames: Sequence[GroundFrame]) -> Sequence
 
 def _of_control(
     control: GivenControl | None,
-    images: ImageEvidence,
-    strips: Sequence[Strip],
-    formed: Sequence[EvidenceStrip | None],
-    tried: Mapping[str, bool],
+    observations: PhotoPoints,
+    formed: Sequence[FormedPhotos],
+    settings: Settings,
+    *,
+    slips: bool,
 ) -> list[Finding]:
-    """Look at given coordinates: where they lie, how they go with each strip.
-
-    tried: ids of the strips that may be formed anew with other principal distances, and whether all their control
-        shows stretched heights.
-    """
+    """Look at given coordinates: where they lie, how they go with each strip, and with it by single points."""
     if control is None:
         return []
-    copied = list(identity.find_copied_points(control.points, images.observations))
-    named = {name for each in copied for name in each.names}
-    of_strips = given_control.by_strip(control, images, strips, formed, tried)
-    # a point with the coordinates of another looks like a slip of the pen
-    of_strips = [each for each in of_strips if each.code != OF_SLIPS or named.isdisjoint(each.points)]
-    return [*control.findings, *copied, *of_strips]
+    copied = list(identity.find_copied_points(control.points, observations))
+    of_strips = [given_control.of_strip(control, each, settings) for each in formed]
+    findings = [*control.findings, *copied, *(finding for each in of_strips for finding in each.whole)]
+    named = {name for each in copied for name in each.names}  # with the coordinates of another it looks like a slip
+    single = (finding for each in of_strips for finding in each.slips) if slips else ()
+    return [*findings, *(each for each in single if named.isdisjoint(each.points))]
 
 
 def _of_unadjusted_models(
-    inputs: Inputs, models: MeasuredModels, settings: Settings, directory: Path | None
+    models: MeasuredModels, settings: Settings, control: GivenControl | None
 ) -> tuple[Finding, ...]:
     """Look at strips of models of which there is no result."""
-    control = _given_control(inputs, directory)
     if control is None:
         return ()
     from photostrip.pipeline.plausibility import model_evidence  # strips of photos need none of it
 
-    return accepted(_of_models(model_evidence.form_strips(models, settings), models, control), settings.accept)
+    formed = list(model_evidence.form_strips(models, settings))
+    return accepted(_of_models(formed, models, control, settings, slips=True), settings.accept)
 
 
-def _of_adjusted_models(result: Result, models: MeasuredModels, directory: Path | None) -> tuple[Finding, ...]:
+def _of_adjusted_models(
+    result: Result, models: MeasuredModels, control: GivenControl | None, predicted: Predicted
+) -> tuple[Finding, ...]:
     """Look at strips of models as they were adjusted."""
-    from photostrip.pipeline.plausibility import shared_control, slips  # a check has no adjusted strips
+    from photostrip.pipeline.plausibility import model_evidence, shared_control
+    from photostrip.pipeline.plausibility import predicted as by_result
 
-    control = _given_control(result.inputs, directory)
     if control is None:
         return ()
-    strips = [(each.of_models.strip, each.of_models.formed) for each in result.strips]
-    findings = _of_models(strips, models, control)
-    if result.precision is not None:
-        findings = [each for each in findings if each.code != OF_SLIPS]
-        findings += slips.of_models(result, models, slips.Predicted(result), control)
-        if not any(each.is_error for each in findings):
-            findings += shared_control.find_shifted_checks(result)
-    return accepted(findings, result.settings.accept)
+    settings = result.settings
+    formed = list(model_evidence.form_strips(models, settings))
+    findings = _of_models(formed, models, control, settings, slips=result.precision is None)
+    if not any(each.is_error for each in findings):
+        findings += by_result.of_result(result, predicted, control)
+        findings += shared_control.find_shifted_checks(result)
+    return accepted(findings, settings.accept)
 
 
 def _of_models(
-    strips: Iterable[tuple[ModelStrip, FormedModels]], models: MeasuredModels, control: GivenControl
+    formed: Sequence[LinkedModels], models: MeasuredModels, control: GivenControl, settings: Settings, *, slips: bool
 ) -> list[Finding]:
     """Look at strips of models: given points by themselves and in each strip, perspective centres."""
     from photostrip.pipeline.plausibility import model_evidence
 
     findings = [*control.findings]
-    for held in model_evidence.model_strips(strips, models.points.point_ids, control.points):
-        for part in evidence.stretches(
-            held.rows, held.on_strip, longest=STRETCH_MODELS, photos=STRETCH_MODELS, most=len(held.photos)
-        ):
-            findings += control.compared(*part).findings
+    for each in formed:
+        of_strip = given_control.of_strip(control, each, settings)
+        findings += [*of_strip.whole, *(of_strip.slips if slips else ())]
+    for held in model_evidence.model_strips(formed, models.points.point_ids, control.points):
         findings += flight.find_odd_centers(held.centers, held.depth, model_evidence.UP, held.photos, held.strip.id)
         findings += control_layout.weak_layout_of_models(held, control)
-    return [finding for finding in findings if finding.code not in OF_CAMERAS]
-
-
-def _of_ids(strips: Sequence[Strip], images: ImageEvidence) -> list[Finding]:
-    """Look at ids of points by the images alone."""
-    findings: list[Finding] = []
-    observations = images.observations
-    for strip in strips:
-        rows, along = evidence.places_in_photos(strip, observations, images.steps)
-        findings += identity.find_shared_ids_in_images(observations, rows, along, strip.photos, strip.id)
-        findings += identity.find_double_ids_in_images(observations, rows, strip.id)
     return findings
 
 
-def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
+def _of_formed(each: FormedPhotos, observations: PhotoPoints) -> list[Finding]:
     """Look at a formed strip: its perspective centres, and the ids of its points."""
     strip, formed = each.strip, each.formed
     sigma = np.median(observations.sigma)
@@ -272,9 +274,10 @@ def _of_formed(each: EvidenceStrip, observations: PhotoPoints) -> list[Finding]:
     return findings
 
 
-def _of_flight(each: EvidenceStrip) -> Iterator[Finding]:
+def _of_flight(each: FormedPhotos) -> Iterator[Finding]:
     """Look at the perspective centres of a formed strip."""
-    return flight.find_odd_centers(each.formed.centers, each.depth, each.up, each.strip.photos, each.strip.id)
+    centers, depth = each.formed.centers, evidence.depth(each)
+    return flight.find_odd_centers(centers, depth, evidence.up(each), each.strip.photos, each.strip.id)
 
 
 def _of_adjusted_flight(strip: StripResult) -> Iterator[Finding]:
@@ -284,7 +287,7 @@ def _of_adjusted_flight(strip: StripResult) -> Iterator[Finding]:
     return flight.find_odd_centers(centers, depth, np.array([0.0, 0.0, 1.0]), strip.strip.photos, strip.strip.id)
 
 
-def _of_shared_ids(result: Result, stages: Iterable[StripResult], formed: Iterable[EvidenceStrip]) -> Iterator[Finding]:
+def _of_shared_ids(result: Result, stages: Iterable[StripResult], formed: Iterable[FormedPhotos]) -> Iterator[Finding]:
     """Look for ids that stand for two points: in a bundle, or in each strip and between strips.
 
     stages: the strips as they were formed; formed: those of photos.
@@ -303,7 +306,7 @@ def _of_shared_ids(result: Result, stages: Iterable[StripResult], formed: Iterab
         yield from tied_strips.find_shared_ids_of_strips(ties)
 
 
-def _shared_ids(each: EvidenceStrip, observations: PhotoPoints) -> Iterator[Finding]:
+def _shared_ids(each: FormedPhotos, observations: PhotoPoints) -> Iterator[Finding]:
     """Look for ids that stand for two points of a formed strip."""
     strip, formed, o = each.strip, each.formed, observations
     photos = strip.oriented(formed.centers, formed.rotations)
@@ -342,7 +345,7 @@ def _contradicted(finding: Finding, bundle: Bundle) -> bool:
     return not named.isdisjoint(finding.photos) or any(each.kind in (OFFSET, DRIFT, ORDER) for each in screened.common)
 
 
-def _of_rotations(result: Result, formed: Sequence[EvidenceStrip], directory: Path | None) -> list[Finding]:
+def _of_rotations(result: Result, formed: Sequence[FormedPhotos], directory: Path | None) -> list[Finding]:
     """Compare given angles with the rotations found; not with those of a bundle that they took part in."""
     given = result.inputs.orientations
     if given is None:

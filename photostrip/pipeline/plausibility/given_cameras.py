@@ -18,7 +18,7 @@ from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import Finding
 from photostrip.pipeline.given_points import cartesian_of, rows_of_given
 from photostrip.pipeline.inputs import Inputs, Strip
-from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import found
 from photostrip.plausibility.photos import flight
 from photostrip.plausibility.photos import rotations as given_angles
@@ -182,7 +182,7 @@ def _other_height(strip: Strip, plan: LevelPlan, photos: Sequence[str], depth: F
 
 def angles(
     inputs: Inputs,
-    formed: Sequence[EvidenceStrip],
+    formed: Sequence[FormedPhotos],
     observations: PhotoPoints,
     directory: Path | None = None,
 ) -> list[Finding]:
@@ -209,13 +209,13 @@ def angles(
     return list(given_angles.find_wrong_angles(given.angles[rows], given.system, rotations, photos))
 
 
-def _rotations(formed: EvidenceStrip, similarity: Similarity, frame: GroundFrame) -> Floats:
+def _rotations(formed: FormedPhotos, similarity: Similarity, frame: GroundFrame) -> Floats:
     axes = frame.axes_at(similarity(formed.formed.centers))
     return np.asarray(axes @ similarity.rotation @ formed.formed.rotations, float)
 
 
 def _on_control(
-    formed: EvidenceStrip, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame]
+    formed: FormedPhotos, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame]
 ) -> Similarity | None:
     """Similarity from the strip to its control; None where that does not hold all rotations."""
     strip = formed.formed

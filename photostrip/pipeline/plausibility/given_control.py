@@ -1,29 +1,29 @@
-"""Given coordinates: where they lie on the Earth, and how they go with each strip."""
+"""Given coordinates: where they lie on the Earth, and how they go with each formed strip."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Self
 
-from photostrip.arrays import Numbers
+import numpy as np
+
 from photostrip.geodesy.crs import areas_of_use
+from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding
-from photostrip.pipeline.inputs import Inputs, Strip
-from photostrip.pipeline.plausibility import distance_trial, evidence
-from photostrip.pipeline.plausibility.evidence import EvidenceStrip
-from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
-from photostrip.plausibility.control import (
-    given_points,
-    wrong_heights,
-    wrong_place,
-    wrong_readings,
-)
-from photostrip.plausibility.control.straightening import GivenPoints, StripPoints
+from photostrip.pipeline.inputs import Inputs, Settings
+from photostrip.pipeline.plausibility import control_readings, shared_control
+from photostrip.pipeline.plausibility.on_control import HeldStrip
+from photostrip.pipeline.strips.models import LinkedModels
+from photostrip.pipeline.strips.photos import FormedPhotos
+from photostrip.plausibility.control import given_points, slips, wrong_place
 from photostrip.points import ControlPoints
+
+PLAIN = FrameSpec("local", GROUND_AXES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,96 +58,42 @@ class GivenControl:
             axes_are_right=sure.pop() if len(sure) == 1 else None,
         )
 
-    def compared(self, rows: Numbers, on_strip: StripPoints) -> wrong_readings.Reading:
-        """Compare the given points of some rows with the same points in a strip."""
-        points = self.points.take(rows)
-        given = given_points.level(points, self.frames, as_written=self.as_written)
-        if given is None:
-            return wrong_readings.Reading([])
-
-        def exchanged() -> GivenPoints | None:
-            order = [1, 0, 2]
-            other = replace(points, enu=points.enu[:, order], use=points.use[:, order])
-            return given_points.level(other, self.frames)
-
-        return wrong_readings.find_wrong_readings(
-            given, on_strip, axes_are_right=self.axes_are_right, exchanged=exchanged
-        )
+    @cached_property
+    def read_in(self) -> Sequence[GroundFrame]:
+        """Frames in which strips are laid on the points: plain ones where their own cannot be right."""
+        return tie_frames([PLAIN] * len(self.frames))[0] if self.as_written else self.frames
 
 
-def by_strip(
-    control: GivenControl,
-    images: ImageEvidence,
-    strips: Sequence[Strip],
-    formed: Sequence[EvidenceStrip | None],
-    tried: Mapping[str, bool],
-) -> list[Finding]:
-    """Compare given coordinates with each strip: the formed one, or else the mosaic of its photos.
+@dataclass(frozen=True)
+class OfStrip:
+    """What a formed strip says of the given points that it shows."""
 
-    formed: the same strips, as far as they could be formed.
-    tried: ids of the strips that may be formed anew with other principal distances, and whether all their control
-        shows stretched heights.
-    """
-    findings: list[Finding] = []
-    for strip, each in zip(strips, formed, strict=True):
-        readings = _of_strip(strip, each, images, control)
-        of_strip = [finding for reading in readings for finding in reading.findings]
-        errors = {finding.code for finding in of_strip if finding.is_error}
-        if (
-            errors == {wrong_readings.NO_FIT}
-            and each is not None
-            and distance_trial.pairs_ask(each, images.observations)
-        ):
-            errors = set()  # a strip that a wrong distance tears apart fits no control
-        if strip.id in tried and not errors:
-            whole = readings[0].heights if len(readings) == 1 and not control.as_written else None
-            # where the distance is wrong, single points prove nothing
-            stretch = wrong_heights.stretch_of(whole)
-            of_strip = _of_distance(strip, each, stretch, images, control, stretched=tried[strip.id]) or of_strip
-        findings += of_strip
-    return findings
+    whole: list[Finding] = field(default_factory=list)  # of all of them, or of a list: P103, P105, P107, P401 to P410
+    slips: list[Finding] = field(default_factory=list)  # of single ones: P406, P408
 
 
-def _of_strip(
-    strip: Strip, formed: EvidenceStrip | None, images: ImageEvidence, control: GivenControl
-) -> list[wrong_readings.Reading]:
-    if formed is None:
-        held = evidence.mosaic_points(strip, images.observations, control.points, images.steps)
-        return [] if held is None else [control.compared(*held)]
-    rows, on_strip = evidence.strip_points(formed, images.observations, control.points, images.steps)
-    return [control.compared(*part) for part in evidence.stretches(rows, on_strip)]
-
-
-def _of_distance(
-    strip: Strip,
-    formed: EvidenceStrip | None,
-    stretch: wrong_heights.HeightStretch | None,
-    images: ImageEvidence,
-    control: GivenControl,
-    *,
-    stretched: bool,
-) -> list[Finding]:
-    compare = partial(_compared_in_height, images=images, control=control)
-    if formed is not None:
-        return distance_trial.find_wrong_distance(
-            formed,
-            stretch,
-            images.observations,
-            control.points.ids,
-            images.settings,
-            compare,
-            stretched=stretched,
-        )
-    if images.findings:
-        return []
-    return distance_trial.find_distance_without_pairs(
-        strip, images.observations, control.points.ids, images.settings, compare
-    )
-
-
-def _compared_in_height(
-    formed: EvidenceStrip, images: ImageEvidence, control: GivenControl
-) -> wrong_heights.HeightStretch | None:
-    rows, on_strip = evidence.strip_points(formed, images.observations, control.points, images.steps)
-    given = given_points.level(control.points.take(rows), control.frames)
-    return None if given is None else wrong_heights.height_stretch(given, on_strip)
+def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings) -> OfStrip:
+    """Compare the given points with a formed strip, as they are given and as they may be read."""
+    strip, points = stage.strip.id, control.points
+    held = HeldStrip.of(stage, points, settings)
+    if not len(held.given):
+        return OfStrip()
+    as_given = held.read(points, control.read_in, as_given=True)
+    whole: list[Finding] = []
+    better = control_readings.find_reading(held, points, control.read_in, as_given)
+    if better is not None:
+        whole.append(control_readings.named(better, as_given, held, axes_are_right=control.axes_are_right))
+    else:
+        whole += control_readings.of_whole_control(held, as_given, points)
+        whole += [] if whole or as_given is None else shared_control.of_formed(as_given, stage)
+    laid, reading = (as_given, control_readings.AS_GIVEN) if better is None else (better.laid, better.reading)
+    if laid is None or not laid.fits or reading.rows or (whole and better is None):
+        return OfStrip(whole)
+    given = given_points.level(points.take(held.given), control.frames, as_written=control.as_written)
+    if given is None:
+        return OfStrip(whole)
+    off, sigma = laid.off
+    off = reading.as_written(off, signed=True) + given.moved * given.steps.unit
+    named = [given.ids.index(name) for name in whole[0].points] if whole else []
+    off[named] = np.nan  # of a list that lies beside the others
+    return OfStrip(whole, list(slips.find_slips(given, off, reading.as_written(sigma, signed=False), (strip,))))

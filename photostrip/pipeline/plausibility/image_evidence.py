@@ -16,6 +16,8 @@ from photostrip.plausibility import accepted
 from photostrip.plausibility.photos import flight_order, units
 from photostrip.points import PhotoPoints
 
+ALL_PHOTOS, ONE_PHOTO = "P101", "P102"  # image coordinates in another unit
+
 
 @dataclass(frozen=True, eq=False)
 class ImageEvidence:
@@ -29,10 +31,13 @@ class ImageEvidence:
     settings: Settings
 
 
-def of_units(inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
-    """Look at how large image coordinates are, which no fault of other data hides."""
+def of_units(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None = None) -> tuple[Finding, ...]:
+    """Look at how large image coordinates are, which no fault of other data hides.
+
+    photo: image points in the system of the photo, where a run has them already.
+    """
     cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
-    return accepted(_photo_coordinates(inputs, cameras, settings, None)[1], settings.accept)
+    return accepted(_photo_coordinates(inputs, cameras, settings, photo)[1], settings.accept)
 
 
 def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None = None) -> ImageEvidence:
@@ -50,6 +55,8 @@ def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None
         of_order, order = flight_order.find_wrong_order(observations, strip.id, strip.photos, closer)
         findings += of_order
         orders.append(order)
+    alone = {name for each in findings if each.code == ONE_PHOTO for name in each.photos}
+    findings = [each for each in findings if each.code != ALL_PHOTOS or not alone.issuperset(each.photos)]
     for order in orders:
         factor |= {name: factor[name] / size for name, size in order.size.items()}
     mirrored = frozenset(name for order in orders for name in order.mirrored)

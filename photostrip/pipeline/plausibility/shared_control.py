@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
+from photostrip.camera import Camera
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Strip
-from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
+from photostrip.pipeline.plausibility.on_control import OnControl
 from photostrip.pipeline.results import Result, StripResult
+from photostrip.pipeline.strips.models import LinkedModels
+from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import found
 from photostrip.plausibility.control.shared_by_control import (
     Shared,
     ShiftedList,
     StretchedHeights,
+    find_shared,
     significant,
 )
 from photostrip.plausibility.finding import ERROR, Evidence
@@ -26,6 +30,9 @@ from photostrip.points import ControlPoints
 if TYPE_CHECKING:
     from photostrip.strip.error_propagation.check_errors import CheckErrors
 
+Common = StretchedHeights | ShiftedList
+FIX = "take it from the certificate"
+LEAST_WRONG = 0.03  # of a principal distance, from which it is wrong and not only another one
 OTHER_PLACE = "is its crs the right one: zone, datum, false easting?"
 OTHER_HEIGHTS = "are its heights of the same kind as those of the others: `height`, `geoid_undulation`, datum?"
 
@@ -42,29 +49,42 @@ def find_shared_errors(
     if any(each.severity == ERROR and each.key.startswith("control[") for each in findings):
         return  # a list that is misread
     misread = {name for each in findings if each.severity == ERROR for name in each.strips}
-    named = {name for each in findings if each.code == "P107" for name in each.strips}
     for each in strips:
-        shared, strip = each.shared, each.of_photos.strip if each.photo_stages else None
-        if shared is None or strip is None or strip.id in misread:
-            continue
-        if isinstance(shared, ShiftedList):
-            yield shifted_list(shared, each.control, f"strip {strip.id}", (strip.id,), then)
-        elif strip.id not in named:
-            yield _stretched(strip, shared, then)
+        if each.shared is not None and each.strip.id not in misread:
+            photos = each.of_photos.strip if each.photo_stages else None
+            yield from _named(each.shared, each.control, each.strip.id, photos, then)
+
+
+def of_formed(laid: OnControl, stage: FormedPhotos | LinkedModels) -> list[Finding]:
+    """Name what the control of a strip shares that is formed, and not adjusted."""
+    shared = find_shared(laid.counted)
+    photos = stage.strip if isinstance(stage, FormedPhotos) else None
+    return [] if shared is None else list(_named(shared, laid.counted.control, stage.strip.id, photos, ""))
+
+
+def _named(shared: Common, control: ControlPoints, strip: str, photos: Strip | None, then: str) -> Iterator[Finding]:
+    """Name what the control of a strip shares; photos: the strip where it is one of photos, which have a camera."""
+    if isinstance(shared, ShiftedList):
+        yield shifted_list(shared, control, f"strip {strip}", (strip,), then)
+    elif photos is not None:
+        yield _stretched(photos, shared, then)
 
 
 def shifted_list(shared: ShiftedList, control: ControlPoints, whose: str, strips: Sequence[str], then: str) -> Finding:
     """Name a control list that lies beside the other control, or beside all else that is given (P404, P407).
 
+    shared: its number is -1 for points that are given in height only, whatever their list.
     control: control that counts, of all lists.
     """
     plan, steps, evidence = _described(shared.shift, shared.sigma)
-    points = tuple(name for name, number in zip(control.ids, control.frame, strict=True) if number == shared.number)
-    key = f"control[{shared.number}]"
-    message = f"{key} lies beside the other control of {whose}, all of it by {steps}{then}"
+    inside = np.flatnonzero((control.frame == shared.number) | (shared.number < 0))
+    key, what = f"control[{shared.number}]", f"control[{shared.number}] lies"
+    if shared.number < 0:
+        key, what = "control", "what is given in height only lies"
+    message = f"{what} beside the other control of {whose}, all of it by {steps}{then}"
     fix = OTHER_PLACE if plan else OTHER_HEIGHTS
-    code = "P407" if plan else "P404"
-    return found(code, message, fix, evidence, points=points, strips=strips, key=key)
+    points = [control.ids[row] for row in inside.tolist()]
+    return found("P407" if plan else "P404", message, fix, evidence, points=points, strips=strips, key=key)
 
 
 def _described(shift: Floats, sigma: Floats) -> tuple[bool, str, Evidence]:
@@ -113,6 +133,16 @@ def _common_shift(checks: Sequence[CheckErrors]) -> tuple[Numbers, Shared | None
             alone = max(alone, float(pulled[rows] @ np.linalg.solve(weight[np.ix_(rows, rows)], pulled[rows])))
     count = sum(each.coordinates for each in checks)
     return axes, significant(normal, pull, squares, count - len(axes), alone)
+
+
+def other_distance(
+    camera: Camera, would_fit: float, message: str, fix: str, numbers: Evidence, strips: Sequence[str]
+) -> Finding:
+    """Name the principal distance that would fit: a small difference (P107) or a wrong one (P105)."""
+    given = camera.principal_distance
+    code = "P107" if abs(would_fit / given - 1.0) < LEAST_WRONG else "P105"
+    evidence = numbers | {"principal_distance_mm": given, "would_fit_mm": would_fit}
+    return found(code, message, fix, evidence, strips=strips, key=f"cameras.{camera.name}.principal_distance")
 
 
 def _stretched(strip: Strip, stretch: StretchedHeights, then: str) -> Finding:

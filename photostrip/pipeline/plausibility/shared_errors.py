@@ -30,8 +30,7 @@ from photostrip.network.reliability import CONTROL
 from photostrip.network.self_calibration import Parameter
 from photostrip.notes import Finding, listed
 from photostrip.pipeline.inputs import Inputs
-from photostrip.pipeline.plausibility.distance_trial import FIX, other_distance
-from photostrip.pipeline.plausibility.shared_control import shifted_list
+from photostrip.pipeline.plausibility.shared_control import FIX, other_distance, shifted_list
 from photostrip.pipeline.results import Bundle
 from photostrip.plausibility import found
 from photostrip.plausibility.control.shared_by_control import ShiftedList

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
@@ -26,49 +27,66 @@ def slip(given: float, predicted: float, scatter: float, tolerance: float) -> Sl
     scatter: standard deviation of the prediction.
     tolerance: how far the corrected coordinate may lie from the prediction; never more than a part of the digit's
         value.
-    Returns the slip that brings the coordinate nearest to the prediction; None when none brings it near.
+    Returns the slip, of the first kind that brings the coordinate near, that brings it nearest; None when none does.
     """
     if abs(given - predicted) < LEAST_SLIP_SIGMAS * scatter:
         return None
-    fits = [
-        each
-        for each in _slips(given, scatter)
-        if abs(each.meant - predicted) <= min(tolerance, max(NEAR_SHARE * abs(each.meant - given), scatter))
-    ]
-    return min(fits, key=lambda each: abs(each.meant - predicted), default=None)
+    for kind in KINDS:
+        fits = [
+            each
+            for each in kind(given, scatter)
+            if abs(each.meant - predicted) <= min(tolerance, max(NEAR_SHARE * abs(each.meant - given), scatter))
+        ]
+        if fits:
+            return min(fits, key=lambda each: abs(each.meant - predicted))
+    return None
 
 
-def _slips(given: float, scatter: float) -> Iterator[Slip]:
-    """Return every coordinate that one slip of the pen turns into the one given."""
-    text = f"{abs(given):.{MOST_DECIMALS}f}"
-    sign = -1.0 if given < 0 else 1.0
-    yield Slip(-given, "the sign is wrong")
-    yield from _lost(given, sign, text.index("."))
+def _written(given: float) -> tuple[str, float]:
+    """Return the digits of a coordinate, and its sign."""
+    return f"{abs(given):.{MOST_DECIMALS}f}", -1.0 if given < 0 else 1.0
+
+
+def _places_of(text: str) -> Iterator[tuple[int, int, float]]:
+    """Give number, digit and worth of each place."""
     point = text.index(".")
-    digits = [(place, int(sign_)) for place, sign_ in enumerate(text) if sign_ != "."]
-    for number, (place, digit) in enumerate(digits):
-        worth = 10.0 ** (point - place - (1 if place < point else 0))
-        if worth < LEAST_DIGIT_SIGMAS * scatter:
-            break
-        for other in range(10):
-            if other != digit and abs(other - digit) * worth > LEAST_SLIP_SIGMAS * scatter:
-                change = sign * (other - digit) * worth
-                what = f"a typing error in the {_ordinal(number)} digit ({digit} for {other})"
-                yield Slip(given + change, what)
-        if number + 1 < len(digits):
-            after = digits[number + 1][1]
-            if after != digit:
-                swapped = sign * (after - digit) * (worth - worth / 10.0)
-                yield Slip(given + swapped, f"the {_ordinal(number)} and the {_ordinal(number + 1)} digit exchanged")
-    yield from _added(text, sign, point)
+    for number, (place, sign) in enumerate((place, sign) for place, sign in enumerate(text) if sign != "."):
+        yield number, int(sign), 10.0 ** (point - place - (1 if place < point else 0))
+
+
+def _turned_over(given: float, _: float) -> Iterator[Slip]:
+    yield Slip(-given, "the sign is wrong")
+
+
+def _point_moved(given: float, scatter: float) -> Iterator[Slip]:
     for times in (10.0, 100.0, 1000.0):
         if abs(given) / times > scatter:
             yield Slip(given / times, f"the decimal point is {_places(times)} too far right")
             yield Slip(given * times, f"the decimal point is {_places(times)} too far left")
 
 
-def _lost(given: float, sign: float, length: int) -> Iterator[Slip]:
+def _exchanged(given: float, scatter: float) -> Iterator[Slip]:
+    text, sign = _written(given)
+    digits = list(_places_of(text))
+    for (number, digit, worth), (_, after, _) in pairwise(digits):
+        if after != digit and worth >= LEAST_DIGIT_SIGMAS * scatter:
+            what = f"the {_ordinal(number)} and the {_ordinal(number + 1)} digit exchanged"
+            yield Slip(given + sign * (after - digit) * (worth - worth / 10.0), what)
+
+
+def _mistyped(given: float, scatter: float) -> Iterator[Slip]:
+    text, sign = _written(given)
+    for number, digit, worth in _places_of(text):
+        for other in range(10) if worth >= LEAST_DIGIT_SIGMAS * scatter else ():
+            if other != digit and abs(other - digit) * worth > LEAST_SLIP_SIGMAS * scatter:
+                what = f"a typing error in the {_ordinal(number)} digit ({digit} for {other})"
+                yield Slip(given + sign * (other - digit) * worth, what)
+
+
+def _lost(given: float, _: float) -> Iterator[Slip]:
     """Give coordinates that had one digit more in front, or zeros after it."""
+    text, sign = _written(given)
+    length = text.index(".")
     for power in range(length, MOST_DIGITS):
         for digit in range(1, 10):
             what = (
@@ -77,8 +95,10 @@ def _lost(given: float, sign: float, length: int) -> Iterator[Slip]:
             yield Slip(given + sign * digit * 10.0**power, what)
 
 
-def _added(text: str, sign: float, point: int) -> Iterator[Slip]:
+def _added(given: float, _: float) -> Iterator[Slip]:
     """Give coordinates that have one digit less."""
+    text, sign = _written(given)
+    point = text.index(".")
     for number in range(point if point > LEAST_DIGITS else 0):
         what = f"one digit too many, the {_ordinal(number)} ({text[number]})"
         yield Slip(sign * float(text[:number] + text[number + 1 :]), what)
@@ -91,3 +111,14 @@ def _ordinal(number: int) -> str:
 def _places(times: float) -> str:
     number = len(str(int(times))) - 1
     return f"{number} place" if number == 1 else f"{number} places"
+
+
+KINDS: tuple[Callable[[float, float], Iterator[Slip]], ...] = (
+    _turned_over,
+    _point_moved,
+    _added,
+    _lost,
+    _exchanged,
+    _mistyped,
+)
+"""Kinds of slips, those first that few coordinates fit by chance."""

@@ -3,20 +3,51 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.plausibility.control.straightening import GivenPoints, WrittenAxes
 from photostrip.points import ControlPoints
+
+
+class WrittenAxes(NamedTuple):
+    """What a step of a written coordinate is in the level frame."""
+
+    unit: Floats  # (n, 3): metres in a unit of the written coordinates
+    axes: Floats  # (n, 3, 3): directions of the written axes, as rows
+
+
+@dataclass(frozen=True, eq=False)
+class GivenPoints:
+    """Given points in a level frame."""
+
+    ids: tuple[str, ...]
+    # (n, 3): east, north, up in metres in a level frame in the middle of the control; NaN where not given
+    xyz: Floats
+    use: Flags  # (n, 3): which coordinates count
+    check: Flags  # (n,): check points
+    group: Numbers  # (n,): control list of each
+    # (n, 3): the coordinates as they are written, east, north, up; NaN where slips of the pen cannot be sought in them
+    written: Floats
+    moved: Floats  # (n, 3): what was taken from them, so that a point far from all others comes among them
+    written_axes: Callable[[], WrittenAxes]  # what a step of them is; worked out for points that stand out only
+
+    @cached_property
+    def steps(self) -> WrittenAxes:
+        """What a step of the written coordinates is."""
+        return self.written_axes()
+
 
 _LevelPoints = tuple[Floats, Callable[[], WrittenAxes]]  # (n, 3) in the level frame; what the written axes are
 
-USUAL_SIGMA = 0.1  # metres, of coordinates without one
 # times as far from the middle of a list as a good half of it: strip and map say nothing of such a place
 FAR_AWAY = 20.0
+HIGHEST = 2e4  # metres, twice the height of a mountain: no ground lies so far from the other heights
 LEAST_OF_LIST = 4  # points that tell where a list lies
 
 
@@ -30,14 +61,11 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
     if not plan.any():
         return None
     written = np.where(control.use, control.enu, np.nan)
-    moved = _moved(written, control.frame)
+    moved = far_away(written, control.frame)
     filled = _filled(written - moved, control.frame)
     decoded = None if as_written else _decoded(filled, control, frames, plan)
     xyz, written_axes = decoded or _plain(filled, control, frames, plan)
     known = np.column_stack([plan, plan, height])
-    sigma = np.where(known & (control.sigma > 0), control.sigma, np.nan)
-    stated = (part[np.isfinite(part)] for part in (sigma[:, :2], sigma[:, 2]))
-    usual = [np.median(part) if len(part) else USUAL_SIGMA for part in stated]
     return GivenPoints(
         ids=control.ids,
         xyz=np.where(known, xyz, np.nan),
@@ -47,7 +75,6 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
         written=written,
         moved=moved,
         written_axes=written_axes,
-        sigma=(usual[0], usual[1]),
     )
 
 
@@ -63,8 +90,8 @@ def _plain_axes(control: ControlPoints, frames: Sequence[GroundFrame]) -> Writte
     return WrittenAxes(unit, np.tile(np.eye(3), (len(control), 1, 1)))
 
 
-def _moved(written: Floats, lists: Numbers) -> Floats:
-    """By how much coordinates in plan that lie far from all others of their list are moved to its middle (n, 3)."""
+def far_away(written: Floats, lists: Numbers) -> Floats:
+    """By how much coordinates (n, 3) that lie far from all others of their list are moved to its middle."""
     moved = np.zeros_like(written)
     for number in np.unique(lists).tolist():
         rows = np.flatnonzero((lists == number) & np.isfinite(written[:, :2]).all(axis=1))
@@ -73,6 +100,9 @@ def _moved(written: Floats, lists: Numbers) -> Floats:
         off = written[rows, :2] - np.median(written[rows, :2], axis=0)
         far = np.abs(off) > FAR_AWAY * np.median(np.abs(off), axis=0).max()
         moved[rows, :2] = np.where(far, off, 0.0)
+        rows = np.flatnonzero((lists == number) & np.isfinite(written[:, 2]))
+        off = written[rows, 2] - np.median(written[rows, 2]) if len(rows) >= LEAST_OF_LIST else np.zeros(len(rows))
+        moved[rows, 2] = np.where(np.abs(off) > HIGHEST, off, 0.0)
     return moved
 
 

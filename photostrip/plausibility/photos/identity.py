@@ -5,21 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.sparse import coo_array
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.notes import Finding
 from photostrip.plausibility.finding import found
 from photostrip.points import ControlPoints, PhotoPoints, located
-from photostrip.strip.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.strip.strip_formation.strip import FormedStrip
 
 SAME_PLACE_SIGMAS = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
 SAME_HEIGHT_FACTOR = 3.0  # times that in height, times height over base
 MOST_BY_CHANCE = 0.002  # points that may lie at the same place by chance in the whole strip; else nothing is said
-FAR_BASES = 2.0  # bases between two places of one id: tilts move them by less
-LEAST_RAYS = 2  # photos that must agree
-TINY = 1e-12
 MOST_COPIED = 100  # that are looked for, at most
 COPIED_SIGMAS = 20.0  # standard deviations of an image coordinate between two points that cannot be one
 SAME_IMAGE_SIGMAS = 3.5  # standard deviations of the mean difference of image coordinates on common photos
@@ -59,82 +54,6 @@ def find_double_ids(
         yield found("P302", message, fix, evidence, points=names, strips=(strip_id,))
 
 
-def find_shared_ids_in_images(
-    observations: PhotoPoints, rows: Numbers, along: Floats, photos: Sequence[str], strip_id: str
-) -> Iterator[Finding]:
-    """Find ids that two groups of photos put at places far from each other along the strip.
-
-    Nothing is said where photos that can be oriented on each other put all that they share at places as far from each
-    other: they were not flown along a line.
-
-    rows: (m,), image points of the strip.
-    along: (m,), where the photo of each puts its point along the strip, bases.
-    """
-    order = np.lexsort((along, observations.point[rows]))
-    rows, along = rows[order], along[order]
-    point = observations.point[rows]
-    far = np.flatnonzero((point[1:] == point[:-1]) & (np.diff(along) > FAR_BASES)).tolist()
-    if not far:
-        return
-    common, apart = _common_points(observations, rows, along)
-    if (apart[common >= MINIMUM_POINTS] > FAR_BASES).any():
-        return
-    for k in far:
-        same = np.flatnonzero(point == point[k])
-        groups = [rows[same[same <= k]], rows[same[same > k]]]
-        if min(len(each) for each in groups) < LEAST_RAYS:
-            continue  # a wrong coordinate on one photo
-        names = set(photos)
-        one, two = (
-            tuple(name for name in (observations.photo_ids[n] for n in observations.photo[each]) if name in names)
-            for each in groups
-        )
-        gap = float(along[k + 1] - along[k])
-        name = observations.point_ids[int(point[k])]
-        message = (
-            f"point {name} stands for two points: photos {' and '.join(one)} put it {gap:.1f} bases away from where "
-            f"photos {' and '.join(two)} put it"
-        )
-        fix = f"give one of the two another id on photos {' and '.join(two)}"
-        yield found("P301", message, fix, {"apart_in_bases": gap}, points=(name,), photos=(*one, *two),
-                    strips=(strip_id,))  # fmt: skip
-
-
-def find_double_ids_in_images(observations: PhotoPoints, rows: Numbers, strip_id: str) -> Iterator[Finding]:
-    """Find points at one place on all photos of a strip (image points `rows`) that show both, at least two."""
-    if not len(rows):
-        return
-    o = observations
-    reach = SAME_IMAGE_SIGMAS * np.median(o.sigma[rows]) * np.sqrt(2.0)
-    rows = rows[np.lexsort((o.xy[rows, 0], o.photo[rows]))]
-    first = np.flatnonzero(np.diff(o.photo[rows], prepend=-1))
-    extent = np.maximum.reduceat(o.xy[rows], first) - np.minimum.reduceat(o.xy[rows], first)
-    pairs = np.diff(first, append=len(rows)) ** 2 / 2.0  # of points on one photo, each counted on two photos at least
-    if (pairs / LEAST_RAYS * (2.0 * reach) ** 2 / np.maximum(extent.prod(axis=1), TINY)).sum() > MOST_BY_CHANCE:
-        return
-    near: dict[tuple[int, int], list[float]] = {}
-    for lag in range(1, len(rows)):
-        step = np.abs(o.xy[rows[lag:]] - o.xy[rows[:-lag]])
-        beside = (o.photo[rows[lag:]] == o.photo[rows[:-lag]]) & (step[:, 0] < reach)
-        if not beside.any():
-            break
-        for k in np.flatnonzero(beside & (step[:, 1] < reach)).tolist():
-            a, b = sorted((int(o.point[rows[k]]), int(o.point[rows[k + lag]])))
-            near.setdefault((a, b), []).append(float(np.hypot(*step[k])))
-    for (a, b), gaps in near.items():
-        both = np.intersect1d(o.photo[rows[o.point[rows] == a]], o.photo[rows[o.point[rows] == b]])
-        if a == b or len(gaps) < max(LEAST_RAYS, len(both)):
-            continue
-        names = (o.point_ids[a], o.point_ids[b])
-        gap = float(np.mean(gaps))
-        message = (
-            f"points {names[0]} and {names[1]} lie at the same place on all {len(both)} photos that show both, "
-            f"{1000 * gap:.0f} µm from each other: two ids for one point"
-        )
-        evidence = {"photos": len(both), "mean_distance_mm": gap}
-        yield found("P302", message, f"give {names[1]} the id {names[0]}", evidence, points=names, strips=(strip_id,))
-
-
 def find_copied_points(control: ControlPoints, observations: PhotoPoints) -> Iterator[Finding]:
     """Find given points with the very same coordinates in plan that photos show at two places (P410)."""
     rows = np.flatnonzero(control.use[:, :2].all(axis=1))
@@ -160,14 +79,6 @@ def find_copied_points(control: ControlPoints, observations: PhotoPoints) -> Ite
         names = (control.ids[a], control.ids[b])
         message = f"given points {' and '.join(names)} have the same coordinates, and {where}"
         yield found("P410", message, "was the row of one of them copied?", evidence, points=names)
-
-
-def _common_points(observations: PhotoPoints, rows: Numbers, along: Floats) -> tuple[Floats, Floats]:
-    """Count the points that each two photos have in common; how far apart both put them in the mean, bases."""
-    at, size = (observations.photo[rows], observations.point[rows]), len(observations.photo_ids)
-    one, place = (coo_array((each, at), (size, len(observations.point_ids))).tocsr() for each in (along**0, along))
-    count, both = (one @ one.T).toarray(), (place @ one.T).toarray()
-    return np.asarray(count, float), np.asarray(np.abs(both - both.T) / np.maximum(count, 1.0), float)
 
 
 def _depth(formed: FormedStrip) -> float:

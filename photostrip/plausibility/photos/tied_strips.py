@@ -15,8 +15,8 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.notes import Finding
-from photostrip.plausibility.control.straightening import LEAST_REDUNDANCY, fit_simplest
 from photostrip.plausibility.finding import found
+from photostrip.plausibility.photos.robust_fit import LEAST_REDUNDANCY, fit_simplest
 
 LEAST_TIES = 1 + LEAST_REDUNDANCY  # a shift fits one tie
 TWO_RAYS = 2

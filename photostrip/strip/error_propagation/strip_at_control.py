@@ -64,9 +64,9 @@ class StripAtControl:
         total = len(self.coordinates.point)
         part = before * -(-total // LARGEST_SECTION) // max(total, 1)
         parts = [np.sort(order[part == number]) for number in np.unique(part)]
-        return [(rows, self._section(rows)) for rows in parts]  # none of them holds the whole, which holds them
+        return [(rows, self.at(rows)) for rows in parts]  # none of them holds the whole, which holds them
 
-    def _section(self, rows: Numbers) -> StripAtControl:
+    def at(self, rows: Numbers) -> StripAtControl:
         """Return the strip at some of its control points, numbered anew; covariances stay those of the whole strip."""
         place, targets, covariance = np.full(len(self.control), -1), self.targets, self.covariance
         place[rows] = np.arange(len(rows))

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 import pytest
 
-from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+from photostrip.pipeline.plausibility import evidence
 
 if TYPE_CHECKING:
-    from photostrip.pipeline.inputs import Strip
+    from photostrip.pipeline.strips.photos import FormedPhotos
     from photostrip.strip.relative_orientation.orientation import Orientation
-    from photostrip.strip.strip_formation.strip import FormedStrip
 
 
 def test_the_depth_is_the_height_above_the_mean_of_the_points_of_a_model() -> None:
@@ -23,17 +22,5 @@ def test_the_depth_is_the_height_above_the_mean_of_the_points_of_a_model() -> No
     pairs = SimpleNamespace(pair=np.array([0, 0, 0, 1]), size=2)
     orientation = cast("Orientation", SimpleNamespace(pairs=pairs, used=np.ones(4, bool)))
     formed = SimpleNamespace(rotations=np.tile(np.eye(3), (3, 1, 1)), model_xyz=points, xyz=points, centers=centers)
-    strip = EvidenceStrip(cast("Strip", None), orientation, cast("FormedStrip", formed))
-    assert strip.depth == pytest.approx([10.0 - 3.0, 11.0 - 3.0, 12.0 - 6.0])
-
-
-@pytest.mark.parametrize(("degrees", "by_ground"), [(10.0, False), (45.0, True)])
-def test_control_is_laid_on_the_normal_of_the_ground_under_an_oblique_mount(degrees: float, *, by_ground: bool) -> None:
-    """Cameras that look aside do not say what is upwards; those that are tilted a little do."""
-    side = np.radians(degrees)
-    turn = np.array([[1, 0, 0], [0, np.cos(side), -np.sin(side)], [0, np.sin(side), np.cos(side)]])
-    points = np.array([[0.0, 0.0, 0.1], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0], [4.0, 2.0, 0.1], [2.0, 1.0, -0.1]])
-    formed = SimpleNamespace(rotations=np.tile(turn, (3, 1, 1)), xyz=points)
-    strip = EvidenceStrip(cast("Strip", None), cast("Orientation", None), cast("FormedStrip", formed))
-    wanted = np.array([0.0, 0.0, 1.0]) if by_ground else turn[:, 2]
-    assert strip.axes == pytest.approx(np.tile(wanted, (3, 1)), abs=0.03)
+    stage = cast("FormedPhotos", SimpleNamespace(orientation=orientation, formed=formed))
+    assert evidence.depth(stage) == pytest.approx([10.0 - 3.0, 11.0 - 3.0, 12.0 - 6.0])

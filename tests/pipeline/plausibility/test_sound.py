@@ -10,17 +10,15 @@ import pytest
 
 from benchmarks import causes
 from photostrip.pipeline.inputs import Inputs, Settings
-from photostrip.pipeline.plausibility import gate
-from photostrip.pipeline.plausibility.given_control import GivenControl
+from photostrip.pipeline.plausibility import gate, given_control
+from photostrip.pipeline.plausibility.given_control import GivenControl, OfStrip
 from photostrip.pipeline.run import triangulate
 from photostrip.simulation import FILM, Control, Flight, Gnss, Ground, Image, Models, Points, Spec, Terrain, simulate
 from tests.pipeline.blocks import orientations, positions, with_control
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Numbers
-    from photostrip.plausibility.control.straightening import StripPoints
-    from photostrip.plausibility.control.wrong_readings import Reading
+    from photostrip.pipeline.strips.photos import FormedPhotos
     from photostrip.simulation import Simulation
 
 BLOCK = Spec(
@@ -125,13 +123,13 @@ def test_strips_of_a_bundle_hold_each_other() -> None:
 def test_a_bundle_says_whose_given_points_need_a_closer_look(role: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Strips are laid on their control only where the bundle does not agree with it."""
     looked_at: list[str] = []
-    compared = GivenControl.compared
+    compared = given_control.of_strip
 
-    def seen(control: GivenControl, rows: Numbers, on_strip: StripPoints) -> Reading:
-        looked_at.append(on_strip.strip)
-        return compared(control, rows, on_strip)
+    def seen(control: GivenControl, stage: FormedPhotos, settings: Settings) -> OfStrip:
+        looked_at.append(stage.strip.id)
+        return compared(control, stage, settings)
 
-    monkeypatch.setattr(GivenControl, "compared", seen)
+    monkeypatch.setattr(given_control, "of_strip", seen)
     made = simulate(replace(BLOCK, control=Control(check=4)))
     inputs = inputs_of(made)
     assert triangulate(inputs, BUNDLE).findings == ()

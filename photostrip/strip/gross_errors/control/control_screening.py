@@ -11,11 +11,14 @@ Source: derived; data snooping with correlated observations.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import chain
+from random import Random
 
 import numpy as np
 
-from photostrip.arrays import Floats
+from photostrip.arrays import Flags, Floats
 from photostrip.errors import PhotostripError
+from photostrip.geometry.similarity import similar
 from photostrip.points import ControlPoints
 from photostrip.rejection import Rejection
 from photostrip.strip.error_propagation.strip_at_control import StripAtControl
@@ -33,6 +36,8 @@ from photostrip.strip.gross_errors.control.control_rejections import (
     reliability,
 )
 
+DRAWN, DRAWS = 3, 200  # points of a similarity, and similarities: of half good points, one in eight is of these alone
+KEPT = 5.0  # median residuals within which a point goes with the others
 BENT = 2.5  # standard deviation of unit weight beyond which more is wrong with a strip than its control
 
 
@@ -53,11 +58,7 @@ def screen_control(strip: StripAtControl) -> ScreenedControl:
     use, rejections = strip.control.use.copy(), []
     redundancy, detectable = np.full((2, *use.shape), np.nan)
     for rows, section in strip.sections:
-        try:
-            found = _searched(section)
-        except (PhotostripError, np.linalg.LinAlgError):
-            # the control of the section leaves it free, or would without what is suspected: nothing is said against it
-            continue
+        found = search(section)
         if found is not None:
             use[rows] = kept_of(section, found)
             rejections += control_rejections(section, found, rows)
@@ -76,37 +77,56 @@ def not_screened(control: ControlPoints) -> ScreenedControl:
     return ScreenedControl(kept=control, rejections=(), redundancy=unknown, detectable=unknown)
 
 
-def _searched(strip: StripAtControl) -> FoundErrors | None:
+def search(strip: StripAtControl) -> FoundErrors | None:
     """Search for what is wrong in a section; None where its control does not check itself."""
     count = len(strip.coordinates.point)
     if count <= strip.design.shape[1]:
         return None
-    found = [_laid(strip)]
-    if not found[0].left.explained:  # much may be wrong
-        found += [_laid(strip, much=True, bends=bends) for bends in (True, False)]
+    first = found = _found(strip)
+    if not first or not first[0].left.explained:  # much may be wrong
+        kept, full = strip.control.use.copy(), np.flatnonzero(strip.control.use.all(axis=1))
+        kept[full] = majority(strip.xyz[full], strip.targets.of_full[full])[:, None]
+        much = (_found(strip, much=True, bends=bends) for bends in (True, False))
+        found = [*first, *chain.from_iterable(much), *_found(strip, kept)]
     told = [
         each
         for each in found
         if each.whole.allows(each.out) and each.left.squares <= BENT**2 * max(each.left.freedom, 1)
     ]
+    if not told:
+        return FoundErrors(first[0].whole, ()) if first else None
     # of two equally small explanations the one that blames less control, or explains more
     best = min(
-        told,
-        key=lambda each: (not each.left.explained, len(each.out), len(each.coordinates), each.left.squares),
-        default=FoundErrors(found[0].whole, ()),
+        told, key=lambda each: (not each.left.explained, len(each.out), len(each.coordinates), each.left.squares)
     )
     # where much is wrong, little is left to check the rest of wrong points, and to be lost
-    return FoundErrors(best.whole, best.whole.completed(best.out)) if best is found[0] else best
+    return FoundErrors(best.whole, best.whole.completed(best.out)) if first and best is first[0] else best
 
 
-def _laid(strip: StripAtControl, *, much: bool = False, bends: bool = False) -> FoundErrors:
-    """Search, lay the strip on what is kept, and search from what was found, until the same is found."""
-    kept, out = strip.control.use, None
+def _found(
+    strip: StripAtControl, start: Flags | None = None, *, much: bool = False, bends: bool = False
+) -> list[FoundErrors]:
+    """Search; nothing where the control leaves the strip free, or would without what is suspected."""
+    try:
+        return [first_search(strip, start, much=much, bends=bends)]
+    except (PhotostripError, np.linalg.LinAlgError):
+        return []
+
+
+def first_search(
+    strip: StripAtControl, start: Flags | None = None, *, much: bool = False, bends: bool = False
+) -> FoundErrors:
+    """Take out one after the other, lay the strip on what is kept, and search from there, until the same is found.
+
+    start: (n, 3), coordinates that are kept at first; all, if not said.
+    """
+    kept, out = strip.control.use if start is None else start, None
     for _ in strip.coordinates.point:
         laid = strip.laid if kept is strip.control.use else strip.laid_on(kept)
         whole = adjust(laid, laid.misclosures(), strip.joint_covariance, bends=bends)
         if out is None:
-            out = candidates(whole) if much else ()
+            place = strip.coordinates
+            out = candidates(whole) if much else tuple(np.flatnonzero(~kept[place.point, place.axis]).tolist())
         out = whole.shrunk(whole.grown(whole.shrunk(out)))
         if much:
             out = whole.shrunk(whole.grown(whole.exchanged(out)))
@@ -115,6 +135,25 @@ def _laid(strip: StripAtControl, *, much: bool = False, bends: bool = False) -> 
         if np.array_equal(before, kept):
             break
     return found
+
+
+def majority(strip: Floats, given: Floats) -> Flags:
+    """Points (n,) without those that the similarity which fits half of them best leaves farthest.
+
+    Similarities through three points are drawn, that whose median residual is least is taken. Errors of many points
+    turn a similarity of all of them so far that the least sum of squares lies elsewhere.
+
+    strip, given: (n, 3), strip and Cartesian coordinates.
+    Source: [Rousseeuw 1984].
+    """
+    if len(strip) <= DRAWN:
+        return np.ones(len(strip), bool)
+    draw = Random(len(strip))  # noqa: S311 (the same for the same number)
+    triples = np.array([draw.sample(range(len(strip)), DRAWN) for _ in range(DRAWS)])
+    off = np.linalg.norm(given - similar(strip[triples], given[triples], strip), axis=2)
+    half = np.partition(off, len(strip) // 2, axis=1)[:, len(strip) // 2]
+    best = int(half.argmin())
+    return np.asarray(off[best] <= KEPT * half[best], bool)
 
 
 def candidates(whole: JointAdjustment) -> Columns:

@@ -1,8 +1,4 @@
-"""A strip, or the mosaic of its photos, laid on given points in plan and height, whatever else is wrong with them.
-
-The strip is set upright by its cameras, which look down; so it cannot come out upside down, and a mirror image shows as
-a mirror image. In plan, the similarity through two given points whose middle misclosure is the smallest of all pairs
-is taken, once as it is and once with the strip mirrored. Up to nearly half of the points may be wrong.
+"""A linear fit that wrong values do not disturb, with as few columns as leave no more than makes sense.
 
 Source: least median of squares (Rousseeuw 1984); derived, see docs/sources.md.
 """
@@ -20,13 +16,7 @@ from numpy.typing import NDArray
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.statistics import SIGMA_FROM_MEDIAN, t_quantile
 
-Complex = NDArray[np.complex128]
-
-LEAST_POINTS = 3  # in plan; two always fit
-PLAN_UNKNOWNS = 2  # complex ones: turn and shift
-MOST_PAIRS = 1500  # tried
 MEDIAN_POINTS = 100  # at most, from which a median misclosure is taken
-LEAST_PAIR_DISTANCE = 0.25  # of the largest distance: two points that give a similarity
 GOOD_SHARE = 0.55  # of the points, at least
 NO_GOOD_DRAW = 1e-3  # probability that no draw of as many points as unknowns, for a start, is of good points alone
 LEAST_DETERMINANT = 1e-9  # of such a draw, columns of size one
@@ -34,58 +24,8 @@ REWEIGHTINGS = 12  # of a robust fit
 KEPT_SIGMAS = 5.0  # robust standard deviations within which a point goes with the others
 ODD_PROBABILITY = 1e-6  # that a good point is called odd
 TINY = 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class PlanSimilarity:
-    """Plan from strip: E + iN = turn w + shift, with conj(w) where the strip is mirrored."""
-
-    turn: complex
-    shift: complex
-    mirrored: bool
-    median: float  # misclosure that a good half of the points does not exceed, metres
-
-    @property
-    def matrix(self) -> Floats:
-        """The same turn of plan and height together, shape (3, 3)."""
-        sense = -1.0 if self.mirrored else 1.0
-        a, b = self.turn.real, self.turn.imag
-        return np.array([[a, -sense * b, 0.0], [b, sense * a, 0.0], [0.0, 0.0, abs(self.turn)]])
-
-    def __call__(self, w: Complex) -> Complex:
-        """Bring places of the upright strip to the plan."""
-        return np.asarray(self.turn * (np.conj(w) if self.mirrored else w) + self.shift)
-
-
-def upright(axes: Floats) -> Floats:
-    """Rotation (3, 3) that takes the mean of the photos' third axes (n, 3), from the ground to the cameras, to up."""
-    up = axes.mean(axis=0)
-    up /= max(float(np.linalg.norm(up)), TINY)
-    helper = np.eye(3)[int(np.abs(up).argmin())]
-    first = np.cross(helper, up)
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(up, first), up])
-
-
-def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> PlanSimilarity | None:
-    """Lay a strip on given points in plan, by least median of squares, then least squares on the better half.
-
-    w: (n,), places of the points in the upright strip.
-    plan: (n,), given places E + iN, metres.
-    Returns none for fewer than three points, or when all lie at the same place.
-    """
-    if len(w) < LEAST_POINTS:
-        return None
-    z = np.conj(w) if mirrored else w
-    i, j = _pairs(z, plan)
-    if not len(i):
-        return None
-    turn = (plan[j] - plan[i]) / (z[j] - z[i])
-    shift = plan[i] - turn * z[i]
-    some = _evenly(len(z), MEDIAN_POINTS)
-    size = np.abs(turn[:, None] * z[some] + shift[:, None] - plan[some])
-    best = int(_median(size, PLAN_UNKNOWNS).argmin())
-    return _refined(z, plan, complex(turn[best]), complex(shift[best]), mirrored=mirrored)
+SIMPLE_SIGMAS = 2.5  # times what makes sense that a fit may leave before another column is taken
+LEAST_REDUNDANCY = 2  # redundancy that must be left then
 
 
 def _evenly(count: int, most: int) -> Numbers:
@@ -98,40 +38,6 @@ def _median(size: Floats, unknowns: int) -> Floats:
     count = size.shape[-1]
     place = min((count + unknowns + 1) // 2, count) - 1
     return np.asarray(np.partition(size, place, axis=-1)[..., place])
-
-
-def _pairs(z: Complex, plan: Complex) -> tuple[Numbers, Numbers]:
-    """Pairs of points far enough from each other on both sides, evenly drawn from all."""
-    n = len(z)
-    if n * (n - 1) // 2 > 20 * MOST_PAIRS:
-        draw = np.random.default_rng(n)  # the same for the same number of points
-        i, j = draw.integers(0, n, (2, 20 * MOST_PAIRS))
-    else:
-        i, j = _each_two(n)
-    far = np.abs(z[j] - z[i])
-    enough = far > LEAST_PAIR_DISTANCE * far.max(initial=0.0)
-    keep = np.flatnonzero(enough & (far > 0) & (np.abs(plan[j] - plan[i]) > TINY))
-    if len(keep) > MOST_PAIRS:
-        keep = keep[_evenly(len(keep), MOST_PAIRS)]
-    return i[keep].astype(np.intp), j[keep].astype(np.intp)
-
-
-@lru_cache(maxsize=8)
-def _each_two(n: int) -> tuple[Numbers, Numbers]:
-    return np.triu_indices(n, 1)
-
-
-def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirrored: bool) -> PlanSimilarity:
-    """Fit the better half of the points by least squares."""
-    size = np.abs(turn * z + shift - plan)
-    good = size <= max(2.5 * SIGMA_FROM_MEDIAN * float(_median(size, PLAN_UNKNOWNS)), TINY)
-    d, t = z[good] - z[good].mean(), plan[good] - plan[good].mean()
-    squares = float((np.abs(d) ** 2).sum())
-    if squares >= TINY:
-        turn = complex((np.conj(d) * t).sum() / squares)
-        shift = complex(plan[good].mean() - turn * z[good].mean())
-    size = np.abs(turn * z + shift - plan)
-    return PlanSimilarity(turn=turn, shift=shift, mirrored=mirrored, median=float(_median(size, PLAN_UNKNOWNS)))
 
 
 def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: Numbers) -> Floats | None:
@@ -246,3 +152,26 @@ def _reweighted(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, floo
         if (before == weight).all():
             break
     return coefficient, weight > 0
+
+
+def fit_simplest(
+    columns: list[NDArray[Any]],
+    least: int,
+    values: NDArray[Any],
+    in_fit: Flags,
+    floor: float,
+) -> tuple[NDArray[Any], RobustFit]:
+    """Fit as few columns, the simplest first, as leave no more than makes sense, or least; `least` are always taken.
+
+    More columns leave more where too many of the points are wrong for them.
+
+    Returns columns: (n, c), those that were fitted.
+    """
+    fits: list[tuple[NDArray[Any], RobustFit]] = []
+    for number in range(least, len(columns) + 1):
+        chosen = np.column_stack(columns[:number])
+        fits.append((chosen, fit_robustly(chosen, values, in_fit, floor)))
+        spare = int(in_fit.sum()) - number - 1
+        if spare < LEAST_REDUNDANCY or fits[-1][1].sigma0 <= SIMPLE_SIGMAS * floor:
+            break
+    return min(fits, key=lambda each: each[1].sigma0)

@@ -1,0 +1,289 @@
+"""Other ways to read the given coordinates: columns, signs, units, rows; and what all control of a strip shares.
+
+Each reading is a row of ``READINGS``. Where a formed strip does not fit its control, every reading is tried on it; that
+under which it fits best is named, if chance does not make as much of so many readings (an F test of the variance
+factors). Where none fits, something may be common to all heights or to one list (``shared_by_control``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from photostrip.arrays import Flags, Floats
+from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geometry.similarity import collinearity
+from photostrip.notes import Finding
+from photostrip.pipeline.inputs import Settings, Strip
+from photostrip.pipeline.plausibility import evidence
+from photostrip.pipeline.plausibility.on_control import HeldStrip, OnControl
+from photostrip.pipeline.plausibility.shared_control import FIX, other_distance, shifted_list
+from photostrip.pipeline.strips.photos import FormedPhotos
+from photostrip.plausibility import found
+from photostrip.plausibility.control.shared_by_control import ShiftedList
+from photostrip.plausibility.control.wrong_place import FOOT, KINDS_OF_FEET
+from photostrip.plausibility.finding import Evidence
+from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.strip.absolute_orientation import MOST_OFF, WEAK_LIMIT
+
+LEVEL = 1e-6  # of naming a reading where the control is read as it should be: a run fails because of it
+SEARCH_LEVEL = 0.01  # of taking anything out of sound control
+AS_IT_IS = (0, 1, 2)
+HEIGHTS, ALL = "heights", "all"
+UNITS = "bring heights and plan into one unit, or name a crs with the right unit of height"
+COLUMNS = "put `control.axes` into the order of the columns"
+HEIGHT = 2
+LEAST_FULL = 3  # full points that always fit
+LEAST_HEIGHTS = 2  # that are the same by chance
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A way to read given coordinates, east, north, up, from those that are written."""
+
+    code: str
+    text: str
+    fix: str
+    order: tuple[int, int, int] = AS_IT_IS  # columns that are east, north, up
+    factor: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of them; a negative one turns them over about their middle
+    rows: int = 0  # by which the coordinates are moved down against the ids
+    of_list: bool = False  # whether one list is read so, and not all of them
+    without: str = ""  # coordinates that lie beside the others: ``HEIGHTS`` of a list, or ``ALL``
+    distance: float = 1.0  # by which the principal distance is multiplied
+
+    def __call__(self, control: ControlPoints, number: int | None = None) -> ControlPoints:
+        """Read all given points, or those of one list."""
+        rows = np.arange(len(control)) if number is None else np.flatnonzero(control.frame == number)
+        source, order = np.roll(rows, self.rows), list(self.order)
+        columns = {}
+        for name in ("enu", "use", "sigma"):
+            columns[name] = np.array(getattr(control, name))
+            columns[name][rows] = columns[name][source][:, order]
+        factor, some = np.array(self.factor), columns["enu"][rows]
+        middle = _medians(some, columns["use"][rows])
+        columns["enu"][rows] = np.where(factor < 0, middle + factor * (some - middle), factor * some)
+        return replace(control, **columns)
+
+    def beside(self, control: ControlPoints, number: int | None) -> Flags:
+        """Coordinates (n, 3) that lie beside the others; of points given in height only, where it is no list."""
+        inside = ~control.use[:, :HEIGHT].any(axis=1) if number is None else control.frame == number
+        axes = np.array([self.without == ALL, self.without == ALL, bool(self.without)])
+        return np.asarray(np.logical_and.outer(inside, axes), bool)
+
+    def as_written(self, columns: Floats, *, signed: bool) -> Floats:
+        """Bring values (n, 3) along east, north, up as they are read back to the columns as they are written."""
+        result = np.empty_like(columns)
+        result[:, list(self.order)] = columns / (self.factor if signed else np.abs(self.factor))
+        return result
+
+
+def _columns(*order: int) -> Reading:
+    names = ", ".join(GROUND_AXES[each] for each in order)
+    return Reading("P401", f"what is called east, north, up is {names}", COLUMNS, order=(order[0], order[1], order[2]))
+
+
+def _heights(factor: float, text: str) -> Reading:
+    return Reading("P405", text, UNITS, factor=(1.0, 1.0, factor))
+
+
+AS_GIVEN = Reading("", "", "")
+MIRRORED = Reading("P401", "the control is left-handed: its axes are exchanged or one of them counts backwards",
+                   f"{COLUMNS}, [north, east, up] where x points north", factor=(1.0, -1.0, 1.0))  # fmt: skip
+READINGS = (
+    MIRRORED,
+    _columns(1, 0, 2),
+    _columns(2, 1, 0),
+    _columns(0, 2, 1),
+    _columns(1, 2, 0),
+    _columns(2, 0, 1),
+    Reading("P401", "heights are counted downwards", "give heights, positive upwards", factor=(1.0, 1.0, -1.0)),
+    _heights(FOOT, "heights in feet, plan in metres"),
+    _heights(1 / FOOT, "heights in metres, plan in feet"),
+    _heights(1e-3, "heights in millimetres, plan in metres"),
+    _heights(1e-2, "heights in centimetres, plan in metres"),
+    _heights(1e3, "heights in kilometres, plan in metres"),
+    Reading("P409", "the coordinates are moved down by one row", "put the ids into the rows of their coordinates",
+            rows=1),
+    Reading("P409", "the coordinates are moved up by one row", "put the ids into the rows of their coordinates",
+            rows=-1),
+    Reading("P403", "metres read as feet", "name the right unit: the crs counts in feet, the numbers are metres",
+            factor=(1 / FOOT, 1 / FOOT, 1 / FOOT), of_list=True),
+    Reading("P403", "feet read as metres",
+            f"name the right unit: a crs in feet, or metres in the table; {KINDS_OF_FEET}",
+            factor=(FOOT, FOOT, FOOT), of_list=True),
+    Reading("P105", "", "", distance=0.1),
+    Reading("P105", "", "", distance=10.0),
+    Reading("P404", "", "", without=HEIGHTS),
+    Reading("P404", "", "", of_list=True, without=HEIGHTS),
+    Reading("P407", "", "", of_list=True, without=ALL),
+)  # fmt: skip
+"""Ways to read given coordinates that are wrong as a whole; of two that fit alike the first is named."""
+
+
+class Better(NamedTuple):
+    """A reading under which a strip fits its control."""
+
+    reading: Reading
+    number: int | None  # list that is read so; None for all
+    laid: OnControl
+
+
+def find_reading(
+    held: HeldStrip, control: ControlPoints, frames: Sequence[GroundFrame], as_given: OnControl | None
+) -> Better | None:
+    """Find the reading under which a strip fits its control better than as it is given; None without one."""
+    if as_given is not None and as_given.fits and not as_given.found.out:
+        return None
+    lists, sizes = np.unique(control.frame[held.given], return_counts=True)
+    smaller = lists[np.argsort(sizes, kind="stable")][:-1].tolist()  # against a majority nothing is said
+    ways = [(each, number) for each in READINGS for number in (smaller if each.of_list else [None])]
+    best, least = None, np.inf
+    if as_given is not None:
+        least = _cost(as_given, AS_GIVEN) - np.log(len(ways) / LEVEL)
+    for reading, number in ways:
+        strip = held
+        if reading.distance != 1.0:
+            formed = None if as_given is not None and as_given.fits else held.at_distance(reading.distance)
+            if formed is None:
+                continue
+            strip = formed
+        aside = reading.beside(control, number)
+        tried = strip.read(reading(control, number), frames, aside)
+        if tried is None or not tried.fits:
+            continue
+        cost = _cost(tried, reading, int(aside[held.given].any(axis=0).sum()), number)
+        if cost < least:
+            best, least = Better(reading=reading, number=number, laid=tried), cost
+    return best
+
+
+def _cost(laid: OnControl, reading: Reading, axes: int = 0, number: int | None = None) -> float:
+    """Minus the logarithm of the likelihood of the coordinates as they are written, but for a constant.
+
+    What was taken out is as likely as a single test of a search demands; so is one unknown for each of the axes along
+    which something lies beside the others.
+    """
+    place, points = laid.place.coordinates, laid.points
+    read = np.ones(len(points), bool) if number is None else points.frame == number
+    factor = np.where(read[:, None], np.abs(reading.factor), 1.0)[place.point, place.axis]
+    each = np.log(len(place.point) / SEARCH_LEVEL)
+    unknown = len(laid.found.out) + axes
+    size = np.linalg.slogdet(laid.place.joint_covariance)[1]
+    return float(laid.left.squares / 2.0 + size / 2.0 - np.log(factor).sum() + each * unknown)
+
+
+def named(better: Better, as_given: OnControl | None, held: HeldStrip, *, axes_are_right: bool | None) -> Finding:
+    """Name the reading under which a strip fits its control (P103, P105, P401, P403, P404, P405, P407, P409)."""
+    reading, number, tried = better
+    strip = held.stage.strip.id
+    if reading.without:
+        return _beside(better, strip)
+    numbers: Evidence = {"variance_factor": tried.variance, "coordinates": tried.found.whole.coordinates}
+    if as_given is not None:
+        numbers["variance_factor_as_given"] = as_given.variance
+    key = "control" if number is None else f"control[{number}]"
+    before = "cannot be laid on its control as it is given"
+    if as_given is not None:
+        before = f"is {_size(as_given):.3g} m off its control as it is given"
+    head = f"strip {strip} {before}, and {_size(tried):.2g} m if"
+    if reading.distance != 1.0 and isinstance(held.stage, FormedPhotos):
+        return _of_distance(held.stage.strip, reading.distance, head, numbers)
+    if reading is MIRRORED and axes_are_right:
+        message = (
+            f"{head} it is mirrored; the control lies where its coordinate reference system is, so the image "
+            "coordinates are mirrored: y counted the other way, x and y exchanged, or negatives read as positives"
+        )
+        fix = "correct `observations.y_axis`, the columns x and y, or the side from which the photos were measured"
+        return found("P103", message, fix, numbers, strips=(strip,), key="observations.y_axis")
+    message = f"{head} {reading.text}"
+    if reading is MIRRORED and axes_are_right is None:
+        message += "; or else the image coordinates are mirrored"
+    points = () if number is None else tried.points.take(tried.points.frame == number).ids
+    return found(reading.code, message, reading.fix, numbers, points=points, strips=(strip,), key=key)
+
+
+def find_distance(
+    strip: Strip, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> list[Finding]:
+    """Name the principal distance with which alone a strip can be formed, and fits its control."""
+    for reading in READINGS:
+        if reading.distance == 1.0:
+            continue
+        stage = evidence.form(evidence.at_distance(strip, reading.distance), observations, settings)
+        laid = None if stage is None else HeldStrip.of(stage, control, settings).read(control, frames)
+        if laid is not None and laid.fits:
+            head = f"strip {strip.id} cannot be formed, and is {_size(laid):.2g} m off its control if"
+            return [_of_distance(strip, reading.distance, head, {"variance_factor": laid.variance})]
+    return []
+
+
+def _of_distance(strip: Strip, factor: float, head: str, numbers: Evidence) -> Finding:
+    """Name a principal distance off by a power of ten (P105), or images that are, whose size nobody knows (P101)."""
+    camera = strip.camera
+    would_fit = camera.principal_distance * factor
+    message = f"{head} the principal distance is {would_fit:g} mm; {camera.principal_distance:g} mm is given"
+    if camera.format is not None:
+        return other_distance(camera, would_fit, message, FIX, numbers, (strip.id,))
+    message += f"; or the image coordinates are {1 / factor:g} times as large"
+    fix = f"correct `observations.unit`, or the principal distance: {FIX}"
+    return found("P101", message, fix, numbers, strips=(strip.id,), key="observations.unit")
+
+
+def _beside(better: Better, strip: str) -> Finding:
+    """Say how what lies beside the other control lies there (P404, P407)."""
+    reading, number, laid = better
+    off, sigma = laid.off
+    inside = np.flatnonzero(reading.beside(laid.points, number).any(axis=1))
+    shift, spread = (_medians(each[inside], np.isfinite(each[inside])) for each in (off, sigma))
+    shifted = ShiftedList(-1 if number is None else number, shift, spread, gain=float("nan"))
+    return shifted_list(shifted, laid.points.take(inside), f"strip {strip}", (strip,), "")
+
+
+def _medians(values: Floats, known: Flags) -> Floats:
+    """Medians (3,) of the known ones of values (n, 3); NaN of none."""
+    parts = (column[use] for column, use in zip(values.T, known.T, strict=True))
+    return np.array([np.median(part) if len(part) else np.nan for part in parts])
+
+
+def _size(laid: OnControl) -> float:
+    """Median misclosure of the control, metres."""
+    return float(np.median(np.abs(laid.found.whole.w)))
+
+
+def of_whole_control(held: HeldStrip, as_given: OnControl | None, control: ControlPoints) -> list[Finding]:
+    """Say that a strip fits its control under no reading (P409), or that all its heights are the same (P410)."""
+    strip = held.stage.strip.id
+    fix = "do its ids and coordinates belong to these photos, and to the points that were measured?"
+    if as_given is None:
+        full = control.use[held.given].all(axis=1)
+        shown = held.stage.formed.xyz[held.rows[full]]
+        if len(shown) <= LEAST_FULL or collinearity(shown) < WEAK_LIMIT**2:
+            return []  # it may be too little
+        message = f"strip {strip} cannot be laid on its control, however that is read"
+        return [found("P409", message, fix, {"points": len(shown)}, strips=(strip,), key="control")]
+    if as_given.fits:
+        return []
+    points = as_given.counted.control
+    heights = points.enu[points.use[:, HEIGHT], HEIGHT]
+    if len(heights) > LEAST_HEIGHTS and np.ptp(heights) == 0.0:
+        message = (
+            f"strip {strip}: all {len(heights)} heights of the control are {heights[0]:g} m, and the photos show "
+            "another relief"
+        )
+        numbers: Evidence = {"height_m": float(heights[0]), "points": len(heights)}
+        cure = "give the heights, or `use: xy` where they are not known"
+        return [found("P410", message, cure, numbers, strips=(strip,), key="control")]
+    placed, off = as_given.counted.placed, _size(as_given)
+    half = float(np.ptp(placed, axis=0).max()) / 2.0
+    if off <= MOST_OFF * half:
+        return []
+    message = (
+        f"strip {strip} does not fit its control, however it is laid on it: half of the control coordinates are "
+        f"more than {off:.4g} m off, and the control reaches {half:.4g} m from its middle"
+    )
+    numbers = {"misclosure_m": off, "extent_of_control_m": half}
+    return [found("P409", message, fix, numbers, strips=(strip,), key="control")]
