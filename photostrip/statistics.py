@@ -14,7 +14,7 @@ from photostrip.arrays import Floats, Numbers
 # five questions has the same share of it, and the tests of a question share that.
 SECOND_LOOK = 0.01
 TEST_LEVEL = SECOND_LOOK / 5
-HARDLY = 0.05  # probability below which the points that were not seen agree hardly, though the verdict lets them pass
+SLIGHTLY = 0.05  # probability below which points that were not seen speak against a result that the verdict lets pass
 SIGMA_FROM_MEDIAN = 1.4826  # standard deviation over the median of |x|, of a normal distribution
 
 

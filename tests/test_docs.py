@@ -139,6 +139,22 @@ def test_an_unlisted_source_is_found(source: str, *, wrong: bool) -> None:
 # ------------------------------------------------------------------------------------------- the tool can fail
 
 
+def test_a_table_that_the_program_makes_otherwise_is_a_fault_and_is_renewed(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# A page\n\n<!-- table: findings -->\n\n| code |\n| --- |\n| P999 |\n\nThe end.\n", encoding="utf-8"
+    )
+    for name in ("before", "renewing", "after"):
+        (tmp_path / name).mkdir()
+    assert len(faults_of_page(page, tmp_path / "before")) == 1
+    page.write_text(renewed(page, tmp_path / "renewing"), encoding="utf-8")
+    assert faults_of_page(page, tmp_path / "after") == []
+    text = page.read_text(encoding="utf-8")
+    assert text.endswith("\n\nThe end.\n")
+    assert "P999" not in text
+    assert "| P101 |" in text
+
+
 @pytest.mark.parametrize(
     ("expected", "actual", "same"),
     [

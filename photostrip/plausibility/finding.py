@@ -15,50 +15,149 @@ WARNING = "warning"
 
 class Kind(NamedTuple):
     title: str  # what it is, in a few words
+    shows: str  # how it shows
     severity: str  # ``"error"``: a result made from such data is wrong as a whole; ``"warning"``: some of it may be
 
 
 KINDS: dict[str, Kind] = {
-    "P101": Kind("image coordinates in another unit, or from another origin", ERROR),
-    "P102": Kind("one photo in another unit than its neighbours", ERROR),
-    "P103": Kind("image coordinates mirrored", ERROR),
-    "P104": Kind("one photo mirrored against its neighbours", ERROR),
-    "P105": Kind("principal distance off by a factor", ERROR),
-    "P106": Kind("fiducial marks measured in another unit", WARNING),
-    "P107": Kind("another principal distance fits better", WARNING),
-    "P108": Kind("standard deviations in another unit", WARNING),
-    "P109": Kind("image coordinates of one photo shifted or enlarged", WARNING),
-    "P110": Kind("lens distortion that is not stated", WARNING),
-    "P111": Kind("another principal point fits better", WARNING),
-    "P112": Kind("images longer or shorter one way than the other", WARNING),
-    "P201": Kind("photos out of flight order", ERROR),
-    "P202": Kind("neighbouring photos that do not overlap", ERROR),
-    "P203": Kind("the same photo twice", ERROR),
-    "P204": Kind("perspective centres below the ground", ERROR),
-    "P205": Kind("perspective centre at another height", WARNING),
-    "P206": Kind("base of another length", WARNING),
-    "P207": Kind("base in another direction", WARNING),
-    "P208": Kind("camera positions that share an error", WARNING),
-    "P301": Kind("one id for two points", WARNING),
-    "P302": Kind("two ids for one point", WARNING),
-    "P303": Kind("point ids of a photo that do not go with its neighbours", ERROR),
-    "P304": Kind("a point at two places in two strips", WARNING),
-    "P401": Kind("control axes exchanged or left-handed", ERROR),
-    "P402": Kind("control outside its coordinate reference system", ERROR),
-    "P403": Kind("control in feet", ERROR),
-    "P404": Kind("heights of two kinds", ERROR),
-    "P405": Kind("plan and height in different units", ERROR),
-    "P406": Kind("slip of a digit", WARNING),
-    "P407": Kind("control lists in different frames", ERROR),
-    "P408": Kind("given points exchanged", WARNING),
-    "P409": Kind("control of other points", ERROR),
-    "P410": Kind("the same coordinates for several points", WARNING),
-    "P411": Kind("check points that share a shift", WARNING),
-    "P501": Kind("control at one end of the strip", WARNING),
-    "P502": Kind("control on one line", WARNING),
-    "P503": Kind("points far beyond the control", WARNING),
-    "P601": Kind("start angles in another unit", ERROR),
-    "P602": Kind("start angles in another system", ERROR),
+    "P101": Kind(
+        "image coordinates in another unit, or from another origin",
+        "fewer than 98 % of them lie between 0.12 and 1.2 of half the format",
+        ERROR,
+    ),
+    "P102": Kind(
+        "one photo in another unit than its neighbours",
+        "its common points lie four times farther apart, or more",
+        ERROR,
+    ),
+    "P103": Kind(
+        "image coordinates mirrored",
+        "the strip fits its control only so: x and y exchanged, y down, a negative",
+        ERROR,
+    ),
+    "P104": Kind("one photo mirrored against its neighbours", "it fits its neighbours only as a mirror image", ERROR),
+    "P105": Kind(
+        "principal distance off by a factor",
+        "format, heights or y parallaxes ask for another one",
+        ERROR,
+    ),
+    "P106": Kind(
+        "fiducial marks measured in another unit", "points come out right, their standard deviations do not", WARNING
+    ),
+    "P107": Kind(
+        "another principal distance fits better",
+        "all control asks for it, by less than 3 % (more: P105)",
+        WARNING,
+    ),
+    "P108": Kind(
+        "standard deviations in another unit", "image or check coordinates are 30 times better than stated", WARNING
+    ),
+    "P109": Kind(
+        "image coordinates of one photo shifted or enlarged",
+        "without that its points agree with the photos beside it",
+        WARNING,
+    ),
+    "P110": Kind("lens distortion that is not stated", "photos and what is given agree only with it", WARNING),
+    "P111": Kind(
+        "another principal point fits better",
+        "the same, or several photos ask for shifts of their own",
+        WARNING,
+    ),
+    "P112": Kind(
+        "images longer or shorter one way than the other",
+        "the same: film, scanner, pixels",
+        WARNING,
+    ),
+    "P201": Kind("photos out of flight order", "common points put them into another order, which is named", ERROR),
+    "P202": Kind(
+        "neighbouring photos that do not overlap", "two that follow each other share fewer than two points", ERROR
+    ),
+    "P203": Kind("the same photo twice", "two photos stand at one place, within 3 % of the usual base", ERROR),
+    "P204": Kind(
+        "perspective centres below the ground",
+        "below its points, or below the control",
+        ERROR,
+    ),
+    "P205": Kind(
+        "perspective centre at another height",
+        "20 % of the flying height off the line of its neighbours; P205 to P207 only beyond the scatter of the flight",
+        WARNING,
+    ),
+    "P206": Kind(
+        "base of another length",
+        "1.75 times or half as long as those beside it",
+        WARNING,
+    ),
+    "P207": Kind("base in another direction", "it turns by 30 degrees", WARNING),
+    "P208": Kind(
+        "camera positions that share an error",
+        "offset, drift, or positions of other photos",
+        WARNING,
+    ),
+    "P301": Kind("one id for two points", "its rays, or two strips, put it at two places", WARNING),
+    "P302": Kind("two ids for one point", "both lie at one place, and no photo shows them as two", WARNING),
+    "P303": Kind(
+        "point ids of a photo that do not go with its neighbours",
+        "no plane similarity brings them together; a row moved is named",
+        ERROR,
+    ),
+    "P304": Kind(
+        "a point at two places in two strips",
+        "one strip has two rays only: two points, or an error along the base",
+        WARNING,
+    ),
+    "P401": Kind(
+        "control axes exchanged or left-handed",
+        "the strip fits only mirrored, or the area of the crs only exchanged",
+        ERROR,
+    ),
+    "P402": Kind(
+        "control outside its coordinate reference system",
+        "far outside, and another reading lies inside: a digit, a zone, a hemisphere",
+        ERROR,
+    ),
+    "P403": Kind("control in feet", "in feet it falls into the area, or two lists differ by 3.28", ERROR),
+    "P404": Kind("heights of two kinds", "two lists, or full and height points, differ by one height", ERROR),
+    "P405": Kind(
+        "plan and height in different units",
+        "3.28, 0.305, 100, 1000 or 0.001 times the heights of the strip",
+        ERROR,
+    ),
+    "P406": Kind("slip of a digit", "with a digit changed, added, left out or exchanged it fits", WARNING),
+    "P407": Kind("control lists in different frames", "one list lies beside the other by one shift", ERROR),
+    "P408": Kind("given points exchanged", "two points fit with each other's coordinates", WARNING),
+    "P409": Kind(
+        "control of other points",
+        "half of it is off by a tenth of its spread; a row moved is named",
+        ERROR,
+    ),
+    "P410": Kind(
+        "the same coordinates for several points",
+        "photos show the points apart, or relief",
+        WARNING,
+    ),
+    "P411": Kind(
+        "check points that share a shift",
+        "beside the result by one shift: datum, antenna, kind of height",
+        WARNING,
+    ),
+    "P501": Kind("control at one end of the strip", "within 40 % of the length", WARNING),
+    "P502": Kind(
+        "control on one line",
+        "within 8 % of half the breadth: heights at the edges are twelve times worse",
+        WARNING,
+    ),
+    "P503": Kind(
+        "points far beyond the control",
+        "by half of what the control spans, and a base",
+        WARNING,
+    ),
+    "P601": Kind("start angles in another unit", "they fit in gons, degrees or radians only", ERROR),
+    "P602": Kind(
+        "start angles in another system",
+        "they fit in another order or sense, turned by 90 degrees, or inverted",
+        ERROR,
+    ),
 }
 """Every kind of mistake by its code. Codes are never given to another mistake, and never reused."""
 

@@ -16,7 +16,7 @@ from photostrip.notes import LOST_SAY, Document, before, counted, listed
 from photostrip.result import own_tests
 from photostrip.result.quantities import records
 from photostrip.result.records import column_of
-from photostrip.statistics import HARDLY, SECOND_LOOK, TEST_LEVEL, normal_quantile
+from photostrip.statistics import SECOND_LOOK, SLIGHTLY, TEST_LEVEL, normal_quantile
 
 Tests = Mapping[str, float]  # probabilities by chance, of ``own_tests``
 VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
@@ -243,8 +243,8 @@ def _agreement(document: Document, tests: Tests) -> str:
     said = []
     for name, subject in who.items():
         if (p := tests.get(name)) is not None and p >= _unseen_level(document):
-            hardly = "hardly contradict" if p < HARDLY else "do not contradict"
-            said.append(f"{subject} {hardly} the standard deviations of the points, p = {p:.2g}")
+            against = "speak slightly against" if p < SLIGHTLY else "do not contradict"
+            said.append(f"{subject} {against} the standard deviations of the points, p = {p:.2g}")
     return "; ".join(said)
 
 
@@ -266,7 +266,7 @@ def _unseen_level(document: Document) -> float:
 
     Where something larger than the noise is known to be left out, less evidence is enough.
     """
-    return HARDLY if _known_cause(document) else TEST_LEVEL
+    return SLIGHTLY if _known_cause(document) else TEST_LEVEL
 
 
 def _known_cause(document: Document) -> str:

@@ -30,9 +30,10 @@ from photostrip.network.reliability import CONTROL
 from photostrip.network.self_calibration import Parameter
 from photostrip.notes import Finding, listed
 from photostrip.pipeline.inputs import Inputs
-from photostrip.pipeline.plausibility.shared_control import FIX, other_distance, shifted_list
+from photostrip.pipeline.plausibility.shared_control import other_distance, shifted_list
 from photostrip.pipeline.results import Bundle
 from photostrip.plausibility import found
+from photostrip.plausibility.causes import CAUSES
 from photostrip.plausibility.control.shared_by_control import ShiftedList
 from photostrip.plausibility.finding import Evidence
 
@@ -83,7 +84,7 @@ def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
         f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {camera.principal_distance:g} mm is given. "
         "The adjustment continued with the one that fits"
     )
-    fix = f"{FIX}; if that agrees with what is given, {_decision(['principal_distance'])}"
+    fix = f"{CAUSES[DISTANCE].cure}; if that agrees with what is given, {_decision(['principal_distance'])}"
     numbers: Evidence = {"standard_deviation_mm": parameter.sigma}
     return other_distance(camera, would_fit, message, fix, numbers, [each.id for each in strips])
 
@@ -112,8 +113,7 @@ def _order(error: Hypothesis, bundle: Bundle) -> Finding:
     problem = bundle.screened.problem
     photos = tuple(dict.fromkeys(problem.photo_name(int(each)) for each in problem.positions.photo))
     message = f"the camera positions {ORDERS[error.of]}; the adjustment continued with them so"
-    fix = "put the names of the photos and their positions together anew"
-    return found("P208", message, fix, {"order": error.of}, photos=photos, key="camera_positions")
+    return found("P208", message, CAUSES[ORDER].cure, {"order": error.of}, photos=photos, key="camera_positions")
 
 
 def _lens(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
@@ -126,7 +126,7 @@ def _lens(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
         f"stated: k1 = {k1.value:.3g} mm^-2, {um:+.1f} µm at {radius:.0f} mm from the principal point (standard "
         f"deviation {sigma_um:.1f} µm). {CONTINUED}"
     )
-    fix = f"look at the lens in the calibration certificate of the camera; {_decision(['k1'])}"
+    fix = f"{CAUSES[LENS].cure}; {_decision(['k1'])}"
     numbers: Evidence = {"k1": k1.value, "standard_deviation": k1.sigma, "radius_mm": radius, "distortion_um": um}
     return found("P110", message, fix, numbers, strips=_strips_of(k1.camera, inputs), key="processing.self_calibration")
 
@@ -138,7 +138,7 @@ def _point(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
         f"{x.value:+.3f}, {y.value:+.3f} mm from the given one (standard deviations {x.sigma:.3f}, {y.sigma:.3f} mm). "
         f"{CONTINUED}"
     )
-    fix = f"look at the principal point and the origin of the image coordinates; {_decision(['principal_point'])}"
+    fix = f"{CAUSES[POINT].cure}; {_decision(['principal_point'])}"
     numbers: Evidence = {"x_mm": x.value, "y_mm": y.value, "standard_deviation_mm": max(x.sigma, y.sigma)}
     return found("P111", message, fix, numbers, strips=_strips_of(x.camera, inputs), key="processing.self_calibration")
 
@@ -152,11 +152,7 @@ def _film(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
         f"{abs(percent):.3f} % (standard deviation {sigma:.3f} %) {'longer' if percent > 0 else 'shorter'} along x "
         f"than along y, its axes {abs(turned):.3f}° from a right angle. {CONTINUED}"
     )
-    fix = (
-        "where film shrank or was scanned, measure the fiducial marks; of a digital camera, look at both sides of a "
-        "pixel; "
-        f"{_decision(['affinity', 'shear'])}"
-    )
+    fix = f"{CAUSES[FILM].cure}; {_decision(['affinity', 'shear'])}"
     numbers: Evidence = {"x_over_y_percent": percent, "standard_deviation_percent": sigma, "shear_deg": turned}
     strips = _strips_of(affinity.camera, inputs)
     return found("P112", message, fix, numbers, strips=strips, key="processing.self_calibration")
@@ -174,24 +170,19 @@ def _photo(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
             f"shifted by {x.value:+.2f} mm in x and {y.value:+.2f} mm in y (standard deviations {x.sigma:.2g} and "
             f"{y.sigma:.2g} mm)"
         )
-        fix = (
-            "look at its fiducial marks (do their numbers go with the certificate, was the photo turned on the "
-            "comparator?) and at the order and the signs of its principal point"
-        )
         numbers = {"shift_x_mm": x.value, "shift_y_mm": y.value}
     else:
         (c,) = (each for each in own if each.name == "principal_distance")
         focal = problem.cameras.focal[problem.cameras.of_photo[error.number]]
         scale, sigma = 1.0 + c.value / focal, c.sigma / focal
         how = f"{scale:.4f} times as large as those of its neighbours (standard deviation {sigma:.1g})"
-        fix = "is it from another flight or scan, or taken with another lens?"
         numbers = {"scale": scale, "standard_deviation": sigma}
     message = (
         f"all image coordinates of photo {name} are {how}: once that is taken off, {rays} of its points agree with the "
         "neighbouring photos. The adjustment continued so"
     )
     strips = [strip.id for strip in inputs.strips if name in strip.photos]
-    return found("P109", message, fix, numbers, photos=(name,), strips=strips)
+    return found("P109", message, CAUSES[error.kind].cure, numbers, photos=(name,), strips=strips)
 
 
 def _photos(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Finding:
@@ -253,10 +244,7 @@ def _finding(
             f". Control and camera positions contradict each other: {rejected} of {given} control coordinates were "
             "rejected all the same, and which of the two is right cannot be told"
         )
-    fix = (
-        "look at the datum, the kind of height and the lever arm of the positions, and at the crs of the control; what "
-        f"cannot be put right is taken up by `correction: {correction}`"
-    )
+    fix = f"{CAUSES[error.kind].cure}; what cannot be put right is taken up by `correction: {correction}`"
     if error.of == ALL and len(inputs.strips) > 1:
         fix += " with `group: block`"
     photos = tuple(dict.fromkeys(problem.photo_name(int(each)) for each in problem.positions.photo[rows]))

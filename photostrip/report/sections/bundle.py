@@ -11,6 +11,7 @@ from photostrip.report.page.angles import AngleUnit, angle_unit
 from photostrip.report.page.numbers import fixed, metres, power, short, unit
 from photostrip.report.page.parts import DASH, Facts, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.sections import common_causes
 
 NAMES = {
     "image": "image coordinates",
@@ -38,7 +39,7 @@ def bundle_sections(document: Document, *, everything: bool) -> list[Section]:
     found = [_adjustment(block, angle_unit(document)), _reliability(block)]
     if block["variance_components"]:
         found.append(_components(block["variance_components"]))
-    if block["calibration"] or block["corrections"]:
+    if block["calibration"] or block["corrections"] or block.get("taken_up"):
         found.append(_parameters(block, everything=everything))
     return found
 
@@ -219,7 +220,8 @@ CORRELATIONS = (
 
 def _parameters(block: Document, *, everything: bool) -> Section:
     """Calibration parameters, offsets and drifts, and what is hard to tell apart."""
-    parts: list[Part] = []
+    shared = tuple(common_causes.taken_up(block, NAMED))
+    parts: list[Part] = [Facts(shared)] if shared else []
     if block["calibration"]:
         note = "corrections to the given calibration; p: probability of a value this large by chance"
         parts.append(tabulated(block["calibration"], CALIBRATION, note=note))

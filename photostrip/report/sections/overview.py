@@ -13,6 +13,7 @@ from photostrip.notes import Document, counted, listed
 from photostrip.report.page.layout import lay_out
 from photostrip.report.page.numbers import fixed, metres, micrometres, percent
 from photostrip.report.page.parts import Facts, Section, Words
+from photostrip.report.sections import common_causes
 from photostrip.report.sections.bundle import classical_line
 from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.decisions import chosen_degrees
@@ -62,7 +63,7 @@ def _overview(document: Document, most: int) -> tuple[Section, ...]:
         verdict_section(document, most=most),
         cures_section(document, most),
         _facts("Project", _project(document, min(most, NAMED))),
-        _facts("Stages", _stages(document)),
+        _facts("Stages", _stages(document, min(most, NAMED))),
         control_section(document, everything=False, most=most),
         check_section(document, everything=False, most=most),
         *_left_out(document, most),
@@ -95,8 +96,8 @@ def _project(document: Document, most: int) -> Rows:
     yield from (row for row in counts_rows(document) if row[0] not in SAID_BY_THE_WORST)
 
 
-def _stages(document: Document) -> Rows:
-    """Say in a line for each stage how it went."""
+def _stages(document: Document, most: int) -> Rows:
+    """Say in a line for each stage how it went, and for each cause that the adjustment took up what it is."""
     interior, summary = document["corrections"]["interior"], document["summary"]
     if interior:
         yield "interior orientation", interior_line(interior)
@@ -108,6 +109,8 @@ def _stages(document: Document) -> Rows:
     yield from _degrees(document.get("polynomials", []))
     if "bundle" in document:
         yield "bundle adjustment", _bundle(document["bundle"])
+        yield from common_causes.taken_up(document["bundle"], most)
+        yield from common_causes.estimated(document["bundle"], most)
     if "classical" in document:
         yield "polynomials instead", classical_line(document["classical"])
     if summary["image_rms_um"] is not None:

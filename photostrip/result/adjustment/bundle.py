@@ -12,6 +12,8 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.network import reliability
+from photostrip.network.given_orientations import drift_columns
+from photostrip.network.hypotheses import ALL, DRIFT, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET
 from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import BundleSettings
 from photostrip.notes import Document
@@ -103,6 +105,7 @@ def bundle_of(result: Result) -> Document:
         ),
         "positions": list(_positions(found)),
         "corrections": list(_corrections(found)),
+        "taken_up": list(_taken_up(found)),
     }
     return {"bundle": record("bundle", block)}
 
@@ -178,12 +181,46 @@ def _positions(found: Bundle) -> Iterator[Document]:
 
 
 def _corrections(found: Bundle) -> Iterator[Document]:
-    """Return offsets and drifts of the camera positions of the strips: the last of the common unknowns."""
+    """Return offsets and drifts of the camera positions, group by group: the last of the common unknowns."""
     problem, solution, precision = found.screened.problem, found.screened.solution, found.screened.precision
-    names, given = problem.common_names(), (problem.positions.offset_sigma, problem.positions.drift_sigma)
-    for number in range(len(names) - sum(int((sigma > 0).sum()) for sigma in given), len(names)):
-        sigma = float(np.sqrt(precision.common[number, number])) * found.unit
-        yield {"name": names[number], "value": solution.common[number], "sigma": sigma}
+    given, names = problem.positions, problem.common_names()
+    offset, drift = drift_columns(given, len(found.parameters))
+    sigma = np.sqrt(np.diag(precision.common)) * found.unit
+    strips = {strip.strip.id for strip in found.start.strips}
+    for group in range(len(given.offset_sigma)):
+        name, time = problem.group_ids[group], given.time[given.group == group]
+        for kind, columns in ((OFFSET, offset[group]), (DRIFT, drift[group])):
+            for axis in np.flatnonzero(columns >= 0).tolist():
+                number = int(columns[axis])
+                value, length = float(solution.common[number]), float(np.ptp(time)) if kind == DRIFT else 1.0
+                yield {
+                    "name": names[number],
+                    "group": f"strip {name}" if name in strips else name.removeprefix("of "),
+                    "kind": kind,
+                    "axis": problem.position_axes[axis],
+                    "value": value,
+                    "sigma": float(sigma[number]),
+                    "whole": value * length,
+                    "whole_sigma": float(sigma[number]) * length,
+                }
+
+
+def _taken_up(found: Bundle) -> Iterator[Document]:
+    """Return what the search took up as common to many observations, in its order, and the adjustment went on with."""
+    problem = found.screened.problem
+    for each in found.screened.common:
+        of = "the block" if each.of == ALL else "each group" if each.kind in {OFFSET, DRIFT} else each.of
+        if each.kind == LIST:
+            of = f"control[{each.number}]"
+        elif each.kind in OF_CAMERAS:
+            of = problem.camera_ids[each.number]
+        elif each.kind in OF_PHOTOS:
+            of = problem.photo_name(each.number)
+        shift, sigma = (
+            dict(zip(GROUND_AXES, size or (np.nan,) * len(GROUND_AXES), strict=True))
+            for size in (each.shift, each.sigma)
+        )
+        yield {"cause": each.kind, "of": of, "rivals": list(each.rivals), "shift": shift, "sigma": sigma}
 
 
 def image_fit(found: Bundle) -> Document:

@@ -1,0 +1,102 @@
+"""What many observations share: causes that the search took up, and what was estimated of cameras and positions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from heapq import nlargest
+from itertools import groupby
+from operator import itemgetter
+from typing import NamedTuple
+
+from photostrip.notes import Document, counted, listed
+from photostrip.report.page.numbers import metres, short, signed
+
+Row = tuple[str, str]
+
+SENTENCES = {
+    "offset": "offset of the camera positions of {of}",
+    "drift": "drift of the camera positions of {of}",
+    "order of positions": "camera positions {of}",
+    "control list": "without {of}",
+}
+"""How a cause is said; any other is that of a camera or of a photo."""
+OF_POSITIONS = {"offset", "drift"}  # each is the other of fewer or more unknowns: no rivals
+ORDERS = {
+    "reversed": "in reversed order",
+    "forwards": "each given to the photo after its own",
+    "backwards": "each given to the photo before its own",
+}
+
+
+def taken_up(block: Document, most: int) -> Iterator[Row]:
+    """Say in a line for each cause what the project does not state and the adjustment went on with.
+
+    Results of older versions do not know it.
+    """
+    causes: dict[str, list[Document]] = {}
+    for each in block.get("taken_up", []):
+        causes.setdefault(each["cause"], []).append(each)
+    for cause, rows in causes.items():
+        of = listed(map(_whose, rows), most)
+        whose = cause.replace("of a photo", f"of {'photo' if len(rows) == 1 else 'photos'}")
+        text = SENTENCES.get(cause, f"{whose} {of}").format(of=of)
+        alike = OF_POSITIONS if cause in OF_POSITIONS else set()
+        rivals = dict.fromkeys(rival for row in rows for rival in row["rivals"] if rival not in alike)
+        others = listed(f"another {rival}" if rival == cause else rival for rival in rivals)
+        yield "taken up", f"{text}; {others} would explain it nearly as well" if rivals else text
+
+
+def _whose(row: Document) -> str:
+    if row["cause"] == "control list":
+        known = ((axis, step, row["sigma"][axis]) for axis, step in row["shift"].items() if step is not None)
+        steps = ", ".join(f"{signed(step)} m {axis} (σ {metres(sigma)})" for axis, step, sigma in known)
+        return f"{row['of']}, which lies {steps} beside all else"
+    if row["cause"].endswith("photo"):
+        return str(row["of"])
+    return ORDERS.get(row["of"], row["of"]) if row["cause"] in SENTENCES else f"of camera {row['of']}"
+
+
+class _Estimated(NamedTuple):
+    """A camera, or a group of camera positions, and what was estimated of it."""
+
+    text: str
+    size: float  # largest value in units of its standard deviation
+
+
+def estimated(block: Document, most: int) -> Iterator[Row]:
+    """Say in a line for each camera and group of positions what was estimated; of many the most significant."""
+    found = [*_cameras(block["calibration"]), *_positions(block["corrections"])]
+    for place in sorted(nlargest(most, range(len(found)), key=lambda place: found[place].size)):
+        yield "estimated", found[place].text
+    if len(found) > most:
+        more = counted(len(found) - most, "more camera or group of positions", "more cameras or groups of positions")
+        yield "estimated", f"{more}, less significant: --section bundle"
+
+
+def _cameras(rows: Sequence[Document]) -> Iterator[_Estimated]:
+    for camera, group in groupby(rows, key=itemgetter("camera")):
+        own = list(group)
+        said = (f"{each['parameter'].replace('_', ' ')} {_sized(each)}" for each in own)
+        yield _Estimated(f"camera {camera}: {', '.join(said)}", _largest(own, "value", "sigma"))
+
+
+def _sized(row: Document) -> str:
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
+    return f"{short(row['value'])}{unit} (σ {short(row['sigma'], 2)})"
+
+
+def _positions(rows: Sequence[Document]) -> Iterator[_Estimated]:
+    """Results of older versions do not say of which group a correction is."""
+    known = (row for row in rows if "group" in row)
+    for group, corrections in groupby(known, key=itemgetter("group")):
+        own = list(corrections)
+        said = []
+        for kind, parts in groupby(own, key=itemgetter("kind")):
+            steps = ", ".join(f"{signed(r['whole'])} m {r['axis']} (σ {metres(r['whole_sigma'])})" for r in parts)
+            said.append(f"from the first to the last {steps} more" if kind == "drift" else steps)
+        text = f"camera positions of {group}: added {'; '.join(said)}"
+        yield _Estimated(text, _largest(own, "whole", "whole_sigma"))
+
+
+def _largest(rows: Iterable[Document], value: str, sigma: str) -> float:
+    return max(abs(row[value]) / row[sigma] if row[sigma] else float("inf") for row in rows)
