@@ -291,7 +291,10 @@ def _given_axes(problem: BundleProblem, number: int) -> Numbers:
 
 
 def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
-    """Give a problem the unknowns of a hypothesis; a control list that is shifted is left out as far as it is off."""
+    """Give a problem the unknowns of a hypothesis; a control list that is shifted is left out as far as it is off.
+
+    What is given up again is not undone: the given problem takes up all the others anew.
+    """
     positions, cameras = problem.positions, problem.cameras
     if hypothesis.kind == LIST:
         off = np.abs(hypothesis.shift) > SHOWN_SIGMAS * np.array(hypothesis.sigma)
@@ -356,25 +359,10 @@ def impossible(solution: BundleSolution) -> bool:
     return bool(beside or (problem.cameras.focal + values[:, PRINCIPAL_DISTANCE] <= 0.0).any())
 
 
-def given_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
-    """Take the unknowns of an error of a camera, or of a photo, back: it is as it is given."""
-    camera, columns = place(problem, hypothesis)
-    sigma = np.array(problem.cameras.sigma, float)
-    sigma[camera, columns] = 0.0
-    return replace(problem, cameras=replace(problem.cameras, sigma=sigma if sigma.any() else None))
-
-
-def log_probabilities(
-    problem: BundleProblem, solution: BundleSolution, cofactors: Cofactors, unit: float, taken: Sequence[Hypothesis]
-) -> list[float]:
-    """Logarithm of the probability of such values of the parameters of each error of a camera, if they were zero."""
-    found = []
-    for each in taken:
-        own = problem.cameras.unknown[place(problem, each)]
-        value = solution.common[own]
-        squares = float(value @ np.linalg.solve(cofactors.common[np.ix_(own, own)], value)) / unit**2
-        found.append(log_probability(squares, len(own)))
-    return found
+def log_probability_again(without: BundleSolution, hypothesis: Hypothesis, unit: float) -> float:
+    """Logarithm of the probability that what was taken up explains so much by chance, in an adjustment without it."""
+    gain = _gain(next(_explained(without, [hypothesis])))
+    return log_probability(max(gain.squares, 0.0) / unit**2, max(len(gain.value), 1))
 
 
 def _in_order(positions: PositionObservations, order: str) -> PositionObservations:

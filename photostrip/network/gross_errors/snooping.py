@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from photostrip.network.datum import is_free
 from photostrip.network.gross_errors.point_decisions import cause_of_all
 from photostrip.network.gross_errors.ray_decisions import Adjusted, RayDecisions, decide_rays
 from photostrip.network.gross_errors.ray_log import ROBUST, START, RayLog, WrongRays
-from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OF_PHOTOS, OFFSET, Hypothesis, Likely
+from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER, Hypothesis, Likely
 from photostrip.network.problem import BundleProblem, PositionObservations
 from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, Limit
 from photostrip.network.selection import Selection, restarted, selected, supported
@@ -130,8 +130,8 @@ def _searched(search: _Search, begin: Selection) -> ScreenedBundle:
     done = search.clean(search.with_doubted_control(chosen))
     while (more := search.fitting(done)) is not None:  # a point comes back once only
         done = search.clean(more)
-    while search.put_back(done):
-        done = search.clean(supported(search.problem, done.selection))
+    while (less := search.put_back(done)) is not None:
+        done = search.clean(supported(search.problem, less))
     held = tuple(each for each in search.tested(done)[1] if search.holds(each))
     done = replace(done, rejections=tuple(search.log(done)), held=held)
     return replace(done, rounds=search.rounds, common=tuple(search.common))
@@ -150,7 +150,8 @@ class _Search:
         rough: bool,
         refused: Sequence[Hypothesis] = (),
     ) -> None:
-        self.problem, self.settings, self.rough = problem, settings, rough
+        self.given = self.problem = problem
+        self.settings, self.rough = settings, rough
         images = problem.images
         self.by_point = np.lexsort((images.photo, images.point))
         self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
@@ -314,34 +315,71 @@ class _Search:
         self.common.append(likely.hypothesis)
         return found
 
-    def put_back(self, done: ScreenedBundle) -> bool:
-        """Give up errors of cameras that mean nothing in the end; whether there were any."""
-        errors = [each for each in self.common if hypotheses.of_images(each)]
-        found = hypotheses.log_probabilities(done.problem, done.solution, done.precision, done.limit.unit, errors)
-        gone = [each for each, log_p in zip(errors, found, strict=True) if log_p > self._level]
-        for each in gone:
-            self.common.remove(each)
-            self.problem = hypotheses.given_up(self.problem, each)
-            self.refused.append(each)
-        return bool(gone)
+    def put_back(self, done: ScreenedBundle) -> Selection | None:
+        """Give up what the end supports least of all that was taken up; None where it supports everything.
+
+        One at a time: of two that explain the same each is needless beside the other.
+        """
+        log_p, gone = max(
+            ((self._asked_again(done, each), n) for n, each in enumerate(self.common)), default=(-np.inf, 0)
+        )
+        if log_p <= self._level:
+            return None
+        self.refused.append(self.common.pop(gone))
+        self.problem = self._with(self.common)
+        return self._counting(done.selection)
+
+    def _with(self, common: Sequence[Hypothesis]) -> BundleProblem:
+        """Let what is given take up some hypotheses, and start where the last adjustment ended."""
+        return replace(reduce(hypotheses.taken_up, common, self.given), start=self.problem.start)
+
+    def _counting(self, selection: Selection) -> Selection:
+        """Return a selection with all control that was put in and that nothing has rejected: a list comes back so."""
+        return replace(selection, control=self.control)
+
+    def _asked_again(self, done: ScreenedBundle, hypothesis: Hypothesis) -> float:
+        """Logarithm of the probability that a hypothesis explains so much by chance beside all the others at the end.
+
+        An adjustment without it is asked as the search was. It stays where there is none; an offset stays within a
+        drift, which is asked about first.
+        """
+        others = [each for each in self.common if each is not hypothesis]
+        if hypothesis.kind == OFFSET and any(each.kind == DRIFT for each in others):
+            return -np.inf
+        without = self._with(others)
+        selection = supported(without, self._counting(done.selection))
+        try:
+            if hypothesis.kind == ORDER:
+                return -np.inf if self._order(without, selection)[1] == hypothesis else 0.0
+            solution = solve(selected(without, selection))
+        except GeometryError:
+            return -np.inf
+        return hypotheses.log_probability_again(solution, hypothesis, done.limit.unit)
 
     def _reordered(self, selection: Selection) -> bool:
         """Give photos the positions of other rows, where an adjustment without any of them says so; asked once."""
         used = selection.positions.any()
         if self.order_asked or not used or is_free(replace(self.problem, positions=PositionObservations())):
             return False
-        self.order_asked, before = True, self.problem
+        self.order_asked = True
         try:
-            free = self.adjust(supported(before, replace(selection, positions=np.zeros_like(selection.positions))))
+            solution, found = self._order(self.problem, supported(self.problem, selection))
         except GeometryError:
-            self.problem = before
             return False
-        found = hypotheses.order_of_positions(free.solution, free.precision, before.positions, self.settings.level)
-        if found is None:
-            self.problem = before
-            return False
-        self._take_up(found)
-        return True
+        if found is not None:
+            self.problem = restarted(self.problem, solution)
+            self._take_up(found)
+        return found is not None
+
+    def _order(self, problem: BundleProblem, selection: Selection) -> tuple[BundleSolution, Hypothesis | None]:
+        """Ask an adjustment in which positions take no part in which order they are those of the photos."""
+        bare = selected(problem, replace(selection, positions=np.zeros_like(selection.positions)))
+        if is_free(bare):
+            raise GeometryError("nothing but camera positions gives a datum", code="bundle-rank")
+        solution = solve(bare)
+        self.rounds += 1
+        positions, level = problem.positions, self.settings.level
+        return solution, hypotheses.order_of_positions(solution, cofactors_of(solution), positions, level)
 
     def _log_p(self, done: ScreenedBundle, worst: list[Rejection] | WrongRays) -> float:
         """Logarithm of the probability that the worst single observation, ray or coordinate, is so bad by chance."""
