@@ -168,13 +168,15 @@ def likeliest(
 
     unit: standard deviation of unit weight in force.
     level: as of ``most_likely``.
-    cameras: whether cameras, and photos for themselves, may be asked about.
+    cameras: whether cameras may be taken up. A single photo, which is no matter of calibration, may be in any case, but
+        not for what its camera explains better.
     refused: what has been taken up in vain.
     """
     problem, in_vain = solution.prepared.problem, {each.name for each in refused}
-    lines = [line for line in HYPOTHESES if line not in OF_IMAGES or (cameras and not problem.of_models)]
+    by_photos = not (solution.rough or problem.of_models)
+    lines = [line for line in HYPOTHESES if by_photos or line not in OF_IMAGES]
     asked = [[each for each in line(solution) if each.name not in in_vain] for line in lines]
-    number = sum(len(line) for line in asked) + (len(OF_PHOTOS) * problem.photos if cameras else 0)
+    number = sum(len(line) for line in asked) + (len(OF_PHOTOS) * problem.photos if by_photos else 0)
     found = []
     for line in asked:
         gains = [_gain(each) for each in _explained(solution, line)]
@@ -184,7 +186,11 @@ def likeliest(
         ]
         if likely:
             found.append(most_likely(sorted(likely, key=lambda each: each.freedom), level))  # the plainest first
-    return found
+    if cameras:
+        return found
+    best = min((each.log_p for each in found if each.hypothesis.kind in OF_CAMERAS), default=0.0)
+    others = (each for each in found if each.hypothesis.kind not in OF_CAMERAS)
+    return [each for each in others if each.hypothesis.kind not in OF_PHOTOS or each.log_p < best]
 
 
 def most_likely(found: Sequence[Likely], level: float) -> Likely:

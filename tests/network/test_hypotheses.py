@@ -157,3 +157,23 @@ def test_of_hypotheses_that_explain_alike_the_first_is_taken_and_the_others_are_
     assert (likely.hypothesis.kind, likely.hypothesis.rivals) == (OFFSET, (DISTANCE,))
     found[1] = Likely.of(second, 520.0, 1, 3)
     assert most_likely(found, 0.01).hypothesis == second
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "cannot_be"),
+    [
+        (POINT, (0.9, 0.0), False),
+        (POINT, (1.1, 0.0), True),
+        (POINT, (0.0, -1.1), True),
+        (DISTANCE, (-0.9,), False),
+        (DISTANCE, (-1.1,), True),
+    ],
+)
+def test_no_camera_looks_upwards_or_lies_beside_its_photo(
+    kind: str, values: tuple[float, ...], *, cannot_be: bool
+) -> None:
+    """Of the measured part of a photo, or of the principal distance, so much."""
+    problem = hypotheses.taken_up(with_positions_and_lists(), hypotheses.Hypothesis(kind, 0))
+    whole = problem.cameras.focal[0] if kind == DISTANCE else np.abs(problem.images.xy).max()
+    solution = replace(solve(problem), common=whole * np.array(values))
+    assert hypotheses.impossible(solution) == cannot_be

@@ -265,9 +265,8 @@ class _Search:
 
     def _likeliest(self, done: ScreenedBundle, bound: float) -> list[Likely]:
         """Hypotheses that are likelier than a bound, one of each kind, and than the level."""
-        asked = self.settings.search_cameras and not self.rough
-        unit, level = done.limit.unit, self.settings.level
-        found = hypotheses.likeliest(done.solution, unit, level, cameras=asked, refused=self.refused)
+        cameras, level = self.settings.search_cameras, self.settings.level
+        found = hypotheses.likeliest(done.solution, done.limit.unit, level, cameras=cameras, refused=self.refused)
         return [each for each in found if each.log_p <= min(bound, self._level)]
 
     def _take_up(self, hypothesis: Hypothesis) -> None:
