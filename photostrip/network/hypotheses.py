@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array, hstack
 from scipy.special import fdtrc, gammaincc, gammaln
 
 from photostrip.arrays import Floats, Numbers
@@ -46,7 +45,6 @@ ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group have one of their own
 REVERSED, FORWARDS, BACKWARDS = "reversed", "forwards", "backwards"  # rows of positions that belong to other photos
 ORDERS = REVERSED, FORWARDS, BACKWARDS
-AT_A_TIME = 2  # hypotheses whose columns are worked on together
 ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most in common
 LEAST_SHARE = 1e-6  # of a column that the other unknowns leave to it, for it to be asked about at all
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
@@ -179,7 +177,7 @@ def likeliest(
     number = sum(len(line) for line in asked) + (len(OF_PHOTOS) * problem.photos if by_photos else 0)
     found = []
     for line in asked:
-        gains = [_gain(each) for each in _explained(solution, line)]
+        gains = [_gain(_explained(solution, each)) for each in line]
         likely = [
             Likely.of(_with_shift(each, gain, solution), gain.squares / unit**2, len(gain.value), number)
             for each, gain in zip(line, gains, strict=True)
@@ -237,43 +235,30 @@ def _with_shift(hypothesis: Hypothesis, gain: _Gain, solution: BundleSolution) -
     return replace(hypothesis, shift=tuple(shift.tolist()), sigma=tuple(sigma.tolist()))
 
 
-def _explained(solution: BundleSolution, asked: Sequence[Hypothesis]) -> Iterator[Explained]:
-    """Lay out the normal equations of each hypothesis alone; some at a time, for the sake of memory."""
-    for start in range(0, len(asked), AT_A_TIME):
-        columns = [_columns(solution, each) for each in asked[start : start + AT_A_TIME]]
-        every = Columns(
-            rays=csr_array(hstack([each.rays for each in columns])),
-            control=np.concatenate([each.control for each in columns], axis=2),
-            positions=np.concatenate([each.positions for each in columns], axis=2),
-        )
-        found = solution.factored.explained(every)
-        end = 0
-        for each in columns:
-            own = np.arange(end, end + each.control.shape[2])
-            end += len(own)
-            yield Explained(pull=found.pull[own], normal=found.normal[np.ix_(own, own)], squares=found.squares[own])
+def _explained(solution: BundleSolution, hypothesis: Hypothesis) -> Explained:
+    """Lay out the normal equations of a hypothesis."""
+    return solution.factored.explained(_columns(solution, hypothesis))
 
 
 def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
     """Columns of a hypothesis over all observations, in units of their standard deviations."""
-    prepared = solution.prepared
-    problem, size = prepared.problem, solution.image_residuals.size
-    control, positions = problem.control, problem.positions
+    problem = solution.prepared.problem
+    images, control, positions = problem.images, problem.control, problem.positions
+    none, c = np.zeros(len(images), bool), solution.image_residuals.shape[1]
     if of_images(hypothesis):
-        cameras, kinds = problem.cameras, (OF_CAMERAS | OF_PHOTOS)[hypothesis.kind]
-        of_photo = hypothesis.kind in OF_PHOTOS
-        asked = np.full((len(cameras.focal), len(CALIBRATION)), -1)
-        asked[cameras.of_photo[hypothesis.number] if of_photo else hypothesis.number, kinds] = np.arange(len(kinds))
-        rays = by_calibration(problem, asked, solution.state)
-        if of_photo:
-            own = np.repeat(problem.images.photo == hypothesis.number, 2)
-            rays = csr_array(rays.multiply(own[:, None]))
-        return Columns(rays, np.zeros((len(control), 3, len(kinds))), np.zeros((len(positions), 3, len(kinds))))
+        kinds, of_photo = (OF_CAMERAS | OF_PHOTOS)[hypothesis.kind], hypothesis.kind in OF_PHOTOS
+        camera = int(problem.cameras.of_photo[hypothesis.number]) if of_photo else hypothesis.number
+        of_ray = images.photo if of_photo else problem.cameras.of_photo[images.photo]
+        among = of_ray == hypothesis.number
+        rays = by_calibration(problem, camera, among, kinds, solution.state)
+        k = len(kinds)
+        return Columns(among, rays, np.zeros((len(control), 3, k)), np.zeros((len(positions), 3, k)))
     if hypothesis.kind == LIST:
         axes = _given_axes(problem, hypothesis.number)
         rows = np.where((control.frame == hypothesis.number)[:, None], 1.0 / control.sigma, 0.0)
         shifts = rows[:, :, None] * np.eye(3)[:, axes]
-        return Columns(csr_array((size, len(axes))), shifts, np.zeros((len(positions), 3, len(axes))))
+        k = len(axes)
+        return Columns(none, np.zeros((0, c, k)), shifts, np.zeros((len(positions), 3, k)))
     group = np.where(positions.group >= 0, 0 if hypothesis.of == ALL else positions.group, -1)
     groups = np.unique(group[group >= 0])
     weight = np.where(group >= 0, 1.0, 0.0)[:, None] / positions.sigma
@@ -287,7 +272,8 @@ def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
     ]
     shifts = np.concatenate(parts, axis=2)
     shifts = shifts[:, :, shifts.any(axis=(0, 1))]
-    return Columns(csr_array((size, shifts.shape[2])), np.zeros((len(control), 3, shifts.shape[2])), shifts)
+    k = shifts.shape[2]
+    return Columns(none, np.zeros((0, c, k)), np.zeros((len(control), 3, k)), shifts)
 
 
 def _given_axes(problem: BundleProblem, number: int) -> Numbers:
@@ -367,7 +353,7 @@ def impossible(solution: BundleSolution) -> bool:
 
 def log_probability_again(without: BundleSolution, hypothesis: Hypothesis, unit: float) -> float:
     """Logarithm of the probability that what was taken up explains so much by chance, in an adjustment without it."""
-    gain = _gain(next(_explained(without, [hypothesis])))
+    gain = _gain(_explained(without, hypothesis))
     return log_probability(max(gain.squares, 0.0) / unit**2, max(len(gain.value), 1))
 
 
