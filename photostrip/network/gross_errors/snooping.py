@@ -35,7 +35,7 @@ from photostrip.strip.gross_errors.pairs.pair_search import AMPLE, OUT_TO_ONE_MO
 
 RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
 PHOTOS_ENOUGH = 3  # on which a point is among the worst, for it to go, whatever more it is on
-RAYS_TO_DECIDE_AGAIN = 100  # of a photo, for each by which it may change before its points are decided on again
+RAYS_TO_DECIDE_AGAIN = 100  # of a photo, for each by which it may change before anything is decided on again
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
@@ -175,6 +175,8 @@ class _Search:
         self.rounds = self.failed = 0
         self.order_asked = False
         self.common: list[Hypothesis] = []
+        # what was last said of hypotheses, with what took part and how many had been taken up or refused by then
+        self.asked: tuple[Selection, tuple[int, int], list[Likely]] | None = None
         # with which nothing would hold the photos, or that mean nothing in the end
         self.refused: list[Hypothesis] = list(refused)
 
@@ -264,10 +266,16 @@ class _Search:
         return float(np.log(self.settings.level / 2))
 
     def _likeliest(self, done: ScreenedBundle, bound: float) -> list[Likely]:
-        """Hypotheses that are likelier than a bound, one of each kind, and than the level."""
+        """Hypotheses that are likelier than a bound, one of each kind, and than the level.
+
+        They are asked about anew where more has changed than few rays, and at the end, where the bound is 0.
+        """
         cameras, level = self.settings.search_cameras, self.settings.level
-        found = hypotheses.likeliest(done.solution, done.limit.unit, level, cameras=cameras, refused=self.refused)
-        return [each for each in found if each.log_p <= min(bound, self._level)]
+        asked, taken = self.asked, (len(self.common), len(self.refused))
+        if bound == 0.0 or asked is None or asked[1] != taken or self._moved(done.selection, asked[0]).any():
+            found = hypotheses.likeliest(done.solution, done.limit.unit, level, cameras=cameras, refused=self.refused)
+            self.asked = asked = done.selection, taken, found
+        return [each for each in asked[2] if each.log_p <= min(bound, self._level)]
 
     def _take_up(self, hypothesis: Hypothesis) -> None:
         self.common.append(hypothesis)
@@ -410,10 +418,17 @@ class _Search:
         return min(alone, hypotheses.log_probability_of_any(float(whole[0]), len(used), rows))
 
     def _without_rays(self, done: ScreenedBundle, worst: WrongRays) -> ScreenedBundle:
-        """Take rays out; points without which nothing would hold some photos stay, whatever the tests say."""
+        """Take rays out; points without which nothing would hold some photos stay, whatever the tests say.
+
+        Rays that hardly move any photo are worth no adjustment of their own: what fits comes back with it.
+        """
         images = done.selection.images.copy()
         images[worst.row] = False
-        found = self._tried(replace(done.selection, images=images))
+        left = replace(done.selection, images=images)
+        more = self.fitting(done, left) if not self._moved(left, done.selection).any() else None
+        found = None if more is None else self._tried(more)
+        if found is None:
+            found = self._tried(left)
         if found is not None:
             self.out |= {(IMAGE, row, 0): None for row in worst.row.tolist()}
             self.rays.test[worst.row] = self.settings.test
@@ -548,18 +563,29 @@ class _Search:
         )
         return decide_rays(adjusted, rows, xyz, done.limit)
 
-    def fitting(self, done: ScreenedBundle) -> Selection | None:
-        """Put back what fits the adjustment without it; None when there is nothing new."""
-        point, images = self.problem.images.point, done.selection.images.copy()
+    def _moved(self, selection: Selection, before: Selection) -> Flags:
+        """Photos (m,) that anything else took part in than before, but for few of their rays."""
+        photo, m = self.problem.images.photo, self.problem.photos
+        moved = np.bincount(photo[selection.images != before.images], minlength=m)
+        few = np.bincount(photo[selection.images], minlength=m) // RAYS_TO_DECIDE_AGAIN
+        return np.asarray((moved > few) | (selection.given != before.given), bool)
+
+    def fitting(self, done: ScreenedBundle, left: Selection | None = None) -> Selection | None:
+        """Put back what fits the adjustment without it; None when there is nothing new.
+
+        left: what the adjustment leaves, without rays that go.
+        """
+        left = done.selection if left is None else left
+        point, images = self.problem.images.point, left.images.copy()
         limit, xyz = done.limit, self.problem.start.points.copy()
         photo = self.problem.images.photo
-        changed = np.full(self.problem.photos, done.selection.given != self.decided.given)
-        moved = np.bincount(photo[images != self.decided.images], minlength=len(changed))
-        changed |= moved > np.bincount(photo[images], minlength=len(changed)) // RAYS_TO_DECIDE_AGAIN
-        self.decided = replace(done.selection, images=np.where(changed[photo], images, self.decided.images))
+        changed = self._moved(left, self.decided)
+        self.decided = replace(left, images=np.where(changed[photo], images, self.decided.images))
         rays = np.bincount(point, minlength=len(xyz))
         asked = (self.beyond <= limit.of(rays)) | np.isinf(self.beyond)  # the limit rises where less is established
-        numbers = np.unique(point[~images & (changed[photo] | asked[point])])
+        goes = np.zeros(len(xyz), bool)
+        goes[point[done.selection.images & ~images]] = True
+        numbers = np.unique(point[~images & (changed[photo] | asked[point]) & ~goes[point]])
         placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] >= self.problem.least
         place = np.where(placed, done.solution.points[numbers], np.nan)
         place = np.where(rays[numbers, None] < self.problem.least, xyz[numbers], place)
@@ -576,8 +602,8 @@ class _Search:
         fits = self._given(done, limit.value * limit.unit)
         self.control, self.waiting = self.control | fits, self.waiting & ~fits
         self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))
-        chosen = supported(self.problem, replace(done.selection, images=images, control=self.control))
-        same = (chosen.images == done.selection.images).all() and (chosen.control == done.selection.control).all()
+        chosen = supported(self.problem, replace(left, images=images, control=self.control))
+        same = (chosen.images == left.images).all() and (chosen.control == left.control).all()
         return None if same else chosen
 
     def _given(self, done: ScreenedBundle, limit: float) -> Flags:

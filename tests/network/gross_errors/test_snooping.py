@@ -221,6 +221,23 @@ def test_a_tenth_of_the_rays_takes_few_adjustments() -> None:
     assert (~wrong & ~done.selection.images).sum() < wrong.sum() / 2  # a wrong ray of two takes the other along
 
 
+def test_rays_that_hardly_move_a_photo_take_no_adjustment_of_their_own() -> None:
+    """One ray of hundreds of a photo goes in the same adjustment as what was left outside comes back."""
+    result = adjusted(simulate(Spec(seed=3, flight=Flight(photos=4, strips=2), points=Points(extra_per_model=150))))
+    assert result.bundle is not None
+    problem = result.bundle.block.problem
+    on_four = np.flatnonzero(np.bincount(problem.images.point) >= 4)
+    wrong, outside = rays_of(problem, int(on_four[0]))[0], rays_of(problem, int(on_four[-1]))
+    xy = problem.images.xy.copy()
+    xy[wrong] += 0.1
+    spoiled = replace(problem, images=replace(problem.images, xy=xy))
+    begin = Selection.everything(spoiled)
+    begin.images[outside] = False
+    done = snooping.screen_bundle(spoiled, begin, BundleSettings())
+    assert np.flatnonzero(~done.selection.images).tolist() == [wrong]
+    assert done.rounds == 2
+
+
 def test_a_search_ends_where_eight_adjustments_fail(problem: BundleProblem, monkeypatch: pytest.MonkeyPatch) -> None:
     """A block of exchanged points was adjusted 132 times, 110 times in vain: a point was spared each time."""
     rows = [int(rays_of(problem, point)[0]) for point in range(20)]
