@@ -41,6 +41,7 @@ OF_CAMERAS = {
 """What may be wrong with a camera, with the columns of its parameters."""
 OF_PHOTOS = {SHIFT: PRINCIPAL_POINT, SCALE: [PRINCIPAL_DISTANCE]}
 """What may be wrong with one photo: it has a principal point, or a principal distance, of its own."""
+OF_IMAGE_COORDINATES = OF_CAMERAS | OF_PHOTOS
 ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group have one of their own
 REVERSED, FORWARDS, BACKWARDS = "reversed", "forwards", "backwards"  # rows of positions that belong to other photos
@@ -177,7 +178,7 @@ def likeliest(
     number = sum(len(line) for line in asked) + (len(OF_PHOTOS) * problem.photos if by_photos else 0)
     found = []
     for line in asked:
-        gains = [_gain(_explained(solution, each)) for each in line]
+        gains = [_gain(each) for each in _explained(solution, line)]
         likely = [
             Likely.of(_with_shift(each, gain, solution), gain.squares / unit**2, len(gain.value), number)
             for each, gain in zip(line, gains, strict=True)
@@ -235,24 +236,41 @@ def _with_shift(hypothesis: Hypothesis, gain: _Gain, solution: BundleSolution) -
     return replace(hypothesis, shift=tuple(shift.tolist()), sigma=tuple(sigma.tolist()))
 
 
-def _explained(solution: BundleSolution, hypothesis: Hypothesis) -> Explained:
-    """Lay out the normal equations of a hypothesis."""
-    return solution.factored.explained(_columns(solution, hypothesis))
+def _explained(solution: BundleSolution, asked: Sequence[Hypothesis]) -> list[Explained]:
+    """Lay out the normal equations of each hypothesis alone; columns of the same camera or photo together."""
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for n, each in enumerate(asked):
+        groups.setdefault((each.kind in OF_PHOTOS, each.number) if of_images(each) else each.name, []).append(n)
+    found = {}
+    for group in groups.values():
+        if not of_images(asked[group[0]]):
+            found[group[0]] = solution.factored.explained(_columns(solution, asked[group[0]]))
+            continue
+        every, end = solution.factored.explained(_columns_of_images(solution, [asked[n] for n in group])), 0
+        for n in group:
+            own = np.arange(end, end + len(OF_IMAGE_COORDINATES[asked[n].kind]))
+            end += len(own)
+            found[n] = Explained(every.pull[own], every.normal[np.ix_(own, own)], every.squares[own])
+    return [found[n] for n in range(len(asked))]
+
+
+def _columns_of_images(solution: BundleSolution, together: Sequence[Hypothesis]) -> Columns:
+    """Columns of hypotheses about one camera, or about one photo."""
+    problem, number = solution.prepared.problem, together[0].number
+    of_photo, of_camera = problem.images.photo, problem.cameras.of_photo
+    kinds = [kind for each in together for kind in OF_IMAGE_COORDINATES[each.kind]]
+    alone = together[0].kind in OF_PHOTOS
+    among = (of_photo if alone else of_camera[of_photo]) == number
+    rays = by_calibration(problem, int(of_camera[number]) if alone else number, among, kinds, solution.state)
+    nothing = (np.zeros((rows, 3, len(kinds))) for rows in (len(problem.control), len(problem.positions)))
+    return Columns(among, rays, *nothing)
 
 
 def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
-    """Columns of a hypothesis over all observations, in units of their standard deviations."""
+    """Columns of a hypothesis about what is given, in units of its standard deviations."""
     problem = solution.prepared.problem
-    images, control, positions = problem.images, problem.control, problem.positions
-    none, c = np.zeros(len(images), bool), solution.image_residuals.shape[1]
-    if of_images(hypothesis):
-        kinds, of_photo = (OF_CAMERAS | OF_PHOTOS)[hypothesis.kind], hypothesis.kind in OF_PHOTOS
-        camera = int(problem.cameras.of_photo[hypothesis.number]) if of_photo else hypothesis.number
-        of_ray = images.photo if of_photo else problem.cameras.of_photo[images.photo]
-        among = of_ray == hypothesis.number
-        rays = by_calibration(problem, camera, among, kinds, solution.state)
-        k = len(kinds)
-        return Columns(among, rays, np.zeros((len(control), 3, k)), np.zeros((len(positions), 3, k)))
+    control, positions = problem.control, problem.positions
+    none, c = np.zeros(len(problem.images), bool), solution.image_residuals.shape[1]
     if hypothesis.kind == LIST:
         axes = _given_axes(problem, hypothesis.number)
         rows = np.where((control.frame == hypothesis.number)[:, None], 1.0 / control.sigma, 0.0)
@@ -333,7 +351,7 @@ def _with_own_camera(problem: BundleProblem, photo: int, columns: list[int]) -> 
 
 def of_images(hypothesis: Hypothesis) -> bool:
     """Whether the parameters of a hypothesis are those of a camera."""
-    return hypothesis.kind in OF_CAMERAS or hypothesis.kind in OF_PHOTOS
+    return hypothesis.kind in OF_IMAGE_COORDINATES
 
 
 def place(problem: BundleProblem, hypothesis: Hypothesis) -> tuple[int, list[int]]:
@@ -353,7 +371,8 @@ def impossible(solution: BundleSolution) -> bool:
 
 def log_probability_again(without: BundleSolution, hypothesis: Hypothesis, unit: float) -> float:
     """Logarithm of the probability that what was taken up explains so much by chance, in an adjustment without it."""
-    gain = _gain(_explained(without, hypothesis))
+    (explained,) = _explained(without, [hypothesis])
+    gain = _gain(explained)
     return log_probability(max(gain.squares, 0.0) / unit**2, max(len(gain.value), 1))
 
 
