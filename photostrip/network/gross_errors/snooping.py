@@ -59,13 +59,15 @@ class ScreenedBundle:
     ) -> ScreenedBundle:
         chosen = selected(problem, selection)
         solution = solve(chosen, rough=rough)
+        precision = cofactors_of(solution)
+        tests = reliability.tests_of(chosen, solution, precision)
         points_out = len(np.unique(problem.images.point[~selection.images]))
         return cls(
             problem=chosen,
             selection=selection,
             solution=solution,
-            precision=cofactors_of(solution),
-            limit=reliability.limit_of(solution, settings, points_out, BOTH_GO if rough else 1.0),
+            precision=precision,
+            limit=reliability.limit_of(solution, settings, tests, points_out, BOTH_GO if rough else 1.0),
         )
 
     @cached_property
