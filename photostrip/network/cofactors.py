@@ -19,6 +19,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.network import datum
 from photostrip.network.given_orientations import LinearisedOrientations
 from photostrip.network.normal_equations import FactoredEquations
+from photostrip.network.problem import BundleProblem
 from photostrip.network.rays import whitening
 from photostrip.network.solution import BundleSolution, Cofactors
 
@@ -62,19 +63,27 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
         points, of_photos = _inner(solution, points, of_photos)
     points[~prepared.measured] = np.nan
     turn = _turns(solution.rotations, u)
-    unwhite = np.linalg.inv(whitening(image))
     weights = prepared.prior**-2.0
     return Cofactors(
         points=points,
         photos=turn @ of_photos[:, :u, :u] @ turn.swapaxes(1, 2),
         common=found.common,
-        image_residuals=unwhite @ of_rays @ unwhite.swapaxes(1, 2),
+        image_residuals=_unwhitened(problem, of_rays),
         control_residuals=_control(solution, points),
         position_residuals=positions,
         attitude_residuals=attitudes,
         common_residuals=np.where(weights > 0.0, prepared.prior**2 - np.diag(found.common), 0.0),
         photo_common=turn @ of_photos[:, :u, u:],
     )
+
+
+def _unwhitened(problem: BundleProblem, of_rays: Floats) -> Floats:
+    """Cofactors of the residuals of rays or model coordinates in mm^2, out of those in units of sigma."""
+    sigma = problem.images.sigma
+    if not problem.of_models:
+        return np.asarray(of_rays * sigma[:, :, None] * sigma[:, None, :])
+    unwhite = np.linalg.inv(whitening(problem.images))
+    return np.asarray(unwhite @ of_rays @ unwhite.swapaxes(1, 2))
 
 
 def _of_points(solution: BundleSolution) -> tuple[Floats, Floats]:

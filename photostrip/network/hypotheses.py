@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array, hstack
 from scipy.special import fdtrc, gammaincc, gammaln
 
 from photostrip.arrays import Floats, Numbers
@@ -42,11 +41,11 @@ OF_CAMERAS = {
 """What may be wrong with a camera, with the columns of its parameters."""
 OF_PHOTOS = {SHIFT: PRINCIPAL_POINT, SCALE: [PRINCIPAL_DISTANCE]}
 """What may be wrong with one photo: it has a principal point, or a principal distance, of its own."""
+OF_IMAGE_COORDINATES = OF_CAMERAS | OF_PHOTOS
 ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group have one of their own
 REVERSED, FORWARDS, BACKWARDS = "reversed", "forwards", "backwards"  # rows of positions that belong to other photos
 ORDERS = REVERSED, FORWARDS, BACKWARDS
-AT_A_TIME = 2  # hypotheses whose columns are worked on together
 ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most in common
 LEAST_SHARE = 1e-6  # of a column that the other unknowns leave to it, for it to be asked about at all
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
@@ -168,13 +167,15 @@ def likeliest(
 
     unit: standard deviation of unit weight in force.
     level: as of ``most_likely``.
-    cameras: whether cameras, and photos for themselves, may be asked about.
+    cameras: whether cameras may be taken up. A single photo, which is no matter of calibration, may be in any case, but
+        not for what its camera explains better.
     refused: what has been taken up in vain.
     """
     problem, in_vain = solution.prepared.problem, {each.name for each in refused}
-    lines = [line for line in HYPOTHESES if line not in OF_IMAGES or (cameras and not problem.of_models)]
+    by_photos = not (solution.rough or problem.of_models)
+    lines = [line for line in HYPOTHESES if by_photos or line not in OF_IMAGES]
     asked = [[each for each in line(solution) if each.name not in in_vain] for line in lines]
-    number = sum(len(line) for line in asked) + (len(OF_PHOTOS) * problem.photos if cameras else 0)
+    number = sum(len(line) for line in asked) + (len(OF_PHOTOS) * problem.photos if by_photos else 0)
     found = []
     for line in asked:
         gains = [_gain(each) for each in _explained(solution, line)]
@@ -184,7 +185,11 @@ def likeliest(
         ]
         if likely:
             found.append(most_likely(sorted(likely, key=lambda each: each.freedom), level))  # the plainest first
-    return found
+    if cameras:
+        return found
+    best = min((each.log_p for each in found if each.hypothesis.kind in OF_CAMERAS), default=0.0)
+    others = (each for each in found if each.hypothesis.kind not in OF_CAMERAS)
+    return [each for each in others if each.hypothesis.kind not in OF_PHOTOS or each.log_p < best]
 
 
 def most_likely(found: Sequence[Likely], level: float) -> Likely:
@@ -231,43 +236,47 @@ def _with_shift(hypothesis: Hypothesis, gain: _Gain, solution: BundleSolution) -
     return replace(hypothesis, shift=tuple(shift.tolist()), sigma=tuple(sigma.tolist()))
 
 
-def _explained(solution: BundleSolution, asked: Sequence[Hypothesis]) -> Iterator[Explained]:
-    """Lay out the normal equations of each hypothesis alone; some at a time, for the sake of memory."""
-    for start in range(0, len(asked), AT_A_TIME):
-        columns = [_columns(solution, each) for each in asked[start : start + AT_A_TIME]]
-        every = Columns(
-            rays=csr_array(hstack([each.rays for each in columns])),
-            control=np.concatenate([each.control for each in columns], axis=2),
-            positions=np.concatenate([each.positions for each in columns], axis=2),
-        )
-        found = solution.factored.explained(every)
-        end = 0
-        for each in columns:
-            own = np.arange(end, end + each.control.shape[2])
+def _explained(solution: BundleSolution, asked: Sequence[Hypothesis]) -> list[Explained]:
+    """Lay out the normal equations of each hypothesis alone; columns of the same camera or photo together."""
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for n, each in enumerate(asked):
+        groups.setdefault((each.kind in OF_PHOTOS, each.number) if of_images(each) else each.name, []).append(n)
+    found = {}
+    for group in groups.values():
+        if not of_images(asked[group[0]]):
+            found[group[0]] = solution.factored.explained(_columns(solution, asked[group[0]]))
+            continue
+        every, end = solution.factored.explained(_columns_of_images(solution, [asked[n] for n in group])), 0
+        for n in group:
+            own = np.arange(end, end + len(OF_IMAGE_COORDINATES[asked[n].kind]))
             end += len(own)
-            yield Explained(pull=found.pull[own], normal=found.normal[np.ix_(own, own)], squares=found.squares[own])
+            found[n] = Explained(every.pull[own], every.normal[np.ix_(own, own)], every.squares[own])
+    return [found[n] for n in range(len(asked))]
+
+
+def _columns_of_images(solution: BundleSolution, together: Sequence[Hypothesis]) -> Columns:
+    """Columns of hypotheses about one camera, or about one photo."""
+    problem, number = solution.prepared.problem, together[0].number
+    of_photo, of_camera = problem.images.photo, problem.cameras.of_photo
+    kinds = [kind for each in together for kind in OF_IMAGE_COORDINATES[each.kind]]
+    alone = together[0].kind in OF_PHOTOS
+    among = (of_photo if alone else of_camera[of_photo]) == number
+    rays = by_calibration(problem, int(of_camera[number]) if alone else number, among, kinds, solution.state)
+    nothing = (np.zeros((rows, 3, len(kinds))) for rows in (len(problem.control), len(problem.positions)))
+    return Columns(among, rays, *nothing)
 
 
 def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
-    """Columns of a hypothesis over all observations, in units of their standard deviations."""
-    prepared = solution.prepared
-    problem, size = prepared.problem, solution.image_residuals.size
+    """Columns of a hypothesis about what is given, in units of its standard deviations."""
+    problem = solution.prepared.problem
     control, positions = problem.control, problem.positions
-    if of_images(hypothesis):
-        cameras, kinds = problem.cameras, (OF_CAMERAS | OF_PHOTOS)[hypothesis.kind]
-        of_photo = hypothesis.kind in OF_PHOTOS
-        asked = np.full((len(cameras.focal), len(CALIBRATION)), -1)
-        asked[cameras.of_photo[hypothesis.number] if of_photo else hypothesis.number, kinds] = np.arange(len(kinds))
-        rays = by_calibration(problem, asked, solution.state)
-        if of_photo:
-            own = np.repeat(problem.images.photo == hypothesis.number, 2)
-            rays = csr_array(rays.multiply(own[:, None]))
-        return Columns(rays, np.zeros((len(control), 3, len(kinds))), np.zeros((len(positions), 3, len(kinds))))
+    none, c = np.zeros(len(problem.images), bool), solution.image_residuals.shape[1]
     if hypothesis.kind == LIST:
         axes = _given_axes(problem, hypothesis.number)
         rows = np.where((control.frame == hypothesis.number)[:, None], 1.0 / control.sigma, 0.0)
         shifts = rows[:, :, None] * np.eye(3)[:, axes]
-        return Columns(csr_array((size, len(axes))), shifts, np.zeros((len(positions), 3, len(axes))))
+        k = len(axes)
+        return Columns(none, np.zeros((0, c, k)), shifts, np.zeros((len(positions), 3, k)))
     group = np.where(positions.group >= 0, 0 if hypothesis.of == ALL else positions.group, -1)
     groups = np.unique(group[group >= 0])
     weight = np.where(group >= 0, 1.0, 0.0)[:, None] / positions.sigma
@@ -281,7 +290,8 @@ def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
     ]
     shifts = np.concatenate(parts, axis=2)
     shifts = shifts[:, :, shifts.any(axis=(0, 1))]
-    return Columns(csr_array((size, shifts.shape[2])), np.zeros((len(control), 3, shifts.shape[2])), shifts)
+    k = shifts.shape[2]
+    return Columns(none, np.zeros((0, c, k)), np.zeros((len(control), 3, k)), shifts)
 
 
 def _given_axes(problem: BundleProblem, number: int) -> Numbers:
@@ -291,7 +301,10 @@ def _given_axes(problem: BundleProblem, number: int) -> Numbers:
 
 
 def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
-    """Give a problem the unknowns of a hypothesis; a control list that is shifted is left out as far as it is off."""
+    """Give a problem the unknowns of a hypothesis; a control list that is shifted is left out as far as it is off.
+
+    What is given up again is not undone: the given problem takes up all the others anew.
+    """
     positions, cameras = problem.positions, problem.cameras
     if hypothesis.kind == LIST:
         off = np.abs(hypothesis.shift) > SHOWN_SIGMAS * np.array(hypothesis.sigma)
@@ -338,7 +351,7 @@ def _with_own_camera(problem: BundleProblem, photo: int, columns: list[int]) -> 
 
 def of_images(hypothesis: Hypothesis) -> bool:
     """Whether the parameters of a hypothesis are those of a camera."""
-    return hypothesis.kind in OF_CAMERAS or hypothesis.kind in OF_PHOTOS
+    return hypothesis.kind in OF_IMAGE_COORDINATES
 
 
 def place(problem: BundleProblem, hypothesis: Hypothesis) -> tuple[int, list[int]]:
@@ -356,25 +369,11 @@ def impossible(solution: BundleSolution) -> bool:
     return bool(beside or (problem.cameras.focal + values[:, PRINCIPAL_DISTANCE] <= 0.0).any())
 
 
-def given_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
-    """Take the unknowns of an error of a camera, or of a photo, back: it is as it is given."""
-    camera, columns = place(problem, hypothesis)
-    sigma = np.array(problem.cameras.sigma, float)
-    sigma[camera, columns] = 0.0
-    return replace(problem, cameras=replace(problem.cameras, sigma=sigma if sigma.any() else None))
-
-
-def log_probabilities(
-    problem: BundleProblem, solution: BundleSolution, cofactors: Cofactors, unit: float, taken: Sequence[Hypothesis]
-) -> list[float]:
-    """Logarithm of the probability of such values of the parameters of each error of a camera, if they were zero."""
-    found = []
-    for each in taken:
-        own = problem.cameras.unknown[place(problem, each)]
-        value = solution.common[own]
-        squares = float(value @ np.linalg.solve(cofactors.common[np.ix_(own, own)], value)) / unit**2
-        found.append(log_probability(squares, len(own)))
-    return found
+def log_probability_again(without: BundleSolution, hypothesis: Hypothesis, unit: float) -> float:
+    """Logarithm of the probability that what was taken up explains so much by chance, in an adjustment without it."""
+    (explained,) = _explained(without, [hypothesis])
+    gain = _gain(explained)
+    return log_probability(max(gain.squares, 0.0) / unit**2, max(len(gain.value), 1))
 
 
 def _in_order(positions: PositionObservations, order: str) -> PositionObservations:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.band import Band
 from photostrip.network.given_orientations import (
     LinearisedOrientations,
@@ -215,7 +215,8 @@ def _roots(normal: Floats) -> tuple[Floats, Floats]:
 class Columns(NamedTuple):
     """What each of k causes of size one puts into the observations, in units of their standard deviations."""
 
-    rays: csr_array  # (c n, k)
+    among: Flags  # (n,): rays that they touch
+    rays: Floats  # (r, c, k): of these rays
     control: Floats  # (c, 3, k): along its axes
     positions: Floats  # (g, 3, k): along theirs
 
@@ -297,16 +298,16 @@ class FactoredEquations:
     def explained(self, columns: Columns) -> Explained:
         """Say what the misfits would lose by causes that nothing has been asked about."""
         equations, at = self.equations, self.equations.linearised
-        problem, k, p = equations.prepared.problem, columns.rays.shape[1], len(equations.right_common)
-        m, q = problem.photos, problem.points
-        photos = (_blocks(at.rays.by_photo, problem.images.photo, m).T @ columns.rays).toarray()
-        points = (_blocks(at.rays.by_point, problem.images.point, q).T @ columns.rays).toarray()
+        problem, k, p = equations.prepared.problem, columns.rays.shape[2], len(equations.right_common)
+        m, q, of_rays, (rays,) = problem.photos, problem.points, columns.rays.reshape(-1, k), np.nonzero(columns.among)
+        photos = _blocks(at.rays.by_photo[rays], problem.images.photo[rays], m).T @ of_rays
+        points = _blocks(at.rays.by_point[rays], problem.images.point[rays], q).T @ of_rays
         np.add.at(points.reshape(q, 3, k), problem.control.point, at.by_controlled.swapaxes(1, 2) @ columns.control)
         by_calibration = at.rays.by_common
         common = np.zeros((p, k))
-        common[: by_calibration.shape[1]] = (by_calibration.T @ columns.rays).toarray()
-        squares = (columns.rays.T @ columns.rays).toarray() + np.einsum("nik,nil->kl", columns.control, columns.control)
-        pull = columns.rays.T @ at.rays.misfit.ravel() + np.einsum("nik,ni->k", columns.control, at.control)
+        common[: by_calibration.shape[1]] = by_calibration[np.repeat(columns.among, columns.rays.shape[1])].T @ of_rays
+        squares = of_rays.T @ of_rays + np.einsum("nik,nil->kl", columns.control, columns.control)
+        pull = of_rays.T @ at.rays.misfit[rays].ravel() + np.einsum("nik,ni->k", columns.control, at.control)
         if len(at.positions.photo):
             by_photo, by_common, off = at.positions.scaled()
             np.add.at(photos.reshape(m, -1, k), at.positions.photo, by_photo.swapaxes(1, 2) @ columns.positions)

@@ -10,13 +10,14 @@ Source: derived.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.network.calibration import (
     PRINCIPAL_DISTANCE,
@@ -113,16 +114,17 @@ def whitening(measured: ImageObservations | ModelObservations) -> Floats:
     return white
 
 
-def by_calibration(problem: BundleProblem, asked: Numbers, state: Parameters) -> csr_array:
-    """Differentiate computed minus corrected image coordinates by calibration parameters that are asked about.
+def by_calibration(problem: BundleProblem, camera: int, rays: Flags, kinds: Sequence[int], state: Parameters) -> Floats:
+    """Differentiate computed minus corrected image coordinates of some rays (n,) of a camera by calibration parameters.
 
-    asked: (cameras, 10): column of each parameter, -1: not asked about. Returns (2 n, c), in units of sigma.
+    kinds: (k,): their columns in ``CALIBRATION``. Returns (r, 2, k), in units of sigma.
     """
-    images = problem.images
+    images = problem.images.take(rays)
     back = np.swapaxes(state.rotations, 1, 2)[images.photo]
     arm = np.einsum("nij,nj->ni", back, state.points[images.point] - state.centers[images.photo])
     values = values_of(problem.cameras, state.common)
-    return _by_calibration(problem, asked, values, -arm[:, :2] / arm[:, 2:], 1.0 / images.sigma)
+    table = partials(problem.cameras, values, camera, images.xy, -arm[:, :2] / arm[:, 2:])
+    return np.asarray(table[list(kinds)].transpose(2, 1, 0) / images.sigma[:, :, None])
 
 
 def _by_calibration(

@@ -168,18 +168,25 @@ class Limit(NamedTuple):
         return np.where(rays == 2, self.both, self.value)
 
 
-def limit_of(solution: BundleSolution, settings: BundleSettings, established: int, share_of_both: float = 1.0) -> Limit:
+def tests_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> int:
+    """Count the tests of single observations: every coordinate that others control is one."""
+    return sum(int((each.redundancy >= UNCONTROLLED).sum()) for each in groups_of(problem, solution, precision))
+
+
+def limit_of(
+    solution: BundleSolution, settings: BundleSettings, tests: int, established: int, share_of_both: float = 1.0
+) -> Limit:
     """Limit of standardised residuals: never sharper than the stated standard deviations allow.
 
-    Without errors all tests together, as many as there are conditions, have the level q of the settings. With many
-    errors q is the part of the rejections that are false: with k of m hypotheses rejected the next is tested at
-    i q / (m + 1 - i (1 - q)), i = k + 1, and m - k conditions are left. Source: [Gavrilov 2009].
+    Without errors all tests together have the level q of the settings. With many errors q is the part of the rejections
+    that are false: with k of m hypotheses rejected the next is tested at i q / (m + 1 - i (1 - q)), i = k + 1, and
+    m - k tests are left. Source: [Gavrilov 2009].
 
     share_of_both: what the test of a point on two photos has of the level of one test.
     """
     found = settings.test == "tau" and sigma0_test(solution).too_large
     share = settings.level * (established + 1)
-    alpha = share / (max(solution.redundancy, 1) + share) if settings.alpha is None else settings.alpha
+    alpha = share / (max(tests, 1) + share) if settings.alpha is None else settings.alpha
     test, unit = ("tau", solution.sigma0) if found else ("baarda", 1.0)
     value, both = (limit(test, each, solution.redundancy) for each in (alpha, alpha * share_of_both))
     return Limit(value=value, both=both, alpha=alpha, unit=unit)

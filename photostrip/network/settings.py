@@ -55,7 +55,7 @@ class BundleSettings:
     alpha: float | None = None
     power: float = 0.80  # probability with which an error of the size of the minimal detectable one is found
     variance_components: bool = False  # whether the standard deviations of the groups of observations are estimated
-    # whether lens distortion, principal point and principal distance are asked for before observations are thrown out
+    # whether lens distortion, film, principal point and distance are estimated where the observations ask for them
     search_cameras: bool = True
     # a-priori standard deviations of these parameters about the given calibration, in their units; without one a
     # parameter is free

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from photostrip.network.datum import is_free
 from photostrip.network.gross_errors.point_decisions import cause_of_all
 from photostrip.network.gross_errors.ray_decisions import Adjusted, RayDecisions, decide_rays
 from photostrip.network.gross_errors.ray_log import ROBUST, START, RayLog, WrongRays
-from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OF_PHOTOS, OFFSET, Hypothesis, Likely
+from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER, Hypothesis, Likely
 from photostrip.network.problem import BundleProblem, PositionObservations
 from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, Limit
 from photostrip.network.selection import Selection, restarted, selected, supported
@@ -35,7 +35,7 @@ from photostrip.strip.gross_errors.pairs.pair_search import AMPLE, OUT_TO_ONE_MO
 
 RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
 PHOTOS_ENOUGH = 3  # on which a point is among the worst, for it to go, whatever more it is on
-RAYS_TO_DECIDE_AGAIN = 100  # of a photo, for each by which it may change before its points are decided on again
+RAYS_TO_DECIDE_AGAIN = 100  # of a photo, for each by which it may change before anything is decided on again
 BOTH_GO = 0.25  # share in the level of a point on two photos of a strip, which one test costs both rays
 
 
@@ -59,13 +59,15 @@ class ScreenedBundle:
     ) -> ScreenedBundle:
         chosen = selected(problem, selection)
         solution = solve(chosen, rough=rough)
+        precision = cofactors_of(solution)
+        tests = reliability.tests_of(chosen, solution, precision)
         points_out = len(np.unique(problem.images.point[~selection.images]))
         return cls(
             problem=chosen,
             selection=selection,
             solution=solution,
-            precision=cofactors_of(solution),
-            limit=reliability.limit_of(solution, settings, points_out, BOTH_GO if rough else 1.0),
+            precision=precision,
+            limit=reliability.limit_of(solution, settings, tests, points_out, BOTH_GO if rough else 1.0),
         )
 
     @cached_property
@@ -130,8 +132,8 @@ def _searched(search: _Search, begin: Selection) -> ScreenedBundle:
     done = search.clean(search.with_doubted_control(chosen))
     while (more := search.fitting(done)) is not None:  # a point comes back once only
         done = search.clean(more)
-    while search.put_back(done):
-        done = search.clean(supported(search.problem, done.selection))
+    while (less := search.put_back(done)) is not None:
+        done = search.clean(supported(search.problem, less))
     held = tuple(each for each in search.tested(done)[1] if search.holds(each))
     done = replace(done, rejections=tuple(search.log(done)), held=held)
     return replace(done, rounds=search.rounds, common=tuple(search.common))
@@ -150,7 +152,8 @@ class _Search:
         rough: bool,
         refused: Sequence[Hypothesis] = (),
     ) -> None:
-        self.problem, self.settings, self.rough = problem, settings, rough
+        self.given = self.problem = problem
+        self.settings, self.rough = settings, rough
         images = problem.images
         self.by_point = np.lexsort((images.photo, images.point))
         self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
@@ -174,6 +177,8 @@ class _Search:
         self.rounds = self.failed = 0
         self.order_asked = False
         self.common: list[Hypothesis] = []
+        # what was last said of hypotheses, with what took part and how many had been taken up or refused by then
+        self.asked: tuple[Selection, tuple[int, int], list[Likely]] | None = None
         # with which nothing would hold the photos, or that mean nothing in the end
         self.refused: list[Hypothesis] = list(refused)
 
@@ -263,11 +268,16 @@ class _Search:
         return float(np.log(self.settings.level / 2))
 
     def _likeliest(self, done: ScreenedBundle, bound: float) -> list[Likely]:
-        """Hypotheses that are likelier than a bound, one of each kind, and than the level."""
-        asked = self.settings.search_cameras and not self.rough
-        unit, level = done.limit.unit, self.settings.level
-        found = hypotheses.likeliest(done.solution, unit, level, cameras=asked, refused=self.refused)
-        return [each for each in found if each.log_p <= min(bound, self._level)]
+        """Hypotheses that are likelier than a bound, one of each kind, and than the level.
+
+        They are asked about anew where more has changed than few rays, and at the end, where the bound is 0.
+        """
+        cameras, level = self.settings.search_cameras, self.settings.level
+        asked, taken = self.asked, (len(self.common), len(self.refused))
+        if bound == 0.0 or asked is None or asked[1] != taken or self._moved(done.selection, asked[0]).any():
+            found = hypotheses.likeliest(done.solution, done.limit.unit, level, cameras=cameras, refused=self.refused)
+            self.asked = asked = done.selection, taken, found
+        return [each for each in asked[2] if each.log_p <= min(bound, self._level)]
 
     def _take_up(self, hypothesis: Hypothesis) -> None:
         self.common.append(hypothesis)
@@ -314,34 +324,71 @@ class _Search:
         self.common.append(likely.hypothesis)
         return found
 
-    def put_back(self, done: ScreenedBundle) -> bool:
-        """Give up errors of cameras that mean nothing in the end; whether there were any."""
-        errors = [each for each in self.common if hypotheses.of_images(each)]
-        found = hypotheses.log_probabilities(done.problem, done.solution, done.precision, done.limit.unit, errors)
-        gone = [each for each, log_p in zip(errors, found, strict=True) if log_p > self._level]
-        for each in gone:
-            self.common.remove(each)
-            self.problem = hypotheses.given_up(self.problem, each)
-            self.refused.append(each)
-        return bool(gone)
+    def put_back(self, done: ScreenedBundle) -> Selection | None:
+        """Give up what the end supports least of all that was taken up; None where it supports everything.
+
+        One at a time: of two that explain the same each is needless beside the other.
+        """
+        log_p, gone = max(
+            ((self._asked_again(done, each), n) for n, each in enumerate(self.common)), default=(-np.inf, 0)
+        )
+        if log_p <= self._level:
+            return None
+        self.refused.append(self.common.pop(gone))
+        self.problem = self._with(self.common)
+        return self._counting(done.selection)
+
+    def _with(self, common: Sequence[Hypothesis]) -> BundleProblem:
+        """Let what is given take up some hypotheses, and start where the last adjustment ended."""
+        return replace(reduce(hypotheses.taken_up, common, self.given), start=self.problem.start)
+
+    def _counting(self, selection: Selection) -> Selection:
+        """Return a selection with all control that was put in and that nothing has rejected: a list comes back so."""
+        return replace(selection, control=self.control)
+
+    def _asked_again(self, done: ScreenedBundle, hypothesis: Hypothesis) -> float:
+        """Logarithm of the probability that a hypothesis explains so much by chance beside all the others at the end.
+
+        An adjustment without it is asked as the search was. It stays where there is none; an offset stays within a
+        drift, which is asked about first.
+        """
+        others = [each for each in self.common if each is not hypothesis]
+        if hypothesis.kind == OFFSET and any(each.kind == DRIFT for each in others):
+            return -np.inf
+        without = self._with(others)
+        selection = supported(without, self._counting(done.selection))
+        try:
+            if hypothesis.kind == ORDER:
+                return -np.inf if self._order(without, selection)[1] == hypothesis else 0.0
+            solution = solve(selected(without, selection))
+        except GeometryError:
+            return -np.inf
+        return hypotheses.log_probability_again(solution, hypothesis, done.limit.unit)
 
     def _reordered(self, selection: Selection) -> bool:
         """Give photos the positions of other rows, where an adjustment without any of them says so; asked once."""
         used = selection.positions.any()
         if self.order_asked or not used or is_free(replace(self.problem, positions=PositionObservations())):
             return False
-        self.order_asked, before = True, self.problem
+        self.order_asked = True
         try:
-            free = self.adjust(supported(before, replace(selection, positions=np.zeros_like(selection.positions))))
+            solution, found = self._order(self.problem, supported(self.problem, selection))
         except GeometryError:
-            self.problem = before
             return False
-        found = hypotheses.order_of_positions(free.solution, free.precision, before.positions, self.settings.level)
-        if found is None:
-            self.problem = before
-            return False
-        self._take_up(found)
-        return True
+        if found is not None:
+            self.problem = restarted(self.problem, solution)
+            self._take_up(found)
+        return found is not None
+
+    def _order(self, problem: BundleProblem, selection: Selection) -> tuple[BundleSolution, Hypothesis | None]:
+        """Ask an adjustment in which positions take no part in which order they are those of the photos."""
+        bare = selected(problem, replace(selection, positions=np.zeros_like(selection.positions)))
+        if is_free(bare):
+            raise GeometryError("nothing but camera positions gives a datum", code="bundle-rank")
+        solution = solve(bare)
+        self.rounds += 1
+        positions, level = problem.positions, self.settings.level
+        return solution, hypotheses.order_of_positions(solution, cofactors_of(solution), positions, level)
 
     def _log_p(self, done: ScreenedBundle, worst: list[Rejection] | WrongRays) -> float:
         """Logarithm of the probability that the worst single observation, ray or coordinate, is so bad by chance."""
@@ -373,10 +420,17 @@ class _Search:
         return min(alone, hypotheses.log_probability_of_any(float(whole[0]), len(used), rows))
 
     def _without_rays(self, done: ScreenedBundle, worst: WrongRays) -> ScreenedBundle:
-        """Take rays out; points without which nothing would hold some photos stay, whatever the tests say."""
+        """Take rays out; points without which nothing would hold some photos stay, whatever the tests say.
+
+        Rays that hardly move any photo are worth no adjustment of their own: what fits comes back with it.
+        """
         images = done.selection.images.copy()
         images[worst.row] = False
-        found = self._tried(replace(done.selection, images=images))
+        left = replace(done.selection, images=images)
+        more = self.fitting(done, left) if not self._moved(left, done.selection).any() else None
+        found = None if more is None else self._tried(more)
+        if found is None:
+            found = self._tried(left)
         if found is not None:
             self.out |= {(IMAGE, row, 0): None for row in worst.row.tolist()}
             self.rays.test[worst.row] = self.settings.test
@@ -511,18 +565,29 @@ class _Search:
         )
         return decide_rays(adjusted, rows, xyz, done.limit)
 
-    def fitting(self, done: ScreenedBundle) -> Selection | None:
-        """Put back what fits the adjustment without it; None when there is nothing new."""
-        point, images = self.problem.images.point, done.selection.images.copy()
+    def _moved(self, selection: Selection, before: Selection) -> Flags:
+        """Photos (m,) that anything else took part in than before, but for few of their rays."""
+        photo, m = self.problem.images.photo, self.problem.photos
+        moved = np.bincount(photo[selection.images != before.images], minlength=m)
+        few = np.bincount(photo[selection.images], minlength=m) // RAYS_TO_DECIDE_AGAIN
+        return np.asarray((moved > few) | (selection.given != before.given), bool)
+
+    def fitting(self, done: ScreenedBundle, left: Selection | None = None) -> Selection | None:
+        """Put back what fits the adjustment without it; None when there is nothing new.
+
+        left: what the adjustment leaves, without rays that go.
+        """
+        left = done.selection if left is None else left
+        point, images = self.problem.images.point, left.images.copy()
         limit, xyz = done.limit, self.problem.start.points.copy()
         photo = self.problem.images.photo
-        changed = np.full(self.problem.photos, done.selection.given != self.decided.given)
-        moved = np.bincount(photo[images != self.decided.images], minlength=len(changed))
-        changed |= moved > np.bincount(photo[images], minlength=len(changed)) // RAYS_TO_DECIDE_AGAIN
-        self.decided = replace(done.selection, images=np.where(changed[photo], images, self.decided.images))
+        changed = self._moved(left, self.decided)
+        self.decided = replace(left, images=np.where(changed[photo], images, self.decided.images))
         rays = np.bincount(point, minlength=len(xyz))
         asked = (self.beyond <= limit.of(rays)) | np.isinf(self.beyond)  # the limit rises where less is established
-        numbers = np.unique(point[~images & (changed[photo] | asked[point])])
+        goes = np.zeros(len(xyz), bool)
+        goes[point[done.selection.images & ~images]] = True
+        numbers = np.unique(point[~images & (changed[photo] | asked[point]) & ~goes[point]])
         placed = np.bincount(point[images], minlength=len(xyz))[numbers, None] >= self.problem.least
         place = np.where(placed, done.solution.points[numbers], np.nan)
         place = np.where(rays[numbers, None] < self.problem.least, xyz[numbers], place)
@@ -539,8 +604,8 @@ class _Search:
         fits = self._given(done, limit.value * limit.unit)
         self.control, self.waiting = self.control | fits, self.waiting & ~fits
         self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))
-        chosen = supported(self.problem, replace(done.selection, images=images, control=self.control))
-        same = (chosen.images == done.selection.images).all() and (chosen.control == done.selection.control).all()
+        chosen = supported(self.problem, replace(left, images=images, control=self.control))
+        same = (chosen.images == left.images).all() and (chosen.control == left.control).all()
         return None if same else chosen
 
     def _given(self, done: ScreenedBundle, limit: float) -> Flags:

@@ -133,10 +133,10 @@ def _two_places(rays: OrientedRays, asked: Numbers) -> Iterator[tuple[Numbers, T
             wrong=rays.wrong[flat],
         )
         one = where_two_meet(rays.xy[rows], rays.photo[rows], rays.photos).reshape(-1, 3)
-        one = tried.meeting(tried.off(one) <= rays.limit, count).xyz
+        one = _meeting(tried, tried.off(one) <= rays.limit, pairs)
         first = tried.off(one)
         here = first <= rays.limit
-        other = tried.meeting(~here, count).xyz
+        other = _meeting(tried, ~here, pairs)
         second = np.where(here, 0.0, tried.off(other)).reshape(-1, size).max(axis=1)
         away = np.where(here, np.inf, first).reshape(-1, size).min(axis=1)
         here = here.reshape(-1, size)
@@ -151,3 +151,16 @@ def _two_places(rays: OrientedRays, asked: Numbers) -> Iterator[tuple[Numbers, T
             if sound[at]:
                 places = TwoPlaces(here=here[at], one=one[at], other=other[at], chance=float(chance[row, best]))
                 yield rows[row], places
+
+
+def _meeting(tried: OrientedRays, use: Flags, pairs: int) -> Floats:
+    """Intersect some of the rays tried for as many pairs of each point, (m pairs, 3): most pairs choose the same."""
+    rows = use.reshape(tried.point[-1] + 1, -1)
+    chosen = np.column_stack([np.arange(len(rows)) // pairs, np.packbits(rows, axis=1)])
+    _, once, again = np.unique(chosen, axis=0, return_index=True, return_inverse=True)
+    first = np.zeros(len(rows), bool)
+    first[once] = True
+    place = np.cumsum(first) - 1
+    kept = first[tried.point] & use
+    of_once = replace(tried, point=place[tried.point]).meeting(kept, len(once)).xyz
+    return of_once[place[once[again.ravel()]]]

@@ -104,7 +104,7 @@ class Bundle(Section):
         DEFAULTS.bundle.level,
     )
     alpha: Fraction | None = key(
-        "Probability of rejecting one good observation; by default `level` is shared out among all conditions", None
+        "Probability of rejecting one good observation; by default `level` is shared out among all tests", None
     )
     power: Fraction = key("Probability with which the minimal detectable errors are found", DEFAULTS.bundle.power)
     variance_components: Flag = key(

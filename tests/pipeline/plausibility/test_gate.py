@@ -755,12 +755,17 @@ def test_mistakes_of_whole_columns_and_rows_are_told(name: str) -> None:
     assert not wrong[1] or any(wrong[1] & named.get(code, frozenset()) for code in mistake.codes)
 
 
+@pytest.mark.parametrize("search_cameras", [True, False])
 @pytest.mark.parametrize(("make", "seed"), [(planted.sound, 43003), (planted.block, 43001)])
-def test_a_shifted_photo_is_named_with_its_shift(make: Callable[[int], planted.Case], seed: int) -> None:
+def test_a_shifted_photo_is_named_with_its_shift(
+    make: Callable[[int], planted.Case], seed: int, *, search_cameras: bool
+) -> None:
+    """Whatever is said of the calibration of its camera (`self_calibration: never`)."""
     case = make(seed)
     inputs, ids = planted_in(case, "one photo shifted by 5 mm")
     shift = (inputs.observations.xy - case.inputs.observations.xy)[case.shows(*ids)][0]
-    (finding,) = (each for each in triangulate(inputs, case.settings).findings if each.code == "P109")
+    settings = replace(case.settings, bundle=replace(case.settings.bundle, search_cameras=search_cameras))
+    (finding,) = (each for each in triangulate(inputs, settings).findings if each.code == "P109")
     assert set(finding.photos) == ids
     found = [float(finding.evidence[f"shift_{axis}_mm"]) for axis in "xy"]
     assert found == pytest.approx(shift, abs=0.8)
