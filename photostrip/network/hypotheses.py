@@ -20,11 +20,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import fdtrc, gammaincc, gammaln
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, values_of
 from photostrip.network.calibration import POINT as PRINCIPAL_POINT
 from photostrip.network.normal_equations import Columns, Explained
-from photostrip.network.problem import BundleProblem, PositionObservations
+from photostrip.network.problem import BundleProblem, ControlObservations, PositionObservations
 from photostrip.network.rays import by_calibration
 from photostrip.network.settings import CALIBRATION
 from photostrip.network.solution import BundleSolution, Cofactors
@@ -50,6 +50,7 @@ ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most
 LEAST_SHARE = 1e-6  # of a column that the other unknowns leave to it, for it to be asked about at all
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
 UP_AXIS = 2
+HEIGHTS_ONLY = -1  # in place of the number of a list: what is given in height only
 
 
 @dataclass(frozen=True)
@@ -88,11 +89,22 @@ def _drifts(solution: BundleSolution) -> Iterator[Hypothesis]:
 
 
 def _lists(solution: BundleSolution) -> Iterator[Hypothesis]:
-    """Ask whether a control list lies beside the others, the shortest first."""
+    """Ask whether a control list lies beside the others, the shortest first, or what is given in height only."""
     control = solution.prepared.problem.control
-    lists, sizes = np.unique(control.frame[np.isfinite(control.sigma).any(axis=1)], return_counts=True)
+    given = np.isfinite(control.sigma)
+    lists, sizes = np.unique(control.lists[given.any(axis=1)], return_counts=True)
     if len(lists) > 1:
         yield from (Hypothesis(LIST, number) for number in lists[np.argsort(sizes, kind="stable")].tolist())
+    alone = _members(control, HEIGHTS_ONLY) & given[:, UP_AXIS]
+    if alone.sum() > 1 and (given[:, UP_AXIS] & ~alone).any():
+        yield Hypothesis(LIST, HEIGHTS_ONLY)
+
+
+def _members(control: ControlObservations, number: int) -> Flags:
+    """Which rows (c,) a control list gives; or those that are given in height only, of all lists."""
+    if number == HEIGHTS_ONLY:
+        return np.asarray(~np.isfinite(control.sigma[:, :UP_AXIS]).any(axis=1), bool)
+    return np.asarray(control.lists == number, bool)
 
 
 def _cameras(solution: BundleSolution) -> Iterator[Hypothesis]:
@@ -273,7 +285,7 @@ def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
     none, c = np.zeros(len(problem.images), bool), solution.image_residuals.shape[1]
     if hypothesis.kind == LIST:
         axes = _given_axes(problem, hypothesis.number)
-        rows = np.where((control.frame == hypothesis.number)[:, None], 1.0 / control.sigma, 0.0)
+        rows = np.where(_members(control, hypothesis.number)[:, None], 1.0 / control.sigma, 0.0)
         shifts = rows[:, :, None] * np.eye(3)[:, axes]
         k = len(axes)
         return Columns(none, np.zeros((0, c, k)), shifts, np.zeros((len(positions), 3, k)))
@@ -297,7 +309,7 @@ def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
 def _given_axes(problem: BundleProblem, number: int) -> Numbers:
     """Axes along which a control list gives anything."""
     control = problem.control
-    return np.flatnonzero(np.isfinite(control.sigma[control.frame == number]).any(axis=0))
+    return np.flatnonzero(np.isfinite(control.sigma[_members(control, number)]).any(axis=0))
 
 
 def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
@@ -308,9 +320,8 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
     positions, cameras = problem.positions, problem.cameras
     if hypothesis.kind == LIST:
         off = np.abs(hypothesis.shift) > SHOWN_SIGMAS * np.array(hypothesis.sigma)
-        outside = (problem.control.frame == hypothesis.number)[:, None] & (
-            off[:UP_AXIS].any() | (np.arange(3) == UP_AXIS)
-        )
+        inside = _members(problem.control, hypothesis.number)
+        outside = inside[:, None] & (off[:UP_AXIS].any() | (np.arange(3) == UP_AXIS))
         control = replace(problem.control, sigma=np.where(outside, np.inf, problem.control.sigma))
         return replace(problem, control=control)
     if hypothesis.kind == ORDER:

@@ -93,6 +93,11 @@ class ControlObservations:
     def __len__(self) -> int:
         return len(self.point)
 
+    @property
+    def lists(self) -> Numbers:
+        """Number (c,) of the list that gives each row."""
+        return self.frame if len(self.frame) else np.zeros(len(self), np.intp)
+
 
 @dataclass(frozen=True, eq=False)
 class PositionObservations:

@@ -17,6 +17,7 @@ from photostrip.arrays import Flags, Floats
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geometry.similarity import collinearity
+from photostrip.network.hypotheses import HEIGHTS_ONLY
 from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.plausibility import evidence
@@ -239,7 +240,7 @@ def _beside(better: Better, strip: str) -> Finding:
     off, sigma = laid.off
     inside = np.flatnonzero(reading.beside(laid.points, number).any(axis=1))
     shift, spread = (_medians(each[inside], np.isfinite(each[inside])) for each in (off, sigma))
-    shifted = ShiftedList(-1 if number is None else number, shift, spread, gain=float("nan"))
+    shifted = ShiftedList(HEIGHTS_ONLY if number is None else number, shift, spread, gain=float("nan"))
     return shifted_list(shifted, laid.points.take(inside), f"strip {strip}", (strip,), "")
 
 

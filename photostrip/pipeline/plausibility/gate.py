@@ -141,7 +141,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     findings = [*images.findings]
     findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None)
     if control is not None and not any(each.is_error for each in findings):
-        named = {name for each in findings for name in each.points}
+        named = {name for each in (*findings, *causes) for name in each.points}
         findings += [each for each in by_result.of_result(result, predicted, control) if named.isdisjoint(each.points)]
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
     for each, strip in zip(formed, result.photo_strips, strict=True):

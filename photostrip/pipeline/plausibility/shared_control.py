@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.network.hypotheses import HEIGHTS_ONLY
 from photostrip.notes import Finding
 from photostrip.pipeline.inputs import Strip
 from photostrip.pipeline.plausibility.on_control import OnControl
@@ -73,13 +74,14 @@ def _named(shared: Common, control: ControlPoints, strip: str, photos: Strip | N
 def shifted_list(shared: ShiftedList, control: ControlPoints, whose: str, strips: Sequence[str], then: str) -> Finding:
     """Name a control list that lies beside the other control, or beside all else that is given (P404, P407).
 
-    shared: its number is -1 for points that are given in height only, whatever their list.
+    shared: its number may be ``HEIGHTS_ONLY``, whatever the list.
     control: control that counts, of all lists.
     """
     plan, steps, evidence = _described(shared.shift, shared.sigma)
-    inside = np.flatnonzero((control.frame == shared.number) | (shared.number < 0))
+    inside = np.flatnonzero(control.frame == shared.number)
     key, what = f"control[{shared.number}]", f"control[{shared.number}] lies"
-    if shared.number < 0:
+    if shared.number == HEIGHTS_ONLY:
+        inside = np.flatnonzero(~control.use[:, :2].any(axis=1))
         key, what = "control", "what is given in height only lies"
     message = f"{what} beside the other control of {whose}, all of it by {steps}{then}"
     fix = OTHER_PLACE if plan else OTHER_HEIGHTS

@@ -13,7 +13,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.network import reliability
 from photostrip.network.given_orientations import drift_columns
-from photostrip.network.hypotheses import ALL, DRIFT, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET
+from photostrip.network.hypotheses import ALL, DRIFT, HEIGHTS_ONLY, LIST, OF_CAMERAS, OF_PHOTOS, OFFSET
 from photostrip.network.problem import BundleProblem
 from photostrip.network.settings import BundleSettings
 from photostrip.notes import Document
@@ -211,7 +211,7 @@ def _taken_up(found: Bundle) -> Iterator[Document]:
     for each in found.screened.common:
         of = "the block" if each.of == ALL else "each group" if each.kind in {OFFSET, DRIFT} else each.of
         if each.kind == LIST:
-            of = f"control[{each.number}]"
+            of = "points given in height only" if each.number == HEIGHTS_ONLY else f"control[{each.number}]"
         elif each.kind in OF_CAMERAS:
             of = problem.camera_ids[each.number]
         elif each.kind in OF_PHOTOS:

@@ -236,3 +236,19 @@ def test_positions_that_are_off_by_a_base_are_those_of_other_photos_only_where_t
     _, result = adjusted(strips=1, shift=np.diff(simulation.gnss, axis=0).mean(axis=0))
     (finding,) = result.findings
     assert finding.key == "camera_positions.correction"
+
+
+@pytest.mark.parametrize("adjustment", ["auto", "polynomial"])
+def test_what_is_given_in_height_only_may_be_of_another_kind(adjustment: str) -> None:
+    """Benchmarks above the geoid beside points from GNSS above the ellipsoid, in one list."""
+    made = simulate(Spec(seed=5, flight=Flight(photos=10), control=Control(every=3, use={"xyz": 0.6, "z": 0.4})))
+    inputs = inputs_of(made)
+    only = inputs.control.use[:, 2] & ~inputs.control.use[:, 0] & ~inputs.control.check
+    enu = inputs.control.enu + np.outer(only, [0.0, 0.0, 31.0])
+    wrong = replace(inputs, control=replace(inputs.control, enu=enu))
+    result = triangulate(wrong, replace(settings_of(made), adjustment=adjustment))
+    (finding,) = [each for each in result.findings if each.code == "P404"]
+    assert "what is given in height only" in finding.message
+    assert set(finding.points) <= {inputs.control.ids[row] for row in np.flatnonzero(only)}
+    assert finding.evidence["offset_up_m"] == pytest.approx(31.0, abs=0.5)
+    assert {each.code for each in result.findings} == {"P404"}
