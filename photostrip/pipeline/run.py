@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.notes import Note
+from photostrip.notes import Finding, Note
 from photostrip.pipeline.block.adjust import adjust_block
 from photostrip.pipeline.block.datum import FormedStrips
 from photostrip.pipeline.common_points import join_photos, join_strips
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
 from photostrip.pipeline.image_coordinates import PhotoCoordinates, correct, orient_interior
-from photostrip.pipeline.inputs import AUTO, POLYNOMIAL, Inputs, Settings
+from photostrip.pipeline.inputs import AUTO, BUNDLE, POLYNOMIAL, Inputs, Settings
 from photostrip.pipeline.not_determined import not_determined
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_runnable, require_whole
@@ -55,7 +55,7 @@ def triangulate(
         gate.require_images(inputs, settings, photo)
         result = _walk_of_any_order(inputs, settings, ground, photo)
     except (InputError, GeometryError) as error:
-        error.findings = gate.of_failure(inputs, settings, directory, photo, ground)
+        error.findings = _of_failure(inputs, settings, directory, ground, photo, error)
         raise
     except np.linalg.LinAlgError as error:
         msg = f"the data contradict themselves so much that an equation cannot be solved ({str(error).lower()})"
@@ -63,6 +63,26 @@ def triangulate(
         unsolvable.findings = gate.of_failure(inputs, settings, directory, photo, ground)
         raise unsolvable from error
     return replace(result, findings=gate.of_result(result, directory))
+
+
+def _of_failure(
+    inputs: Inputs,
+    settings: Settings,
+    directory: Path | None,
+    ground: GroundFrames | None,
+    photo: PhotoCoordinates | None,
+    error: InputError | GeometryError,
+) -> tuple[Finding, ...]:
+    """Find out why a run failed: strips that can be adjusted each by itself say more than strips only formed."""
+    broken = error.photos if isinstance(error, GeometryError) else ()
+    if settings.adjustment == BUNDLE and not broken and ground is not None and photo is not None:
+        try:
+            result = _walk(inputs, replace(settings, adjustment=POLYNOMIAL), ground, photo)
+        except (GeometryError, InputError, np.linalg.LinAlgError):
+            pass
+        else:
+            return gate.of_result(result, directory)
+    return gate.of_failure(inputs, settings, directory, photo, ground, broken)
 
 
 def _walk_of_any_order(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates) -> Result:

@@ -46,6 +46,7 @@ OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
 OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
 ALIKE = "P410"  # coordinates that are those of others
+PAIR = 2  # photos
 OUT_OF_ORDER = "P201"  # of a strip put in order by the layout of its photos alone bases prove nothing
 OF_CAMERAS = ("P105", "P107", "P110", "P111", "P112")  # findings on cameras: control that is misread looks like it
 
@@ -72,15 +73,18 @@ def of_failure(
     directory: Path | None,
     photo: PhotoCoordinates | None,
     ground: GroundFrames | None,
+    broken: Sequence[str] = (),
 ) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment having failed.
 
     photo, ground: what the run had found before it failed.
+    broken: photos that its refusal names; the strip of a pair that could not be oriented is not formed again in vain.
     Returns nothing when the evidence cannot be put together either.
     """
     try:
         frames = () if ground is None else _plain_frames(settings, ground.control)
-        return _of_data(inputs, settings, directory, photo, _given_control(inputs, directory, frames), starts=True)
+        control = _given_control(inputs, directory, frames)
+        return _of_data(inputs, settings, directory, photo, control, starts=True, broken=broken)
     except (GeometryError, InputError, np.linalg.LinAlgError):
         return ()  # the failure itself is what must be reported
 
@@ -93,16 +97,21 @@ def _of_data(
     control: GivenControl | None,
     *,
     starts: bool,
+    broken: Sequence[str] = (),
 ) -> tuple[Finding, ...]:
     """Look at all that is given, each strip formed by itself.
 
     starts: whether given orientations that are only a start count as well: they matter where a run fails.
+    broken: photos that the refusal of a run names.
     """
     if inputs.models is not None:
         return _of_unadjusted_models(inputs.models, settings, control)
     images = of_images(inputs, settings, photo)
     points = evidence.ideal(images.observations, images.cameras, settings)
-    formed = [evidence.form(strip, points, settings) for strip in images.strips]
+    pair = set(broken) if len(broken) == PAIR and not images.findings else set[str]()
+    formed = [
+        None if pair and pair < set(strip.photos) else evidence.form(strip, points, settings) for strip in images.strips
+    ]
     whole = [each for each in formed if each is not None]
     findings = [*images.findings, *_of_control(control, points, whole, settings, slips=True)]
     findings += control_layout.weak_layout(inputs, settings, images, control, directory)
@@ -112,8 +121,7 @@ def _of_data(
         findings += () if each.strip.id in moved else _of_flight(each)
     findings += given_cameras.centers(inputs, images.observations, images.strips, directory, starts=starts)
     findings += given_cameras.angles(inputs, whole, points, directory)
-    broken = [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]
-    for strip in broken:
+    for strip in [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]:
         findings += flight_order.find_other_scale(images.observations, strip.id, strip.photos)
         if control is not None and not images.findings:
             findings += find_distance(strip, points, control.points, control.read_in, settings)

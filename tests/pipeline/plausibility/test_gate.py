@@ -41,6 +41,7 @@ from photostrip.strip.image_coordinates.corrections import undistort
 from tests.pipeline.blocks import positions
 from tests.results import write_project
 from tests.simulated import inputs_of, settings_of
+from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -855,3 +856,14 @@ def test_an_id_beside_another_with_its_coordinates_is_no_copied_row_where_they_a
     enu[other] = enu[one]
     inputs = replace(case.inputs, observations=twin, control=replace(control, ids=ids, enu=enu))
     assert "P410" not in codes(gate.of_inputs(inputs, case.settings))
+
+
+def test_a_bundle_that_fails_is_explained_by_strips_adjusted_each_by_itself() -> None:
+    """Three ids that each stand for two points of two strips bend the start of the bundle until rays run parallel."""
+    with pytest.raises(photostrip.GeometryError) as caught:
+        photostrip.run(ROOT / "tests" / "data" / "shared-ids" / "project.yaml")
+    assert {(each.code, *each.points) for each in caught.value.findings} == {
+        ("P301", "T000009"),
+        ("P301", "T000022"),
+        ("P301", "T000024"),
+    }
