@@ -59,7 +59,7 @@ class Similarity:
 def similar(source: Floats, target: Floats, points: Floats) -> Floats:
     """Move points (n, 3) by each of t least-squares similarities of k corresponding points (t, k, 3); (t, n, 3).
 
-    Source: as ``Similarity.from_points``.
+    Source: [001] eq. 145-149; closed form by singular values, as ``Similarity.from_points``.
     """
     center_a, center_b = source.mean(axis=1, keepdims=True), target.mean(axis=1, keepdims=True)
     da, db = source - center_a, target - center_b

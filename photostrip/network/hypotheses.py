@@ -103,7 +103,7 @@ def _lists(solution: BundleSolution) -> Iterator[Hypothesis]:
 def _members(control: ControlObservations, number: int) -> Flags:
     """Which rows (c,) a control list gives; or those that are given in height only, of all lists."""
     if number == HEIGHTS_ONLY:
-        return np.asarray(~np.isfinite(control.sigma[:, :UP_AXIS]).any(axis=1), bool)
+        return np.zeros(len(control), bool) if control.height_only is None else control.height_only
     return np.asarray(control.lists == number, bool)
 
 
@@ -274,8 +274,8 @@ def _columns_of_images(solution: BundleSolution, together: Sequence[Hypothesis])
     alone = together[0].kind in OF_PHOTOS
     among = (of_photo if alone else of_camera[of_photo]) == number
     rays = by_calibration(problem, int(of_camera[number]) if alone else number, among, kinds, solution.state)
-    nothing = (np.zeros((rows, 3, len(kinds))) for rows in (len(problem.control), len(problem.positions)))
-    return Columns(among, rays, *nothing)
+    control, positions = (np.zeros((rows, 3, len(kinds))) for rows in (len(problem.control), len(problem.positions)))
+    return Columns(among=among, rays=rays, control=control, positions=positions)
 
 
 def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
@@ -288,7 +288,8 @@ def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
         rows = np.where(_members(control, hypothesis.number)[:, None], 1.0 / control.sigma, 0.0)
         shifts = rows[:, :, None] * np.eye(3)[:, axes]
         k = len(axes)
-        return Columns(none, np.zeros((0, c, k)), shifts, np.zeros((len(positions), 3, k)))
+        nothing = np.zeros((len(positions), 3, k))
+        return Columns(among=none, rays=np.zeros((0, c, k)), control=shifts, positions=nothing)
     group = np.where(positions.group >= 0, 0 if hypothesis.of == ALL else positions.group, -1)
     groups = np.unique(group[group >= 0])
     weight = np.where(group >= 0, 1.0, 0.0)[:, None] / positions.sigma
@@ -303,7 +304,8 @@ def _columns(solution: BundleSolution, hypothesis: Hypothesis) -> Columns:
     shifts = np.concatenate(parts, axis=2)
     shifts = shifts[:, :, shifts.any(axis=(0, 1))]
     k = shifts.shape[2]
-    return Columns(none, np.zeros((0, c, k)), np.zeros((len(control), 3, k)), shifts)
+    nothing = np.zeros((len(control), 3, k))
+    return Columns(among=none, rays=np.zeros((0, c, k)), control=nothing, positions=shifts)
 
 
 def _given_axes(problem: BundleProblem, number: int) -> Numbers:

@@ -89,6 +89,7 @@ class ControlObservations:
     # (c, 3): standard deviations along the three axes, metres; infinite: not given
     sigma: Floats = field(default_factory=lambda: _no_rows(3))
     frame: Numbers = field(default_factory=_no_numbers)  # (c,): list that gives each row; without: all in one
+    height_only: Flags | None = None  # (c,): rows that were given in height only, whatever takes part; None: not said
 
     def __len__(self) -> int:
         return len(self.point)

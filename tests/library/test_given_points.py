@@ -25,6 +25,7 @@ PUBLISHED = ROOT / "tests" / "data" / "authorities" / "sxb-bundle"
 METHODS = "auto", "similarity", "polynomial", "bundle"
 CODES = {"control-lost", "control-rejected", "control-image", "control-measured-once", "given-ray", "check-lost"}
 MOVED = 0.1  # mm, twenty standard deviations
+FOUND_IN_STRIP = 0.11  # mm; the rays of a strip alone leave 3.95 standard deviations of 0.1 mm, and 3.98 is the limit
 
 
 def table(path: Path) -> Columns:
@@ -111,9 +112,10 @@ def simulated() -> Sample:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_wrong_image_of_control_is_told_whatever_it_costs(simulated: Sample, method: str, axis: str) -> None:
     """One image of each control point in turn: all lost their coordinates with x parallaxes, most under GOOD."""
+    size = MOVED if method in {"auto", "bundle"} else FOUND_IN_STRIP
     for point in simulated.given("control"):
         row = simulated.images(point)[0]
-        require_told(simulated.run(method, [(row, axis)]), point, simulated.observations["photo"][row])
+        require_told(simulated.run(method, [(row, axis)], size), point, simulated.observations["photo"][row])
 
 
 @pytest.mark.parametrize("method", ["auto", "bundle"])

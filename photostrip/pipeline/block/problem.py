@@ -145,7 +145,14 @@ def control_observations(
             xyz[inside], axes[inside], sigma[inside] = given_positions(
                 control.enu[chosen], control.use[chosen], control.sigma[chosen], frame, start.points[point[chosen]], ids
             )
-    given = ControlObservations(point=point[rows], xyz=xyz - origin, axes=axes, sigma=sigma, frame=control.frame[rows])
+    given = ControlObservations(
+        point=point[rows],
+        xyz=xyz - origin,
+        axes=axes,
+        sigma=sigma,
+        frame=control.frame[rows],
+        height_only=np.asarray(~control.use[rows, :2].any(axis=1), bool),
+    )
     return given, rows
 
 

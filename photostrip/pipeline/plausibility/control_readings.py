@@ -102,6 +102,8 @@ READINGS = (
     _columns(1, 2, 0),
     _columns(2, 0, 1),
     Reading("P401", "heights are counted downwards", "give heights, positive upwards", factor=(1.0, 1.0, -1.0)),
+    Reading("P401", "it is turned over: perspective centres or heights are counted downwards",
+            "give heights and z positive upwards", factor=(1.0, -1.0, -1.0)),
     _heights(FOOT, "heights in feet, plan in metres"),
     _heights(1 / FOOT, "heights in metres, plan in feet"),
     _heights(1e-3, "heights in millimetres, plan in metres"),
@@ -153,6 +155,8 @@ def find_reading(
                 continue
             strip = formed
         aside = reading.beside(control, number)
+        if reading.without and not aside[held.given].any():
+            continue
         tried = strip.read(reading(control, number), frames, aside)
         if tried is None or not tried.fits:
             continue

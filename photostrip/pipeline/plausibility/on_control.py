@@ -96,7 +96,8 @@ class HeldStrip:
     def of(cls, stage: FormedPhotos | LinkedModels, control: ControlPoints, settings: Settings) -> HeldStrip:
         ids = stage.observations.point_ids if isinstance(stage, FormedPhotos) else stage.measured.point_ids
         rows = rows_of_given(control.ids, stage.formed.point, ids)
-        given = np.flatnonzero((rows >= 0) & control.use.any(axis=1) & ~control.check)
+        placed = np.asarray(np.isfinite(stage.formed.xyz).all(axis=1), bool)
+        given = np.flatnonzero((rows >= 0) & placed[rows] & control.use.any(axis=1) & ~control.check)
         if len(given) > MOST_POINTS:
             xyz = stage.formed.xyz[rows[given]]
             along = np.argsort((xyz - xyz.mean(axis=0)) @ np.linalg.svd(xyz - xyz.mean(axis=0))[2][0], kind="stable")

@@ -82,11 +82,18 @@ class _Reach(NamedTuple):
 
 
 def _scaled(observations: PhotoPoints, cameras: Mapping[str, Camera], camera: Camera) -> tuple[Floats, Numbers]:
-    """Image points of a camera in those units (m, 2), and their photos (m,)."""
+    """Image points of a camera in those units (m, 2), and their photos (m,).
+
+    The photos of a strip may lie crosswise in the comparator: then the sides of the format are exchanged.
+    """
     of_camera = [photo in cameras and cameras[photo].name == camera.name for photo in observations.photo_ids]
     rows = np.array(of_camera, bool)[observations.photo]
-    half = camera.principal_distance if camera.format is None else np.array(camera.format) / 2.0
-    return observations.xy[rows] / half, observations.photo[rows]
+    xy = observations.xy[rows]
+    half = np.full(2, camera.principal_distance) if camera.format is None else np.array(camera.format) / 2.0
+    either = [xy / half, xy / half[::-1]]
+    reach = [np.quantile(np.abs(each).max(axis=1), REACH_SHARE) if len(xy) else 0.0 for each in either]
+    crosswise = reach[0] > REACH[1] >= reach[1]
+    return either[1 if crosswise else 0], observations.photo[rows]
 
 
 def _reach(observations: PhotoPoints, scaled: Floats, photo: Numbers) -> _Reach:

@@ -277,7 +277,7 @@ def test_the_principal_distance_of_another_lens(factor: float) -> None:
     ]
     assert finding.code == "P105"
     if "would_fit_mm" in finding.evidence:
-        assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=1.0)
+        assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=2.0)  # by one step from 210 or 112 mm
 
 
 @pytest.mark.slow
