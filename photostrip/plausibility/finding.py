@@ -38,7 +38,7 @@ KINDS: dict[str, Kind] = {
     "P104": Kind("one photo mirrored against its neighbours", "it fits its neighbours only as a mirror image", ERROR),
     "P105": Kind(
         "principal distance off by a factor",
-        "format, heights or y parallaxes ask for another one",
+        "format, or heights of the control, ask for another one",
         ERROR,
     ),
     "P106": Kind(
@@ -128,7 +128,7 @@ KINDS: dict[str, Kind] = {
     "P408": Kind("given points exchanged", "two points fit with each other's coordinates", WARNING),
     "P409": Kind(
         "control of other points",
-        "half of it is off by a tenth of its spread; a row moved is named",
+        "half of it is off by a fifth of its spread, however it is read; a row moved is named",
         ERROR,
     ),
     "P410": Kind(

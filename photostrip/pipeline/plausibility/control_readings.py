@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from photostrip.arrays import Flags, Floats
 from photostrip.geodesy.frame_spec import GROUND_AXES
@@ -38,6 +39,9 @@ HEIGHTS, ALL = "heights", "all"
 UNITS = "bring heights and plan into one unit, or name a crs with the right unit of height"
 COLUMNS = "put `control.axes` into the order of the columns"
 HEIGHT = 2
+DISTANCES = np.log(10.0) * np.linspace(-1.0, 1.0, 9)  # logarithms of factors, each 1.78 times the one before
+UNIT_FACTOR = 5.0  # a principal distance off by more may be right, and the decimal point of the image coordinates wrong
+NEAR, STEPS = 1e-3, 10  # of a principal distance, within which it is found, and trials for it
 LEAST_FULL = 3  # full points that always fit
 LEAST_HEIGHTS = 2  # that are the same by chance
 
@@ -92,6 +96,7 @@ def _heights(factor: float, text: str) -> Reading:
 
 
 AS_GIVEN = Reading("", "", "")
+DISTANCE = Reading("P105", "", "", distance=np.nan)  # which is estimated
 MIRRORED = Reading("P401", "the control is left-handed: its axes are exchanged or one of them counts backwards",
                    f"{COLUMNS}, [north, east, up] where x points north", factor=(1.0, -1.0, 1.0))  # fmt: skip
 READINGS = (
@@ -118,8 +123,7 @@ READINGS = (
     Reading("P403", "feet read as metres",
             f"name the right unit: a crs in feet, or metres in the table; {KINDS_OF_FEET}",
             factor=(FOOT, FOOT, FOOT), of_list=True),
-    Reading("P105", "", "", distance=0.1),
-    Reading("P105", "", "", distance=10.0),
+    DISTANCE,
     Reading("P404", "", "", without=HEIGHTS),
     Reading("P404", "", "", of_list=True, without=HEIGHTS),
     Reading("P407", "", "", of_list=True, without=ALL),
@@ -136,47 +140,84 @@ class Better(NamedTuple):
 
 
 def find_reading(
-    held: HeldStrip, control: ControlPoints, frames: Sequence[GroundFrame], as_given: OnControl | None
+    held: HeldStrip,
+    control: ControlPoints,
+    frames: Sequence[GroundFrame],
+    as_given: OnControl | None,
+    *,
+    distance: bool = True,
 ) -> Better | None:
-    """Find the reading under which a strip fits its control better than as it is given; None without one."""
-    if as_given is not None and as_given.fits and not as_given.found.out:
-        return None
+    """Find the reading under which a strip fits its control better than as it is given; None without one.
+
+    distance: whether other principal distances are asked about, for which the strip is formed many times.
+    """
     lists, sizes = np.unique(control.frame[held.given], return_counts=True)
     smaller = lists[np.argsort(sizes, kind="stable")][:-1].tolist()  # against a majority nothing is said
     ways = [(each, number) for each in READINGS for number in (smaller if each.of_list else [None])]
-    best, least = None, np.inf
+    best, least, price = None, np.inf, float(np.log(len(ways) / LEVEL))
     if as_given is not None:
-        least = _cost(as_given, AS_GIVEN) - np.log(len(ways) / LEVEL)
+        if _excess(as_given) < price:
+            return None
+        least = _cost(as_given, AS_GIVEN) - price
     for reading, number in ways:
-        strip = held
-        if reading.distance != 1.0:
-            formed = None if as_given is not None and as_given.fits else held.at_distance(reading.distance)
-            if formed is None:
-                continue
-            strip = formed
         aside = reading.beside(control, number)
-        if reading.without and not aside[held.given].any():
+        if (reading.without and not aside[held.given].any()) or (reading is DISTANCE and not distance):
             continue
-        tried = strip.read(reading(control, number), frames, aside)
+        way, unknowns = reading, int(aside[held.given].any(axis=0).sum())
+        if reading is DISTANCE:
+            factor, tried = _best_distance(held, control, frames)
+            way, unknowns = replace(reading, distance=factor), 1
+        else:
+            tried = held.read(reading(control, number), frames, aside)
         if tried is None or not tried.fits:
             continue
-        cost = _cost(tried, reading, int(aside[held.given].any(axis=0).sum()), number)
+        cost = _cost(tried, way, unknowns, number)
         if cost < least:
-            best, least = Better(reading=reading, number=number, laid=tried), cost
+            best, least = Better(reading=way, number=number, laid=tried), cost
     return best
 
 
-def _cost(laid: OnControl, reading: Reading, axes: int = 0, number: int | None = None) -> float:
+def _best_distance(
+    held: HeldStrip, control: ControlPoints, frames: Sequence[GroundFrame]
+) -> tuple[float, OnControl | None]:
+    """Form a strip with other principal distances, up to ten times shorter or longer, and find the likeliest.
+
+    Returns the factor of the principal distance, and the strip with it on its control; None where none is formed.
+    """
+    laid: dict[float, OnControl | None] = {}
+
+    def cost(logarithm: float) -> float:
+        formed = held.at_distance(float(np.exp(logarithm)))
+        laid[logarithm] = None if formed is None else formed.read(control, frames)
+        return np.inf if (tried := laid[logarithm]) is None else _cost(tried, AS_GIVEN, 1)
+
+    costs = [cost(each) for each in DISTANCES]
+    first = int(np.argmin(costs))
+    if np.isfinite(costs[first]):
+        inside = DISTANCES[max(first - 1, 0)], DISTANCES[min(first + 1, len(DISTANCES) - 1)]
+        with np.errstate(invalid="ignore"):  # where it is not formed
+            minimize_scalar(cost, bounds=inside, method="bounded", options={"xatol": NEAR, "maxiter": STEPS})
+    best = min(laid, key=lambda each: np.inf if (tried := laid[each]) is None else _cost(tried, AS_GIVEN, 1))
+    return float(np.exp(best)), laid[best]
+
+
+def _excess(laid: OnControl) -> float:
+    """By how much the likelihood could rise: what is left beyond the redundancy, and what was taken out."""
+    each = np.log(len(laid.place.coordinates.point) / SEARCH_LEVEL)
+    return float(max(laid.left.squares - laid.left.freedom, 0.0) / 2.0 + each * len(laid.found.out))
+
+
+def _cost(laid: OnControl, reading: Reading, unknowns: int = 0, number: int | None = None) -> float:
     """Minus the logarithm of the likelihood of the coordinates as they are written, but for a constant.
 
-    What was taken out is as likely as a single test of a search demands; so is one unknown for each of the axes along
-    which something lies beside the others.
+    What was taken out is as likely as a single test of a search demands, and so is each unknown of the reading: a shift
+    along an axis, a principal distance.
     """
     place, points = laid.place.coordinates, laid.points
     read = np.ones(len(points), bool) if number is None else points.frame == number
     factor = np.where(read[:, None], np.abs(reading.factor), 1.0)[place.point, place.axis]
     each = np.log(len(place.point) / SEARCH_LEVEL)
-    unknown = len(laid.found.out) + axes
+    unknown = len(laid.found.out) + unknowns
     size = np.linalg.slogdet(laid.place.joint_covariance)[1]
     return float(laid.left.squares / 2.0 + size / 2.0 - np.log(factor).sum() + each * unknown)
 
@@ -215,14 +256,15 @@ def find_distance(
     strip: Strip, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
 ) -> list[Finding]:
     """Name the principal distance with which alone a strip can be formed, and fits its control."""
-    for reading in READINGS:
-        if reading.distance == 1.0:
+    for start in np.exp(DISTANCES[[0, -1]]).tolist():
+        stage = evidence.form(evidence.at_distance(strip, start), observations, settings)
+        if stage is None:
             continue
-        stage = evidence.form(evidence.at_distance(strip, reading.distance), observations, settings)
-        laid = None if stage is None else HeldStrip.of(stage, control, settings).read(control, frames)
+        factor, laid = _best_distance(HeldStrip.of(stage, control, settings), control, frames)
         if laid is not None and laid.fits:
             head = f"strip {strip.id} cannot be formed, and is {_size(laid):.2g} m off its control if"
-            return [_of_distance(strip, reading.distance, head, {"variance_factor": laid.variance})]
+            return [_of_distance(strip, start * factor, head, {"variance_factor": laid.variance})]
+        break
     return []
 
 
@@ -230,10 +272,10 @@ def _of_distance(strip: Strip, factor: float, head: str, numbers: Evidence) -> F
     """Name a principal distance off by a power of ten (P105), or images that are, whose size nobody knows (P101)."""
     camera = strip.camera
     would_fit = camera.principal_distance * factor
-    message = f"{head} the principal distance is {would_fit:g} mm; {camera.principal_distance:g} mm is given"
-    if camera.format is not None:
+    message = f"{head} the principal distance is {would_fit:.5g} mm; {camera.principal_distance:g} mm is given"
+    if camera.format is not None or 1.0 / UNIT_FACTOR < factor < UNIT_FACTOR:
         return other_distance(camera, would_fit, message, FIX, numbers, (strip.id,))
-    message += f"; or the image coordinates are {1 / factor:g} times as large"
+    message += f"; or the image coordinates are {1 / factor:.4g} times as large"
     fix = f"correct `observations.unit`, or the principal distance: {FIX}"
     return found("P101", message, fix, numbers, strips=(strip.id,), key="observations.unit")
 

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
 OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
+OF_DISTANCE = ("P101", "P105", "P107")  # findings on principal distances, or as much of the images
 ALIKE = "P410"  # coordinates that are those of others
 PAIR = 2  # photos
 OUT_OF_ORDER = "P201"  # of a strip put in order by the layout of its photos alone bases prove nothing
@@ -123,7 +124,7 @@ def _of_data(
     findings += given_cameras.angles(inputs, whole, points, directory)
     for strip in [strip for strip, each in zip(images.strips, formed, strict=True) if each is None]:
         findings += flight_order.find_other_scale(images.observations, strip.id, strip.photos)
-        if control is not None and not images.findings:
+        if control is not None and not any(each.code in OF_DISTANCE for each in findings):
             findings += find_distance(strip, points, control.points, control.read_in, settings)
     return _told(findings, inputs, settings)
 
@@ -219,7 +220,13 @@ def _of_control(
     if control is None:
         return []
     copied = list(identity.find_copied_points(control.points, observations))
-    of_strips = [given_control.of_strip(control, each, settings) for each in formed]
+    of_strips: list[given_control.OfStrip] = []
+    named_cameras: set[str] = set()  # another strip need not be formed with many distances to say it again
+    for stage in formed:
+        camera = stage.strip.camera.name
+        of_strips.append(given_control.of_strip(control, stage, settings, distance=camera not in named_cameras))
+        if any(each.code in OF_DISTANCE for each in of_strips[-1].whole):
+            named_cameras.add(camera)
     findings = [*control.findings, *copied, *(finding for each in of_strips for finding in each.whole)]
     named = {name for each in copied for name in each.names}  # with the coordinates of another it looks like a slip
     single = (finding for each in of_strips for finding in each.slips) if slips else ()

@@ -72,15 +72,20 @@ class OfStrip:
     slips: list[Finding] = field(default_factory=list)  # of single ones: P406, P408
 
 
-def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings) -> OfStrip:
-    """Compare the given points with a formed strip, as they are given and as they may be read."""
+def of_strip(
+    control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings, *, distance: bool = True
+) -> OfStrip:
+    """Compare the given points with a formed strip, as they are given and as they may be read.
+
+    distance: whether the principal distance may be wrong as well.
+    """
     strip, points = stage.strip.id, control.points
     held = HeldStrip.of(stage, points, settings)
     if not len(held.given):
         return OfStrip()
     as_given = held.read(points, control.read_in, as_given=True)
     whole: list[Finding] = []
-    better = control_readings.find_reading(held, points, control.read_in, as_given)
+    better = control_readings.find_reading(held, points, control.read_in, as_given, distance=distance)
     if better is not None:
         whole.append(control_readings.named(better, as_given, held, axes_are_right=control.axes_are_right))
     else:
