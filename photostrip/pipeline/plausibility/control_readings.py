@@ -41,7 +41,8 @@ COLUMNS = "put `control.axes` into the order of the columns"
 HEIGHT = 2
 DISTANCES = np.log(10.0) * np.linspace(-1.0, 1.0, 9)  # logarithms of factors, each 1.78 times the one before
 UNIT_FACTOR = 5.0  # a principal distance off by more may be right, and the decimal point of the image coordinates wrong
-NEAR, STEPS = 1e-3, 10  # of a principal distance, within which it is found, and trials for it
+LITTLE = 0.1  # of a principal distance: another certificate, or focus
+NEAR, STEPS = 1e-4, 20  # of a principal distance, within which it is found, and trials for it
 LEAST_FULL = 3  # full points that always fit
 LEAST_HEIGHTS = 2  # that are the same by chance
 
@@ -123,10 +124,10 @@ READINGS = (
     Reading("P403", "feet read as metres",
             f"name the right unit: a crs in feet, or metres in the table; {KINDS_OF_FEET}",
             factor=(FOOT, FOOT, FOOT), of_list=True),
-    DISTANCE,
     Reading("P404", "", "", without=HEIGHTS),
     Reading("P404", "", "", of_list=True, without=HEIGHTS),
     Reading("P407", "", "", of_list=True, without=ALL),
+    DISTANCE,
 )  # fmt: skip
 """Ways to read given coordinates that are wrong as a whole; of two that fit alike the first is named."""
 
@@ -145,11 +146,12 @@ def find_reading(
     frames: Sequence[GroundFrame],
     as_given: OnControl | None,
     *,
-    distance: bool = True,
+    distance: bool = False,
 ) -> Better | None:
     """Find the reading under which a strip fits its control better than as it is given; None without one.
 
-    distance: whether other principal distances are asked about, for which the strip is formed many times.
+    distance: whether the camera is in doubt, so that other principal distances are asked about wherever the strip does
+        not fit at once; else where it does not fit at all. For them it is formed many times.
     """
     lists, sizes = np.unique(control.frame[held.given], return_counts=True)
     smaller = lists[np.argsort(sizes, kind="stable")][:-1].tolist()  # against a majority nothing is said
@@ -161,7 +163,9 @@ def find_reading(
         least = _cost(as_given, AS_GIVEN) - price
     for reading, number in ways:
         aside = reading.beside(control, number)
-        if (reading.without and not aside[held.given].any()) or (reading is DISTANCE and not distance):
+        if reading.without and not aside[held.given].any():
+            continue
+        if reading is DISTANCE and (best is not None or not (distance or as_given is None or not as_given.fits)):
             continue
         way, unknowns = reading, int(aside[held.given].any(axis=0).sum())
         if reading is DISTANCE:
@@ -184,21 +188,22 @@ def _best_distance(
 
     Returns the factor of the principal distance, and the strip with it on its control; None where none is formed.
     """
-    laid: dict[float, OnControl | None] = {}
+    costs: dict[float, float] = {}
 
     def cost(logarithm: float) -> float:
-        formed = held.at_distance(float(np.exp(logarithm)))
-        laid[logarithm] = None if formed is None else formed.read(control, frames)
-        return np.inf if (tried := laid[logarithm]) is None else _cost(tried, AS_GIVEN, 1)
+        formed = held.at_distance(float(np.exp(logarithm)), searched=False)
+        tried = None if formed is None else formed.read(control, frames)
+        costs[logarithm] = np.inf if tried is None else _cost(tried, AS_GIVEN)
+        return costs[logarithm]
 
-    costs = [cost(each) for each in DISTANCES]
-    first = int(np.argmin(costs))
-    if np.isfinite(costs[first]):
-        inside = DISTANCES[max(first - 1, 0)], DISTANCES[min(first + 1, len(DISTANCES) - 1)]
+    best = int(np.argmin([cost(each) for each in DISTANCES]))
+    around = DISTANCES[max(best - 1, 0)], DISTANCES[min(best + 1, len(DISTANCES) - 1)]
+    for inside in (around, (-LITTLE, LITTLE)):  # one that is off by little is likely in a narrow range only
         with np.errstate(invalid="ignore"):  # where it is not formed
             minimize_scalar(cost, bounds=inside, method="bounded", options={"xatol": NEAR, "maxiter": STEPS})
-    best = min(laid, key=lambda each: np.inf if (tried := laid[each]) is None else _cost(tried, AS_GIVEN, 1))
-    return float(np.exp(best)), laid[best]
+    factor = float(np.exp(min(costs, key=lambda each: costs[each])))
+    formed = held.at_distance(factor)
+    return factor, None if formed is None else formed.read(control, frames)
 
 
 def _excess(laid: OnControl) -> float:

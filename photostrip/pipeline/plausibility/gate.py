@@ -141,14 +141,17 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         return _of_adjusted_models(result, inputs.models, control, predicted)
     points = result.refined.observations
     photo = PhotoCoordinates(result.measured, result.interior)
-    images = replace(of_images(inputs, settings, photo), observations=points)
+    images = of_images(inputs, settings, photo)
+    # an adjustment gives its image coordinates free of what it took up of the camera
+    as_given = points if result.bundle is None else evidence.ideal(images.observations, images.cameras, settings)
+    images = replace(images, observations=points)
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
-    formed = [evidence.as_formed(each.of_photos, points) for each in stages]
+    formed = [evidence.as_formed(each.of_photos, as_given) for each in stages]
     causes = [] if result.bundle is None else _causes(result.bundle, inputs)
     misread = any(each.code in OF_CAMERAS for each in causes)  # perhaps
     doubtful = [each for each in formed if misread or by_result.is_doubtful(each, result, predicted)]
     findings = [*images.findings]
-    findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None)
+    findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None, distance=misread)
     if control is not None and not any(each.is_error for each in findings):
         named = {name for each in (*findings, *causes) for name in each.points}
         findings += [each for each in by_result.of_result(result, predicted, control) if named.isdisjoint(each.points)]
@@ -215,18 +218,16 @@ def _of_control(
     settings: Settings,
     *,
     slips: bool,
+    distance: bool = False,
 ) -> list[Finding]:
-    """Look at given coordinates: where they lie, how they go with each strip, and with it by single points."""
+    """Look at given coordinates: where they lie, how they go with each strip, and with it by single points.
+
+    distance: whether the cameras are in doubt.
+    """
     if control is None:
         return []
     copied = list(identity.find_copied_points(control.points, observations))
-    of_strips: list[given_control.OfStrip] = []
-    named_cameras: set[str] = set()  # another strip need not be formed with many distances to say it again
-    for stage in formed:
-        camera = stage.strip.camera.name
-        of_strips.append(given_control.of_strip(control, stage, settings, distance=camera not in named_cameras))
-        if any(each.code in OF_DISTANCE for each in of_strips[-1].whole):
-            named_cameras.add(camera)
+    of_strips = [given_control.of_strip(control, each, settings, distance=distance) for each in formed]
     findings = [*control.findings, *copied, *(finding for each in of_strips for finding in each.whole)]
     named = {name for each in copied for name in each.names}  # with the coordinates of another it looks like a slip
     single = (finding for each in of_strips for finding in each.slips) if slips else ()

@@ -73,11 +73,11 @@ class OfStrip:
 
 
 def of_strip(
-    control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings, *, distance: bool = True
+    control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings, *, distance: bool = False
 ) -> OfStrip:
     """Compare the given points with a formed strip, as they are given and as they may be read.
 
-    distance: whether the principal distance may be wrong as well.
+    distance: whether the camera is in doubt.
     """
     strip, points = stage.strip.id, control.points
     held = HeldStrip.of(stage, points, settings)

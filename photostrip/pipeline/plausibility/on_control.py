@@ -59,8 +59,9 @@ class OnControl:
 
     @property
     def fits(self) -> bool:
-        """Whether no more is wrong with the strip than some of its control."""
-        return self.left.freedom > 0 and self.variance <= BENT**2
+        """Whether no more is wrong with the strip than some of its control, and never most of it."""
+        majority = self.found.whole.allows(tuple(self.found.coordinates))
+        return majority and self.left.freedom > 0 and self.variance <= BENT**2
 
     @cached_property
     def off(self) -> tuple[Floats, Floats]:
@@ -117,12 +118,17 @@ class HeldStrip:
         joint = joint_cofactors(stage.network, coordinates_of(stage.network, stage.formed.point[self.rows]))
         return joint * stage.formed.links.factor
 
-    def at_distance(self, factor: float) -> HeldStrip | None:
-        """Return the strip formed with so many times its principal distance; None of models, or where it cannot be."""
+    def at_distance(self, factor: float, *, searched: bool = True) -> HeldStrip | None:
+        """Return the strip formed with so many times its principal distance; None of models, or where it cannot be.
+
+        searched: whether gross errors are searched for in its pairs, which takes most of the time.
+        """
         if not isinstance(self.stage, FormedPhotos):
             return None
-        strip = evidence.at_distance(self.stage.strip, factor)
-        stage = evidence.form(strip, self.stage.observations, self.settings)
+        strip, settings = evidence.at_distance(self.stage.strip, factor), self.settings
+        if not searched:
+            settings = replace(settings, relative=replace(settings.relative, screening="none"))
+        stage = evidence.form(strip, self.stage.observations, settings)
         if stage is None or not np.isin(self.stage.formed.point[self.rows], stage.formed.point).all():
             return None
         rows = np.searchsorted(stage.formed.point, self.stage.formed.point[self.rows])
