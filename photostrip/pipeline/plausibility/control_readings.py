@@ -26,7 +26,7 @@ from photostrip.pipeline.plausibility.on_control import HeldStrip, OnControl
 from photostrip.pipeline.plausibility.shared_control import FIX, other_distance, shifted_list
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import found
-from photostrip.plausibility.control.shared_by_control import ShiftedList
+from photostrip.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
 from photostrip.plausibility.control.wrong_place import FOOT, KINDS_OF_FEET
 from photostrip.plausibility.finding import Evidence
 from photostrip.points import ControlPoints, PhotoPoints
@@ -151,7 +151,7 @@ def find_reading(
     """Find the reading under which a strip fits its control better than as it is given; None without one.
 
     distance: whether the camera is in doubt, so that other principal distances are asked about wherever the strip does
-        not fit at once; else where it does not fit at all. For them it is formed many times.
+        not fit at once; else only where its heights ask for them. For them it is formed many times.
     """
     lists, sizes = np.unique(control.frame[held.given], return_counts=True)
     smaller = lists[np.argsort(sizes, kind="stable")][:-1].tolist()  # against a majority nothing is said
@@ -169,7 +169,7 @@ def find_reading(
             continue
         way, unknowns = reading, int(aside[held.given].any(axis=0).sum())
         if reading is DISTANCE:
-            factor, tried = _best_distance(held, control, frames)
+            factor, tried = _best_distance(held, control, frames, closely=distance or _stretched(as_given))
             way, unknowns = replace(reading, distance=factor), 1
         else:
             tried = held.read(reading(control, number), frames, aside)
@@ -182,10 +182,11 @@ def find_reading(
 
 
 def _best_distance(
-    held: HeldStrip, control: ControlPoints, frames: Sequence[GroundFrame]
+    held: HeldStrip, control: ControlPoints, frames: Sequence[GroundFrame], *, closely: bool
 ) -> tuple[float, OnControl | None]:
     """Form a strip with other principal distances, up to ten times shorter or longer, and find the likeliest.
 
+    closely: whether any may be right, and not only one with the decimal point elsewhere.
     Returns the factor of the principal distance, and the strip with it on its control; None where none is formed.
     """
     costs: dict[float, float] = {}
@@ -196,14 +197,23 @@ def _best_distance(
         costs[logarithm] = np.inf if tried is None else _cost(tried, AS_GIVEN)
         return costs[logarithm]
 
-    best = int(np.argmin([cost(each) for each in DISTANCES]))
+    asked = DISTANCES if closely else DISTANCES[[0, -1]]
+    best = int(np.argmin([cost(each) for each in asked]))
     around = DISTANCES[max(best - 1, 0)], DISTANCES[min(best + 1, len(DISTANCES) - 1)]
-    for inside in (around, (-LITTLE, LITTLE)):  # one that is off by little is likely in a narrow range only
+    # one that is off by little is likely in a narrow range only
+    for inside in (around, (-LITTLE, LITTLE)) if closely else ():
         with np.errstate(invalid="ignore"):  # where it is not formed
             minimize_scalar(cost, bounds=inside, method="bounded", options={"xatol": NEAR, "maxiter": STEPS})
     factor = float(np.exp(min(costs, key=lambda each: costs[each])))
     formed = held.at_distance(factor)
     return factor, None if formed is None else formed.read(control, frames)
+
+
+def _stretched(as_given: OnControl | None) -> bool:
+    """Whether a strip fits no control as it is, and its heights ask for another principal distance."""
+    if as_given is None or as_given.fits:
+        return False
+    return isinstance(find_shared(as_given.counted), StretchedHeights)
 
 
 def _excess(laid: OnControl) -> float:
@@ -265,7 +275,7 @@ def find_distance(
         stage = evidence.form(evidence.at_distance(strip, start), observations, settings)
         if stage is None:
             continue
-        factor, laid = _best_distance(HeldStrip.of(stage, control, settings), control, frames)
+        factor, laid = _best_distance(HeldStrip.of(stage, control, settings), control, frames, closely=True)
         if laid is not None and laid.fits:
             head = f"strip {strip.id} cannot be formed, and is {_size(laid):.2g} m off its control if"
             return [_of_distance(strip, start * factor, head, {"variance_factor": laid.variance})]
