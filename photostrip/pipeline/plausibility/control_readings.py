@@ -1,8 +1,9 @@
-"""Other ways to read the given coordinates: columns, signs, units, rows; and what all control of a strip shares.
+"""Ways to read the given coordinates: columns, signs, units, rows of ids, lists, the principal distance of the photos.
 
-Each reading is a row of ``READINGS``. Where a formed strip does not fit its control, every reading is tried on it; that
-under which it fits best is named, if chance does not make as much of so many readings (an F test of the variance
-factors). Where none fits, something may be common to all heights or to one list (``shared_by_control``).
+Each is a row of ``READINGS``. Where a formed strip does not fit its control, it is laid on it under each of them, and
+what is written has a likelihood: that of the misclosures by their joint covariance, with a price for what is taken out.
+The likeliest is named, if the strip fits under it and chance does not make as much of so many. Where none fits,
+something may be common to all heights or to one list (``shared_by_control``).
 """
 
 from __future__ import annotations
@@ -197,13 +198,15 @@ def _best_distance(
         costs[logarithm] = np.inf if tried is None else _cost(tried, AS_GIVEN)
         return costs[logarithm]
 
-    asked = DISTANCES if closely else DISTANCES[[0, -1]]
-    best = int(np.argmin([cost(each) for each in asked]))
-    around = DISTANCES[max(best - 1, 0)], DISTANCES[min(best + 1, len(DISTANCES) - 1)]
-    # one that is off by little is likely in a narrow range only
-    for inside in (around, (-LITTLE, LITTLE)) if closely else ():
-        with np.errstate(invalid="ignore"):  # where it is not formed
-            minimize_scalar(cost, bounds=inside, method="bounded", options={"xatol": NEAR, "maxiter": STEPS})
+    if closely:
+        best = int(np.argmin([cost(each) for each in DISTANCES]))
+        around = DISTANCES[max(best - 1, 0)], DISTANCES[min(best + 1, len(DISTANCES) - 1)]
+        for inside in (around, (-LITTLE, LITTLE)):  # one that is off by little is likely in a narrow range only
+            with np.errstate(invalid="ignore"):  # where it is not formed
+                minimize_scalar(cost, bounds=inside, method="bounded", options={"xatol": NEAR, "maxiter": STEPS})
+    else:
+        for each in DISTANCES[[0, -1]]:
+            cost(float(each))
     factor = float(np.exp(min(costs, key=lambda each: costs[each])))
     formed = held.at_distance(factor)
     return factor, None if formed is None else formed.read(control, frames)
@@ -316,15 +319,17 @@ def _size(laid: OnControl) -> float:
     return float(np.median(np.abs(laid.found.whole.w)))
 
 
-def of_whole_control(held: HeldStrip, as_given: OnControl | None, control: ControlPoints) -> list[Finding]:
+def of_whole_control(
+    held: HeldStrip, as_given: OnControl | None, control: ControlPoints, frames: Sequence[GroundFrame]
+) -> list[Finding]:
     """Say that a strip fits its control under no reading (P409), or that all its heights are the same (P410)."""
     strip = held.stage.strip.id
     fix = "do its ids and coordinates belong to these photos, and to the points that were measured?"
     if as_given is None:
         full = control.use[held.given].all(axis=1)
         shown = held.stage.formed.xyz[held.rows[full]]
-        if len(shown) <= LEAST_FULL or collinearity(shown) < WEAK_LIMIT**2:
-            return []  # it may be too little
+        if len(shown) <= LEAST_FULL or collinearity(shown) < WEAK_LIMIT**2 or held.lies_on(control, frames):
+            return []  # it may be too little, or known too badly
         message = f"strip {strip} cannot be laid on its control, however that is read"
         return [found("P409", message, fix, {"points": len(shown)}, strips=(strip,), key="control")]
     if as_given.fits:

@@ -6,7 +6,7 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -149,9 +149,11 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     formed = [evidence.as_formed(each.of_photos, as_given) for each in stages]
     causes = [] if result.bundle is None else _causes(result.bundle, inputs)
     misread = any(each.code in OF_CAMERAS for each in causes)  # perhaps
-    doubtful = [each for each in formed if misread or by_result.is_doubtful(each, result, predicted)]
+    odd = {each.strip.id for each in formed if by_result.is_doubtful(each, result, predicted)}
+    doubtful = [each for each in formed if misread or each.strip.id in odd]
+    cameras = odd if misread else set[str]()  # what was taken up does not explain all
     findings = [*images.findings]
-    findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None, distance=misread)
+    findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None, distances=cameras)
     if control is not None and not any(each.is_error for each in findings):
         named = {name for each in (*findings, *causes) for name in each.points}
         findings += [each for each in by_result.of_result(result, predicted, control) if named.isdisjoint(each.points)]
@@ -218,16 +220,18 @@ def _of_control(
     settings: Settings,
     *,
     slips: bool,
-    distance: bool = False,
+    distances: Container[str] = (),
 ) -> list[Finding]:
     """Look at given coordinates: where they lie, how they go with each strip, and with it by single points.
 
-    distance: whether the cameras are in doubt.
+    distances: ids of strips whose camera is in doubt.
     """
     if control is None:
         return []
     copied = list(identity.find_copied_points(control.points, observations))
-    of_strips = [given_control.of_strip(control, each, settings, distance=distance) for each in formed]
+    of_strips = [
+        given_control.of_strip(control, each, settings, distance=each.strip.id in distances) for each in formed
+    ]
     findings = [*control.findings, *copied, *(finding for each in of_strips for finding in each.whole)]
     named = {name for each in copied for name in each.names}  # with the coordinates of another it looks like a slip
     single = (finding for each in of_strips for finding in each.slips) if slips else ()

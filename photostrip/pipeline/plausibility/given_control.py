@@ -89,7 +89,7 @@ def of_strip(
     if better is not None:
         whole.append(control_readings.named(better, as_given, held, axes_are_right=control.axes_are_right))
     else:
-        whole += control_readings.of_whole_control(held, as_given, points)
+        whole += control_readings.of_whole_control(held, as_given, points, control.read_in)
         whole += [] if whole or as_given is None else shared_control.of_formed(as_given, stage)
     laid, reading = (as_given, control_readings.AS_GIVEN) if better is None else (better.laid, better.reading)
     if laid is None or not laid.fits or reading.rows or (whole and better is None):

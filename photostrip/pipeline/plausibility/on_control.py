@@ -1,4 +1,4 @@
-"""A formed strip on its control, as they are read: what it predicts of each of them, and how well.
+"""A formed strip on its control, however that is read: what it predicts of each coordinate, and how well.
 
 The errors of a strip by those of its image coordinates are known, all of them together, so that a strip which bends as
 they let it contradicts nothing. Under each reading the strip is laid on its control by a similarity, and what no other
@@ -29,7 +29,6 @@ from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility.control.given_points import far_away
 from photostrip.points import ControlPoints
 from photostrip.strip.error_propagation.strip_at_control import StripAtControl
-from photostrip.strip.error_propagation.strip_errors import differentiate_strip
 from photostrip.strip.gross_errors.control.control_deletion import JointAdjustment, adjust
 from photostrip.strip.gross_errors.control.control_rejections import FoundErrors, kept_of
 from photostrip.strip.gross_errors.control.control_screening import BENT, first_search, majority, search
@@ -60,8 +59,8 @@ class OnControl:
     @property
     def fits(self) -> bool:
         """Whether no more is wrong with the strip than some of its control, and never most of it."""
-        majority = self.found.whole.allows(tuple(self.found.coordinates))
-        return majority and self.left.freedom > 0 and self.variance <= BENT**2
+        most_stay = self.found.whole.allows(self.found.coordinates)
+        return most_stay and self.left.freedom > 0 and self.variance <= BENT**2
 
     @cached_property
     def off(self) -> tuple[Floats, Floats]:
@@ -110,11 +109,9 @@ class HeldStrip:
         """Covariance (3 n, 3 n) of those points, in the unit of the strip, but for a similarity."""
         stage = self.stage
         if isinstance(stage, FormedPhotos):
-            errors = differentiate_strip(stage.orientation, stage.formed, AS_FORMED, stage.observations.sigma)
-            scatter = max(1.0, np.median(stage.screened.scatter.by_pair) ** 2 / (2 * stage.sigma**2))
-            errors = errors.with_doubt(stage.formed.junctions.doubt / np.sqrt(scatter))
+            errors = stage.errors(AS_FORMED)
             points = errors.points(self.rows)
-            return errors.joint_covariance(points, errors.frames(points)[0]) * scatter
+            return errors.joint_covariance(points, errors.frames(points)[0]) * stage.excess
         joint = joint_cofactors(stage.network, coordinates_of(stage.network, stage.formed.point[self.rows]))
         return joint * stage.formed.links.factor
 
@@ -166,6 +163,14 @@ class HeldStrip:
         except (PhotostripError, np.linalg.LinAlgError):
             return None
         return OnControl(points=points, place=at_all, counted=at_counted, kept=kept, found=found)
+
+    def lies_on(self, control: ControlPoints, frames: Sequence[GroundFrame]) -> bool:
+        """Whether the strip can be laid on its control at all, as that is read."""
+        try:
+            self._oriented(control.take(self.given), frames)
+        except (PhotostripError, np.linalg.LinAlgError):
+            return False
+        return True
 
     def _majority(self, control: ControlPoints, some: Numbers, frames: Sequence[GroundFrame]) -> ControlPoints:
         """Control without the full points that go least with most of the others, to lay the strip on at first."""

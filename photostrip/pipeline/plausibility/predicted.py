@@ -115,10 +115,12 @@ def of_result(result: Result, predicted: Predicted, control: GivenControl) -> It
     given = given_points.level(control.points, control.frames, as_written=control.as_written)
     if given is None or result.precision is None:
         return
+    asked = np.isfinite(predicted.off) & ~predicted.sound
+    if not (asked & (np.abs(predicted.off) > LIMIT * predicted.sigma)).any() and not given.moved.any():
+        return  # what the axes are where they are written takes long to say
     unit = np.array([[frame.plan_factor, frame.plan_factor, frame.height_factor] for frame in control.frames])
     projected = np.array([frame.kind == "projected" for frame in control.frames])[control.points.frame]
     # differences count by map coordinates: a map has a scale of its own
     scale = np.where(projected[:, None], given.steps.unit / unit[control.points.frame], 1.0)
     scale[:, HEIGHT] = 1.0
-    asked = np.isfinite(predicted.off) & ~predicted.sound
     yield from slips.find_slips(given, predicted.off * scale, predicted.spread, asked=asked)

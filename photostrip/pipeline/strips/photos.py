@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
+from photostrip.geometry.similarity import Similarity
 from photostrip.network.gross_errors.strip_rays import StripRays
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import Settings, Strip
@@ -17,6 +18,7 @@ from photostrip.pipeline.strips.screened_formation import form_screened, with_re
 from photostrip.points import PhotoPoints
 from photostrip.rejection import Rejection
 from photostrip.strip import absolute_orientation
+from photostrip.strip.error_propagation.strip_errors import StripErrors, differentiate_strip
 from photostrip.strip.gross_errors.pairs import screening
 from photostrip.strip.relative_orientation.orientation import (
     Orientation,
@@ -67,6 +69,19 @@ class FormedPhotos:
         return absolute_orientation.PointPrecision(
             plan, plan * float(np.sqrt(2.0)) * depth_mean / float(length[good].mean())
         )
+
+    @property
+    def excess(self) -> float:
+        """Variance of an image coordinate over what is stated, at least 1: as large as the pairs have proved."""
+        return max(1.0, float(np.median(self.screened.scatter.by_pair)) ** 2 / (2 * self.sigma**2))
+
+    def errors(self, similarity: Similarity) -> StripErrors:
+        """Differentiate the strip after a similarity by its image coordinates, and by the doubts about its scales.
+
+        They count in stated standard deviations: covariances are those of the strip when multiplied by ``excess``.
+        """
+        errors = differentiate_strip(self.orientation, self.formed, similarity, self.observations.sigma)
+        return errors.with_doubt(self.formed.junctions.doubt / np.sqrt(self.excess))
 
     def as_left_by(self, stages: PhotoStages) -> FormedPhotos:
         """Form nothing again: the strip without the wrong images of control that an adjustment found in it."""

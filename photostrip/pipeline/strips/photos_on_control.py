@@ -55,9 +55,7 @@ class OrientedPhotos:
     def misclosure_covariance(self) -> Callable[[Numbers], Floats]:
         """Covariance of any misclosures at the control, strip and control together, metres^2."""
         stage, misclosures = self.stage, self.oriented.misclosures
-        # image coordinates are taken as good as stated, or as bad as the pairs have proved
-        factor = max(1.0, np.median(stage.screened.scatter.by_pair) ** 2 / (2 * stage.sigma**2))
-        errors = self.errors.with_doubt(stage.formed.junctions.doubt / np.sqrt(factor))
+        errors, factor = stage.errors(self.oriented.absolute.similarity), stage.excess
 
         def of(some: Numbers) -> Floats:
             found = misclosures.take(some)

@@ -47,7 +47,7 @@ _LevelPoints = tuple[Floats, Callable[[], WrittenAxes]]  # (n, 3) in the level f
 
 # times as far from the middle of a list as a good half of it: strip and map say nothing of such a place
 FAR_AWAY = 20.0
-HIGHEST = 2e4  # metres, twice the height of a mountain: no ground lies so far from the other heights
+HIGHEST = 2e4  # metres, twice the height of a mountain: no height lies so far from the others; geocentric Z may
 LEAST_OF_LIST = 4  # points that tell where a list lies
 
 
@@ -98,11 +98,11 @@ def far_away(written: Floats, lists: Numbers) -> Floats:
         if len(rows) < LEAST_OF_LIST:
             continue
         off = written[rows, :2] - np.median(written[rows, :2], axis=0)
-        far = np.abs(off) > FAR_AWAY * np.median(np.abs(off), axis=0).max()
-        moved[rows, :2] = np.where(far, off, 0.0)
+        reach = FAR_AWAY * np.median(np.abs(off), axis=0).max()
+        moved[rows, :2] = np.where(np.abs(off) > reach, off, 0.0)
         rows = np.flatnonzero((lists == number) & np.isfinite(written[:, 2]))
         off = written[rows, 2] - np.median(written[rows, 2]) if len(rows) >= LEAST_OF_LIST else np.zeros(len(rows))
-        moved[rows, 2] = np.where(np.abs(off) > HIGHEST, off, 0.0)
+        moved[rows, 2] = np.where(np.abs(off) > max(reach, HIGHEST), off, 0.0)
     return moved
 
 
