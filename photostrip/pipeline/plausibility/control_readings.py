@@ -32,6 +32,7 @@ from photostrip.plausibility.control.wrong_place import FOOT, KINDS_OF_FEET
 from photostrip.plausibility.finding import Evidence
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.strip.absolute_orientation import MOST_OFF, WEAK_LIMIT
+from photostrip.strip.gross_errors.control.control_deletion import ROUNDING
 
 LEVEL = 1e-6  # of naming a reading where the control is read as it should be: a run fails because of it
 SEARCH_LEVEL = 0.01  # of taking anything out of sound control
@@ -193,7 +194,7 @@ def _best_distance(
     costs: dict[float, float] = {}
 
     def cost(logarithm: float) -> float:
-        formed = held.at_distance(float(np.exp(logarithm)), searched=False)
+        formed = held.at_distance(float(np.exp(logarithm)))
         tried = None if formed is None else formed.read(control, frames)
         costs[logarithm] = np.inf if tried is None else _cost(tried, AS_GIVEN)
         return costs[logarithm]
@@ -204,9 +205,11 @@ def _best_distance(
         for inside in (around, (-LITTLE, LITTLE)):  # one that is off by little is likely in a narrow range only
             with np.errstate(invalid="ignore"):  # where it is not formed
                 minimize_scalar(cost, bounds=inside, method="bounded", options={"xatol": NEAR, "maxiter": STEPS})
-    else:
+    elif isinstance(held.stage, FormedPhotos) and held.stage.strip.camera.format is None:  # else its size would tell
         for each in DISTANCES[[0, -1]]:
             cost(float(each))
+    if not costs:
+        return 1.0, None
     factor = float(np.exp(min(costs, key=lambda each: costs[each])))
     formed = held.at_distance(factor)
     return factor, None if formed is None else formed.read(control, frames)
@@ -290,7 +293,7 @@ def _of_distance(strip: Strip, factor: float, head: str, numbers: Evidence) -> F
     """Name a principal distance off by a power of ten (P105), or images that are, whose size nobody knows (P101)."""
     camera = strip.camera
     would_fit = camera.principal_distance * factor
-    message = f"{head} the principal distance is {would_fit:.5g} mm; {camera.principal_distance:g} mm is given"
+    message = f"{head} the principal distance is about {would_fit:.3g} mm; {camera.principal_distance:g} mm is given"
     if camera.format is not None or 1.0 / UNIT_FACTOR < factor < UNIT_FACTOR:
         return other_distance(camera, would_fit, message, FIX, numbers, (strip.id,))
     message += f"; or the image coordinates are {1 / factor:.4g} times as large"
@@ -315,8 +318,12 @@ def _medians(values: Floats, known: Flags) -> Floats:
 
 
 def _size(laid: OnControl) -> float:
-    """Median misclosure of the control, metres."""
-    return float(np.median(np.abs(laid.found.whole.w)))
+    """Median distance of a control coordinate from where the strip and all the others put it, metres."""
+    whole = laid.found.whole
+    own = whole.matrix.diagonal()[: whole.coordinates]
+    checked = own > ROUNDING
+    off = np.abs(whole.pull[: whole.coordinates][checked] / own[checked] / whole.size[: whole.coordinates][checked])
+    return float(np.median(off)) if checked.any() else float("nan")
 
 
 def of_whole_control(

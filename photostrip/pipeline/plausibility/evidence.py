@@ -16,8 +16,10 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.pipeline.inputs import Settings, Strip
 from photostrip.pipeline.results import PhotoStages
 from photostrip.pipeline.strips.photos import FormedPhotos, form_strip
-from photostrip.points import ControlPoints, PhotoPoints, locate, located
+from photostrip.points import ControlPoints, PhotoPoints, locate, located, take_rows
 from photostrip.strip.image_coordinates import corrections
+from photostrip.strip.relative_orientation.orientation import orient_unchecked, unusable_pairs
+from photostrip.strip.relative_orientation.pairs import collect_pairs
 
 BREADTH_SHARE = 0.95  # of the image points lie within the half breadth of a strip
 LEAST_RAYS = 2  # photos that must show a given point
@@ -36,6 +38,22 @@ def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> FormedP
 def at_distance(strip: Strip, factor: float) -> Strip:
     """Return a strip whose camera has so many times its principal distance."""
     return replace(strip, camera=replace(strip.camera, principal_distance=strip.camera.principal_distance * factor))
+
+
+def formed_at_distance(stage: FormedPhotos, factor: float, settings: Settings) -> FormedPhotos | None:
+    """Form a strip again with so many times its principal distance, by the rays that it used; None where it cannot be.
+
+    Nothing is searched for in it: that takes most of the time where the distance is wrong, and proves nothing.
+    """
+    strip = at_distance(stage.strip, factor)
+    rays = take_rows(stage.observations, stage.rays_in_use, ("photo", "point", "xy", "sigma"))
+    plain = replace(settings, relative=replace(settings.relative, screening="none"))
+    try:
+        oriented, converged = orient_unchecked(collect_pairs(rays, strip.photos, strip.camera.principal_distance))
+        usable = not unusable_pairs(oriented, converged).any()
+    except (GeometryError, np.linalg.LinAlgError):
+        return None
+    return form(strip, rays, plain) if usable else None
 
 
 def as_formed(stages: PhotoStages, observations: PhotoPoints) -> FormedPhotos:

@@ -46,6 +46,7 @@ OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
 OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
 OF_DISTANCE = ("P101", "P105", "P107")  # findings on principal distances, or as much of the images
+OF_DISTANCE_OR_POINT = ("P105", "P111")
 ALIKE = "P410"  # coordinates that are those of others
 PAIR = 2  # photos
 OUT_OF_ORDER = "P201"  # of a strip put in order by the layout of its photos alone bases prove nothing
@@ -151,7 +152,9 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     misread = any(each.code in OF_CAMERAS for each in causes)  # perhaps
     odd = {each.strip.id for each in formed if by_result.is_doubtful(each, result, predicted)}
     doubtful = [each for each in formed if misread or each.strip.id in odd]
-    cameras = odd if misread else set[str]()  # what was taken up does not explain all
+    # what was taken up does not explain all, or is what a distance that is far off is taken for
+    far = any(each.code in OF_DISTANCE_OR_POINT for each in causes)
+    cameras = {each.strip.id for each in formed if far or (misread and each.strip.id in odd)}
     findings = [*images.findings]
     findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None, distances=cameras)
     if control is not None and not any(each.is_error for each in findings):

@@ -115,17 +115,11 @@ class HeldStrip:
         joint = joint_cofactors(stage.network, coordinates_of(stage.network, stage.formed.point[self.rows]))
         return joint * stage.formed.links.factor
 
-    def at_distance(self, factor: float, *, searched: bool = True) -> HeldStrip | None:
-        """Return the strip formed with so many times its principal distance; None of models, or where it cannot be.
-
-        searched: whether gross errors are searched for in its pairs, which takes most of the time.
-        """
+    def at_distance(self, factor: float) -> HeldStrip | None:
+        """Return the strip formed with so many times its principal distance; None of models, or where it cannot be."""
         if not isinstance(self.stage, FormedPhotos):
             return None
-        strip, settings = evidence.at_distance(self.stage.strip, factor), self.settings
-        if not searched:
-            settings = replace(settings, relative=replace(settings.relative, screening="none"))
-        stage = evidence.form(strip, self.stage.observations, settings)
+        stage = evidence.formed_at_distance(self.stage, factor, self.settings)
         if stage is None or not np.isin(self.stage.formed.point[self.rows], stage.formed.point).all():
             return None
         rows = np.searchsorted(stage.formed.point, self.stage.formed.point[self.rows])

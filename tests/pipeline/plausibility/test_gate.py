@@ -288,7 +288,7 @@ def test_image_coordinates_ten_times_too_small_without_a_format_are_named_with_t
     small = replace(inputs.observations, xy=0.1 * inputs.observations.xy)
     (finding,) = [each for each in told(replace(inputs, strips=(unknown,), observations=small)) if each.is_error]
     assert (finding.code, finding.key) == ("P101", "observations.unit")
-    assert "if the principal distance is 15.3 mm" in finding.message
+    assert "if the principal distance is about 15.3 mm" in finding.message
 
 
 def second_list(inputs: Inputs, change: Callable[[Floats], Floats]) -> tuple[Inputs, tuple[str, ...]]:
