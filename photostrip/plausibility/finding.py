@@ -155,7 +155,7 @@ KINDS: dict[str, Kind] = {
     "P601": Kind("start angles in another unit", "they fit in gons, degrees or radians only", ERROR),
     "P602": Kind(
         "start angles in another system",
-        "they fit in another order or sense, turned by 90 degrees, or inverted",
+        "they fit in another order or sense, turned about the vertical or by 90 degrees, or inverted",
         ERROR,
     ),
 }

@@ -176,6 +176,9 @@ def test_angles_in_another_unit(factor: float, word: str) -> None:
     assert finding.evidence["rms_as_read_otherwise_deg"] == pytest.approx(0.0, abs=1e-6)
 
 
+OPK = "omega-phi-kappa"
+
+
 def test_angles_in_another_system() -> None:
     values, matrices = attitudes()
     names = [f"{number}" for number in range(len(values))]
@@ -185,6 +188,19 @@ def test_angles_in_another_system() -> None:
         ]
     rough = values + np.random.default_rng(1).normal(0, np.radians(3), values.shape)
     assert list(rotations.find_wrong_angles(rough, "omega-phi-kappa", matrices, names)) == []
+
+
+def test_angles_against_another_north() -> None:
+    """In a grid 3.2 degrees from true north, or by a compass."""
+    values, matrices = attitudes()
+    names = [f"{number}" for number in range(len(values))]
+    north = Rotation.from_euler("z", -3.2, degrees=True) * Rotation.from_matrix(matrices)
+    angles = north.as_euler("XYZ") + np.random.default_rng(1).normal(0, np.radians(0.01), values.shape)
+    found = [list(rotations.find_wrong_angles(angles, OPK, matrices, names, each)) for each in (0.0, np.radians(3.2))]
+    for (finding,) in found:
+        assert finding.code == "P602"
+        assert "; turned about the vertical by +3.20 degrees" in finding.message
+    assert ["grid north lies +3.20 degrees from true north" in each.message for (each,) in found] == [False, True]
 
 
 # --------------------------------------------------------------------------------------------------------- fits

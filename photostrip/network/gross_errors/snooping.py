@@ -291,7 +291,7 @@ class _Search:
         """
         of_worst = self._log_p(done, worst)
         likely_ones = self._likeliest(done, of_worst)
-        if any(each.hypothesis.kind in {OFFSET, DRIFT} for each in likely_ones) and self._reordered(done.selection):
+        if likely_ones and self._reordered(done.selection):
             return self.adjust(supported(self.problem, done.selection))
         before, solution, tried = self.problem, done.solution, {}
         for each in likely_ones:
@@ -381,8 +381,12 @@ class _Search:
         return found is not None
 
     def _order(self, problem: BundleProblem, selection: Selection) -> tuple[BundleSolution, Hypothesis | None]:
-        """Ask an adjustment in which positions take no part in which order they are those of the photos."""
-        bare = selected(problem, replace(selection, positions=np.zeros_like(selection.positions)))
+        """Ask an adjustment in which positions take no part in which order they are those of the photos.
+
+        It starts where the search did: positions of other photos bend the network further than it finds back.
+        """
+        without = replace(selection, positions=np.zeros_like(selection.positions))
+        bare = selected(replace(problem, start=self.given.start), without)
         if is_free(bare):
             raise GeometryError("nothing but camera positions gives a datum", code="bundle-rank")
         solution = solve(bare)

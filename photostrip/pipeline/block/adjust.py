@@ -141,14 +141,30 @@ def _refilled(block: BlockProblem, control: ControlPoints, frames: Sequence[Grou
     if not len(block.control) or control.use[block.control].all():
         return block
     for _ in range(REFILLS):
-        chosen = supported(block.problem, block.begin)
-        solution = solve(selected(block.problem, chosen))
+        solution = _any_solution(block)
         block = replace(block, problem=restarted(block.problem, solution))
         points = np.where(np.isfinite(block.problem.start.points), solution.points, 0.0)
         block, moved = block_problem.refilled(block, control, frames, points)
         if moved < REFILLED:
             break
     return block
+
+
+def _any_solution(block: BlockProblem) -> BundleSolution:
+    """Adjust what begins; without the camera positions where they stand in the way, of which the search will ask."""
+
+    def solved(begin: Selection) -> BundleSolution:
+        return solve(selected(block.problem, supported(block.problem, begin)))
+
+    try:
+        return solved(block.begin)
+    except GeometryError as error:
+        if error.code != "bundle-diverged" or not block.begin.positions.any():
+            raise
+        try:
+            return solved(replace(block.begin, positions=np.zeros_like(block.begin.positions)))
+        except GeometryError:
+            raise error from None
 
 
 def _name_undetermined(block: BlockProblem, error: GeometryError) -> None:

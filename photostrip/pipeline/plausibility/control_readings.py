@@ -160,7 +160,7 @@ def find_reading(
     ways = [(each, number) for each in READINGS for number in (smaller if each.of_list else [None])]
     best, least, price = None, np.inf, float(np.log(len(ways) / LEVEL))
     if as_given is not None:
-        if _excess(as_given) < price:
+        if _excess(as_given) < price and not as_given.found.out:
             return None
         least = _cost(as_given, AS_GIVEN) - price
     for reading, number in ways:
@@ -223,9 +223,8 @@ def _stretched(as_given: OnControl | None) -> bool:
 
 
 def _excess(laid: OnControl) -> float:
-    """By how much the likelihood could rise: what is left beyond the redundancy, and what was taken out."""
-    each = np.log(len(laid.place.coordinates.point) / SEARCH_LEVEL)
-    return float(max(laid.left.squares - laid.left.freedom, 0.0) / 2.0 + each * len(laid.found.out))
+    """By how much the likelihood could rise where nothing was taken out: what is left beyond the redundancy."""
+    return max(laid.left.squares - laid.left.freedom, 0.0) / 2.0
 
 
 def _cost(laid: OnControl, reading: Reading, unknowns: int = 0, number: int | None = None) -> float:
@@ -326,10 +325,28 @@ def _size(laid: OnControl) -> float:
     return float(np.median(off)) if checked.any() else float("nan")
 
 
+def of_heights(held: HeldStrip, as_given: OnControl | None) -> list[Finding]:
+    """Say that all heights of the control are the same number, and the strip shows another relief (P410)."""
+    if as_given is None:
+        return []
+    strip, points = held.stage.strip.id, as_given.counted.control
+    heights = points.enu[points.use[:, HEIGHT], HEIGHT]
+    taken_out = as_given.counted.coordinates.axis[list(as_given.found.coordinates)]
+    if (as_given.fits and HEIGHT not in taken_out) or len(heights) <= LEAST_HEIGHTS or np.ptp(heights) > 0.0:
+        return []
+    message = (
+        f"strip {strip}: all {len(heights)} heights of the control are {heights[0]:g} m, and the photos show another "
+        "relief"
+    )
+    numbers: Evidence = {"height_m": float(heights[0]), "points": len(heights)}
+    cure = "give the heights, or `use: xy` where they are not known"
+    return [found("P410", message, cure, numbers, strips=(strip,), key="control")]
+
+
 def of_whole_control(
     held: HeldStrip, as_given: OnControl | None, control: ControlPoints, frames: Sequence[GroundFrame]
 ) -> list[Finding]:
-    """Say that a strip fits its control under no reading (P409), or that all its heights are the same (P410)."""
+    """Say that a strip fits its control under no reading (P409)."""
     strip = held.stage.strip.id
     fix = "do its ids and coordinates belong to these photos, and to the points that were measured?"
     if as_given is None:
@@ -341,16 +358,6 @@ def of_whole_control(
         return [found("P409", message, fix, {"points": len(shown)}, strips=(strip,), key="control")]
     if as_given.fits:
         return []
-    points = as_given.counted.control
-    heights = points.enu[points.use[:, HEIGHT], HEIGHT]
-    if len(heights) > LEAST_HEIGHTS and np.ptp(heights) == 0.0:
-        message = (
-            f"strip {strip}: all {len(heights)} heights of the control are {heights[0]:g} m, and the photos show "
-            "another relief"
-        )
-        numbers: Evidence = {"height_m": float(heights[0]), "points": len(heights)}
-        cure = "give the heights, or `use: xy` where they are not known"
-        return [found("P410", message, cure, numbers, strips=(strip,), key="control")]
     placed, off = as_given.counted.placed, _size(as_given)
     half = float(np.ptp(placed, axis=0).max()) / 2.0
     if off <= MOST_OFF * half:

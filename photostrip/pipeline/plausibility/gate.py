@@ -48,6 +48,7 @@ OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
 OF_DISTANCE = ("P101", "P105", "P107")  # findings on principal distances, or as much of the images
 OF_DISTANCE_OR_POINT = ("P105", "P111")
 ALIKE = "P410"  # coordinates that are those of others
+OUTSIDE = "P402"  # control lies outside its coordinate reference system: what a map stretches there no camera did
 PAIR = 2  # photos
 OUT_OF_ORDER = "P201"  # of a strip put in order by the layout of its photos alone bases prove nothing
 OF_CAMERAS = ("P105", "P107", "P110", "P111", "P112")  # findings on cameras: control that is misread looks like it
@@ -193,9 +194,15 @@ def _causes(bundle: Bundle, inputs: Inputs) -> list[Finding]:
 
 
 def _told(findings: Iterable[Finding], inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
-    """Leave out what strips say of themselves that were found among photos in no order: they only start a bundle."""
+    """Leave out what strips say of themselves that were found among photos in no order: they only start a bundle.
+
+    Of cameras nothing is said by control that lies where its map is not made for.
+    """
+    findings = list(findings)
     found = {strip.id for strip in inputs.strips if not strip.listed}
+    silent = OF_CAMERAS if any(each.code == OUTSIDE for each in findings) else ()
     told = (each for each in findings if found.isdisjoint(each.strips) or each.code not in OF_STRIPS)
+    told = (each for each in told if each.code not in silent)
     return accepted(told, settings.accept)
 
 
@@ -380,14 +387,16 @@ def _of_rotations(result: Result, formed: Sequence[FormedPhotos], directory: Pat
     target = result.inputs.output or next(iter(result.inputs.frames), given.frame)
     frame = tie_frames([given.frame], target, directory=directory)[0][0]
     found: dict[str, Floats] = {}
-    listed = set(given.photos)
+    listed, norths = set(given.photos), []
     for strip in result.strips:
         resection = strip.of_photos.resection
         cartesian = strip.intermediate.cartesian_from_intermediate(resection.centers)
         turned = frame.axes_at(cartesian) @ strip.intermediate.cartesian_rotations(resection.rotations)
         found |= zip(strip.strip.photos, turned, strict=True)
+        norths.append(frame.convergence(cartesian))
     photos = [photo for photo in found if photo in listed]
     if not photos:
         return []
     angles = given.angles[locate(photos, given.photos)]
-    return list(rotations.find_wrong_angles(angles, given.system, np.array([found[name] for name in photos]), photos))
+    of_photos, north = np.array([found[name] for name in photos]), float(np.median(np.concatenate(norths)))
+    return list(rotations.find_wrong_angles(angles, given.system, of_photos, photos, north))

@@ -193,12 +193,13 @@ def angles(
     try:
         tied, _ = tie_frames([given.frame, *inputs.frames], inputs.output or given.frame, directory=directory)
         laid = [(each, _on_control(each, observations, inputs.control, tied[1:])) for each in formed]
+        held = [(each, similarity) for each, similarity in laid if similarity is not None]
         turned = {
             photo: rotation
-            for each, similarity in laid
-            if similarity is not None
+            for each, similarity in held
             for photo, rotation in zip(each.strip.photos, _rotations(each, similarity, tied[0]), strict=True)
         }
+        norths = [tied[0].convergence(similarity(each.formed.centers)) for each, similarity in held]
     except (GeometryError, InputError):
         return []
     rows = [row for row, photo in enumerate(given.photos) if photo in turned]
@@ -206,7 +207,8 @@ def angles(
         return []
     photos = [given.photos[row] for row in rows]
     rotations = np.array([turned[photo] for photo in photos])
-    return list(given_angles.find_wrong_angles(given.angles[rows], given.system, rotations, photos))
+    north = float(np.median(np.concatenate(norths)))
+    return list(given_angles.find_wrong_angles(given.angles[rows], given.system, rotations, photos, north))
 
 
 def _rotations(formed: FormedPhotos, similarity: Similarity, frame: GroundFrame) -> Floats:

@@ -84,7 +84,9 @@ def of_strip(
     if not len(held.given):
         return OfStrip()
     as_given = held.read(points, control.read_in, as_given=True)
-    whole: list[Finding] = []
+    whole = control_readings.of_heights(held, as_given)
+    if whole:
+        return OfStrip(whole)
     better = control_readings.find_reading(held, points, control.read_in, as_given, distance=distance)
     if better is not None:
         whole.append(control_readings.named(better, as_given, held, axes_are_right=control.axes_are_right))

@@ -53,12 +53,12 @@ def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
     yield from (_point(each, bundle, inputs) for each in shared if each.kind == POINT)
     yield from (_film(each, bundle, inputs) for each in shared if each.kind == FILM)
     of_photos = [each for each in shared if each.kind in OF_PHOTOS]
+    of_positions = [each for each in shared if each.kind in {OFFSET, DRIFT}]
     if len(of_photos) == 1:
         yield _photo(of_photos[0], bundle, inputs)
-    elif of_photos:
+    elif of_photos and not of_positions:  # else they take up what one shift of wrong positions leaves
         yield _photos(of_photos, bundle, inputs)
     yield from (_order(each, bundle) for each in shared if each.kind == ORDER)
-    of_positions = [each for each in shared if each.kind in {OFFSET, DRIFT}]
     if of_positions:
         yield from _positions(bundle, inputs, of_positions[-1])
 

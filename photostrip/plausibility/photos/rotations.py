@@ -26,18 +26,21 @@ UNITS = (
 )
 
 
-def find_wrong_angles(angles: Floats, system: str, rotations: Floats, photos: Sequence[str]) -> Iterator[Finding]:
+def find_wrong_angles(
+    angles: Floats, system: str, rotations: Floats, photos: Sequence[str], convergence: float = 0.0
+) -> Iterator[Finding]:
     """Compare given angles with the rotations that the photos turned out to have.
 
     angles: (n, 3), given angles as they were read, radians, of the stated `system` (``geometry.rotation.SYSTEMS``).
     rotations: (n, 3, 3), rotations found, image axes to east, north, up.
+    convergence: azimuth of grid north there, radians.
     Yields P601 or P602, at most one.
     """
     if len(photos) < LEAST_PHOTOS:
         return
     stated = _rms(from_angles(angles, system), rotations)
     best, text, code = stated, "", ""
-    for other, what, kind in _readings(angles, system):
+    for other, what, kind in (*_readings(angles, system), _turned(angles, system, rotations, convergence)):
         left = _rms(other, rotations)
         if left < best:
             best, text, code = left, what, kind
@@ -50,7 +53,7 @@ def find_wrong_angles(angles: Floats, system: str, rotations: Floats, photos: Se
         f"the given angles of {len(photos)} photos differ from those found by {stated:.2f} degrees (rms); {text} they "
         f"differ by {best:.2f} degrees"
     )
-    fix = "correct `orientations.angles`: unit and system"
+    fix = "correct `orientations.angles`: unit, system, and the north that they count from"
     evidence = {"rms_as_stated_deg": stated, "rms_as_read_otherwise_deg": best, "photos": len(photos)}
     yield found(code, message, fix, evidence, photos=photos, key="orientations.angles")
 
@@ -76,3 +79,14 @@ def _readings(angles: Floats, system: str) -> Iterator[tuple[Floats, str, str]]:
         changed = angles + np.radians([0.0, 0.0, turn])
         yield from_angles(changed, system), f"with kappa larger by {turn:.0f} degrees", "P602"
     yield from_angles(angles, system).transpose(0, 2, 1), "as rotations from object to image", "P602"
+
+
+def _turned(angles: Floats, system: str, rotations: Floats, convergence: float) -> tuple[Floats, str, str]:
+    """Turn all photos about the vertical by the angle that goes best with the rotations found."""
+    stated = from_angles(angles, system)
+    together = np.einsum("nij,nkj->ik", rotations, stated)
+    turn = float(np.arctan2(together[1, 0] - together[0, 1], together[0, 0] + together[1, 1]))
+    text = f"turned about the vertical by {np.degrees(turn):+.2f} degrees"
+    if convergence:
+        text += f" (grid north lies {np.degrees(convergence):+.2f} degrees from true north there)"
+    return from_angles(np.array([[0.0, 0.0, turn]]), system) @ stated, text, "P602"

@@ -229,6 +229,38 @@ def test_positions_of_other_photos_are_named_and_put_right(rows: slice | np.ndar
     assert rms(simulation, result) < 1.2 * rms(*adjusted(strips=1))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [300001, 300005])
+def test_positions_in_reversed_order_are_told_where_nothing_converges_with_them(seed: int) -> None:
+    """With plan or height points an adjustment goes before the search; or the search has bent the network by then."""
+    mistake = planted.mistake("camera positions in reversed order")
+    case = mistake.make(seed)
+    wrong = mistake.plant(case)
+    assert wrong is not None
+    result = triangulate(wrong[0], mistake.settings(case))
+    assert [(each.code, each.evidence.get("order")) for each in result.findings] == [("P208", "reversed")]
+    assert lost(result) == []
+
+
+@pytest.mark.slow
+def test_of_cameras_nothing_is_said_by_control_outside_its_map() -> None:
+    """A map stretches plan there, and the heights look wrong: a principal distance would explain that."""
+    mistake = planted.mistake("crs of another country")
+    case = mistake.make(300006)
+    wrong = mistake.plant(case)
+    assert wrong is not None
+    assert [each.code for each in triangulate(wrong[0], mistake.settings(case)).findings] == ["P402"]
+
+
+@pytest.mark.slow
+def test_heights_that_are_all_zero_are_told_where_some_were_taken_out() -> None:
+    mistake = planted.mistake("all heights zero")
+    case = mistake.make(300000)
+    wrong = mistake.plant(case)
+    assert wrong is not None
+    assert [each.code for each in triangulate(wrong[0], mistake.settings(case)).findings] == ["P410"]
+
+
 def test_positions_that_are_off_by_a_base_are_those_of_other_photos_only_where_the_bases_say_so() -> None:
     """An offset along the flight leaves the bases as they are."""
     simulation = simulate(Spec(seed=7, flight=Flight(photos=10), control=Control(bands=2), gnss=Gnss()))
