@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 LEAST_SLIP_SIGMAS = 6.0  # scatters that a slip must have at least
-LEAST_DIGIT_SIGMAS = 2.0  # scatters that a unit of the digit must have: below, any error looks like a slip of it
+MOST_BY_CHANCE = 0.1  # of errors about as large that come as near to a slip
 MOST_DIGITS = 8  # digits of the largest coordinate
-NEAR_SHARE = 0.3  # of the correction, within which the corrected coordinate must lie at most
 MOST_DECIMALS = 4
 LEAST_DIGITS = 5  # before the point, of a coordinate in which one too many is sought: fewer fit by chance
 
@@ -25,20 +24,21 @@ def slip(given: float, predicted: float, scatter: float, tolerance: float) -> Sl
 
     given, predicted: the coordinate as it is written, and what everything else lets expect, in its own unit.
     scatter: standard deviation of the prediction.
-    tolerance: how far the corrected coordinate may lie from the prediction; never more than a part of the digit's
-        value.
-    Returns the slip, of the first kind that brings the coordinate near, that brings it nearest; None when none does.
+    tolerance: how far the corrected coordinate may lie from the prediction.
+    Returns the slip, of the first kind that brings the coordinate near, that brings it nearest; None when none does, or
+    when many errors of such a size would look as much like one.
     """
-    if abs(given - predicted) < LEAST_SLIP_SIGMAS * scatter:
+    error, asked = abs(given - predicted), 0
+    if error < LEAST_SLIP_SIGMAS * scatter:
         return None
     for kind in KINDS:
-        fits = [
-            each
-            for each in kind(given, scatter)
-            if abs(each.meant - predicted) <= min(tolerance, max(NEAR_SHARE * abs(each.meant - given), scatter))
-        ]
-        if fits:
-            return min(fits, key=lambda each: abs(each.meant - predicted))
+        near = [each for each in kind(given, scatter) if error / 2.0 <= abs(each.meant - given) <= 2.0 * error]
+        asked += len(near)
+        best = min(near, key=lambda each: abs(each.meant - predicted), default=None)
+        if best is None or (off := abs(best.meant - predicted)) > tolerance:
+            continue
+        # of errors from half to twice this one, either way, so many come as near to any slip
+        return best if asked * 2.0 * max(off, scatter) <= MOST_BY_CHANCE * 3.0 * error else None
     return None
 
 
@@ -65,11 +65,11 @@ def _point_moved(given: float, scatter: float) -> Iterator[Slip]:
             yield Slip(given * times, f"the decimal point is {_places(times)} too far left")
 
 
-def _exchanged(given: float, scatter: float) -> Iterator[Slip]:
+def _exchanged(given: float, _: float) -> Iterator[Slip]:
     text, sign = _written(given)
     digits = list(_places_of(text))
     for (number, digit, worth), (_, after, _) in pairwise(digits):
-        if after != digit and worth >= LEAST_DIGIT_SIGMAS * scatter:
+        if after != digit:
             what = f"the {_ordinal(number)} and the {_ordinal(number + 1)} digit exchanged"
             yield Slip(given + sign * (after - digit) * (worth - worth / 10.0), what)
 
@@ -77,7 +77,7 @@ def _exchanged(given: float, scatter: float) -> Iterator[Slip]:
 def _mistyped(given: float, scatter: float) -> Iterator[Slip]:
     text, sign = _written(given)
     for number, digit, worth in _places_of(text):
-        for other in range(10) if worth >= LEAST_DIGIT_SIGMAS * scatter else ():
+        for other in range(10):
             if other != digit and abs(other - digit) * worth > LEAST_SLIP_SIGMAS * scatter:
                 what = f"a typing error in the {_ordinal(number)} digit ({digit} for {other})"
                 yield Slip(given + sign * (other - digit) * worth, what)
