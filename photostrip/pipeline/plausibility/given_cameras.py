@@ -46,6 +46,7 @@ class GivenCenters(NamedTuple):
     frame: FrameSpec
     photos: tuple[str, ...]  # those whose centre is given in full
     enu: Floats  # (n, 3)
+    sigma: float  # usual standard deviation of a coordinate, metres; 0 where none is stated
 
 
 class LevelPlan(NamedTuple):
@@ -54,6 +55,7 @@ class LevelPlan(NamedTuple):
     key: str
     photos: tuple[str, ...]
     centers: Floats  # (n, 3)
+    sigma: float
     ids: tuple[str, ...]
     control: Floats  # (c, 3)
 
@@ -101,11 +103,28 @@ def _given_centers(inputs: Inputs, *, starts: bool) -> Iterator[GivenCenters]:
     if positions is not None:
         whole = np.flatnonzero(positions.use.all(axis=1))
         photos = tuple(positions.photos[row] for row in whole)
-        yield GivenCenters(key="camera_positions", frame=positions.frame, photos=photos, enu=positions.enu[whole])
+        yield GivenCenters(
+            key="camera_positions",
+            frame=positions.frame,
+            photos=photos,
+            enu=positions.enu[whole],
+            sigma=_usual(positions.sigma[whole]),
+        )
     if orientations is not None and (orientations.observed or starts):
         whole = np.flatnonzero(np.isfinite(orientations.enu).all(axis=1))
         photos = tuple(orientations.photos[row] for row in whole)
-        yield GivenCenters(key="orientations", frame=orientations.frame, photos=photos, enu=orientations.enu[whole])
+        yield GivenCenters(
+            key="orientations",
+            frame=orientations.frame,
+            photos=photos,
+            enu=orientations.enu[whole],
+            sigma=_usual(orientations.sigma[whole]),
+        )
+
+
+def _usual(sigma: Floats) -> float:
+    stated = sigma[np.isfinite(sigma)]
+    return float(np.median(stated)) if len(stated) else 0.0
 
 
 def _level_plan(
@@ -118,7 +137,14 @@ def _level_plan(
     if target.kind != "local":  # the Earth falls away from a plane
         level[:, 2] = target.geodetic(together)[:, 2]
     count = len(given.photos)
-    return LevelPlan(key=given.key, photos=given.photos, centers=level[:count], ids=control.ids, control=level[count:])
+    return LevelPlan(
+        key=given.key,
+        photos=given.photos,
+        centers=level[:count],
+        sigma=given.sigma,
+        ids=control.ids,
+        control=level[count:],
+    )
 
 
 def _of_strip(strip: Strip, plan: LevelPlan, shown: Shown, photo_ids: Sequence[str]) -> Iterator[Finding]:
@@ -130,7 +156,7 @@ def _of_strip(strip: Strip, plan: LevelPlan, shown: Shown, photo_ids: Sequence[s
     height, ratio = _ground_below(locate(photos, photo_ids), xyz, plan, shown, strip.camera.principal_distance)
     usual = float(np.ptp(xyz[:, :2], axis=0).max())
     depth = xyz[:, 2] - height if np.isfinite(height).all() else np.full(len(photos), max(usual, 1.0))
-    findings = list(flight.find_odd_centers(xyz, depth, np.array([0.0, 0.0, 1.0]), photos, strip.id))
+    findings = list(flight.find_odd_centers(xyz, depth, np.array([0.0, 0.0, 1.0]), photos, strip.id, plan.sigma))
     below = {photo for each in findings if each.code == "P204" for photo in each.photos}
     known = np.isfinite(ratio) & (depth > 0)
     times = np.median(ratio[known]) if known.sum() >= LEAST_HEIGHTS else 1.0

@@ -21,16 +21,18 @@ TURNED_DEG = 30.0  # of a base against its neighbours
 BESIDE = 3  # bases on either side that say what is usual
 LEAST_PHOTOS = 4
 LEVEL = 0.01  # of one false name in a flight that scatters
+SIGMA_FROM_LINE = 1.5**0.5  # of a height off the line of its neighbours, over that of a height
 
 
 def find_odd_centers(
-    centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], strip: str
+    centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], strip: str, sigma: float = 0.0
 ) -> Iterator[Finding]:
     """Look for perspective centres that do not go with their neighbours.
 
     centers: (n, 3), perspective centres in order, any unit and frame.
     depth: (n,), height of each above the points it shows, in that unit.
     up: (3,), direction from the ground to the cameras.
+    sigma: standard deviation of a coordinate of a centre, in that unit.
     """
     names = (strip,)
     below = np.flatnonzero(depth <= 0)
@@ -39,11 +41,13 @@ def find_odd_centers(
     if len(photos) < LEAST_PHOTOS:
         return
     flying = np.median(np.abs(depth))
-    yield from _heights(centers @ up, flying, photos, names)
+    yield from _heights(centers @ up, flying, photos, names, SIGMA_FROM_LINE * sigma / flying)
     bases = np.diff(centers, axis=0)
     bases = bases - (bases @ up)[:, None] * up
-    yield from _lengths(np.linalg.norm(bases, axis=1), photos, names)
-    yield from _directions(bases, up, photos, names)
+    length = np.linalg.norm(bases, axis=1)
+    of_base = np.sqrt(2.0) * sigma / max(np.median(length), 1e-12)
+    yield from _lengths(length, photos, names, of_base)
+    yield from _directions(bases, up, photos, names, np.degrees(of_base))
 
 
 def _below(photos: Sequence[str], depth: Floats, below: Numbers, names: tuple[str, ...]) -> Finding:
@@ -57,7 +61,9 @@ def _below(photos: Sequence[str], depth: Floats, below: Numbers, names: tuple[st
     return found("P204", message, fix, evidence, photos=photos, strips=names)
 
 
-def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
+def _heights(
+    height: Floats, flying: float, photos: Sequence[str], names: tuple[str, ...], known: float
+) -> Iterator[Finding]:
     step = np.diff(height, 2) / flying
     for number in range(len(photos)):
         near = _beside(number, len(photos))
@@ -65,7 +71,7 @@ def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[
         off = float(height[number] - line[0] - line[1] * number) / flying
         inside = near[0] < number < near[-1]  # at an end a line is extended
         limit = MOST_HEIGHT_OFF if inside else 2.0 * MOST_HEIGHT_OFF
-        if abs(off) > max(limit, _by_chance(step, range(number - 2, number + 1))):
+        if abs(off) > max(limit, _by_chance(step, range(number - 2, number + 1), known)):
             message = (
                 f"the perspective centre of photo {photos[number]} lies {100 * abs(off):.0f} % of the flying height "
                 f"{'above' if off > 0 else 'below'} those of its neighbours"
@@ -75,11 +81,14 @@ def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[
             yield found("P205", message, fix, evidence, photos=(photos[number],), strips=names)
 
 
-def _by_chance(step: Floats, own: range) -> float:
-    """How far chance brings one of a flight whose steps from one to the next, all but its own, scatter so much."""
+def _by_chance(step: Floats, own: range, known: float) -> float:
+    """How far chance brings one of a flight whose steps from one to the next, all but its own, scatter so much.
+
+    known: standard deviation that it has at least.
+    """
     others = np.delete(step, [row for row in own if 0 <= row < len(step)])
     sigma = SIGMA_FROM_MEDIAN * float(np.median(np.abs(others))) if len(others) else 0.0
-    return normal_quantile(1.0 - LEVEL / (2.0 * (len(step) + 1))) * sigma
+    return normal_quantile(1.0 - LEVEL / (2.0 * (len(step) + 1))) * max(sigma, known)
 
 
 def _beside(number: int, count: int) -> list[int]:
@@ -94,12 +103,13 @@ def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
     return np.median(y - slope * x), slope
 
 
-def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
+def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...], known: float) -> Iterator[Finding]:
     step = np.diff(np.log(np.maximum(length, 1e-12)))
     for number in range(len(length)):
         usual = np.median(length[_beside(number, len(length))])
         ratio = float(length[number]) / max(usual, 1e-12)
-        if SHORT_BASE < ratio < LONG_BASE or abs(np.log(ratio)) < _by_chance(step, range(number - 1, number + 1)):
+        by_chance = _by_chance(step, range(number - 1, number + 1), known)
+        if SHORT_BASE < ratio < LONG_BASE or min(abs(np.log(ratio)), abs(ratio - 1.0)) < by_chance:
             continue
         pair = (photos[number], photos[number + 1])
         message = f"the base of photos {pair[0]} and {pair[1]} is {ratio:.2f} times as long as those beside it"
@@ -107,13 +117,15 @@ def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> I
         yield found("P206", message, fix, {"base_over_usual": ratio}, photos=pair, strips=names)
 
 
-def _directions(bases: Floats, up: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
+def _directions(
+    bases: Floats, up: Floats, photos: Sequence[str], names: tuple[str, ...], known: float
+) -> Iterator[Finding]:
     unit = bases / np.maximum(np.linalg.norm(bases, axis=1, keepdims=True), 1e-12)
     step = _turns(unit[:-1], unit[1:], up)
     for number in range(len(bases)):
         usual = np.median(unit[_beside(number, len(bases))], axis=0)
         turn = float(_turns(usual, bases[number], up))
-        if abs(turn) <= max(TURNED_DEG, _by_chance(step, range(number - 1, number + 1))):
+        if abs(turn) <= max(TURNED_DEG, _by_chance(step, range(number - 1, number + 1), known)):
             continue
         pair = (photos[number], photos[number + 1])
         message = f"the base of photos {pair[0]} and {pair[1]} turns by {turn:+.0f} degrees against those beside it"

@@ -27,7 +27,7 @@ SURE_POINTS = 6  # common points of two photos that tell whether they show the s
 SURE_SHARE = 0.25  # of their spread, below which they do
 SURE_MISFIT = 0.35  # of its base
 SAME_PLACE_SHARE = 0.03  # of the median base between photos that share points: two photos from one place
-SAME_PHOTO_SHARE = 0.005  # of it left by a link: noise; a base that tilts hide, 85 % end lap, left 0.011
+SAME_PHOTO_SIGMAS = 5.0  # standard deviations of an image coordinate left by a link: a base that tilts hide leaves more
 MOST_LOOKED_AT = 24  # photos that are looked at closer; a list that is wrong at more places needs no closer look
 LEAST_PHOTOS = 3  # photos that have an order
 OTHER_SCALE = 1.25  # ratio to both neighbours that tilts and relief do not make
@@ -67,7 +67,7 @@ def find_wrong_order(
         mirrored = frozenset(photos[number] for number in np.flatnonzero(plane.mirrored).tolist())
         size = {photos[number]: float(plane.size[number]) for number in _other_size(plane)}
     findings += _of_other_points(observations, odd, links, strip, photos)
-    twice = _twice(links)
+    twice = _twice(links, float(np.median(observations.sigma)))
     findings += [_twin(links, pair, strip, photos) for pair in twice]
     left = [number for number in range(len(photos)) if number not in {other for _, other in twice}]
     against = partial(turned_back, links, closer=_by_number(closer, photos))
@@ -192,7 +192,7 @@ def _moved_by(observations: PhotoPoints, photo: str, rows: int) -> PhotoPoints:
     return replace(observations, point=point)
 
 
-def _twice(links: mosaic.PhotoLinks) -> list[tuple[int, int]]:
+def _twice(links: mosaic.PhotoLinks, sigma: float) -> list[tuple[int, int]]:
     """Photos taken from one place: the same photo under two names."""
     base = np.abs(links.bases[1])
     if not len(base):
@@ -202,7 +202,7 @@ def _twice(links: mosaic.PhotoLinks) -> list[tuple[int, int]]:
     same = (
         like
         & (base < SAME_PLACE_SHARE * usual)
-        & (links.misfit < SAME_PHOTO_SHARE * usual)
+        & (links.misfit < SAME_PHOTO_SIGMAS * sigma)
         & (links.count >= SURE_COUNT)
     )
     return [(int(a), int(b)) for a, b in links.photo[same]]
