@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from photostrip.plausibility.control import layout
 from photostrip.plausibility.control.digits import slip
 from photostrip.plausibility.photos import flight, flight_order, rotations
-from photostrip.plausibility.photos.robust_fit import fit_robustly
+from photostrip.plausibility.photos.tied_strips import TiesOfStrips, odd_ties
 from photostrip.simulation.simulation import simulate
 from photostrip.simulation.spec import Flight, Spec, Terrain
 from tests.simulated import inputs_of
@@ -203,28 +203,37 @@ def test_angles_against_another_north() -> None:
     assert ["grid north lies +3.20 degrees from true north" in each.message for (each,) in found] == [False, True]
 
 
-# --------------------------------------------------------------------------------------------------------- fits
+# --------------------------------------------------------------------------------------------------------- ties
 
 
-@given(st.integers(0, 10_000))
+@given(st.integers(0, 10_000), st.integers(0, 2))
 @settings(max_examples=30, deadline=None)
-def test_a_fit_is_not_disturbed_by_wrong_values(seed: int) -> None:
+def test_ties_of_two_points_are_found_beside_the_bend_of_two_strips(seed: int, degree: int) -> None:
+    """And none beside them; a tenth of the ties is wrong, by metres or by kilometres."""
     rng = np.random.default_rng(seed)
-    columns = np.column_stack([np.ones(15), rng.uniform(-1, 1, (15, 2))])
-    values = columns @ [3.0, -2.0, 1.0] + rng.normal(0, 0.01, 15)
-    values[[2, 7, 11]] += rng.choice([-1, 1], 3) * rng.uniform(5, 1e4, 3)
-    fit = fit_robustly(columns, values, np.ones(15, bool), 0.01)
-    assert np.flatnonzero(fit.odd).tolist() == [2, 7, 11]
-    assert fit.coefficient == pytest.approx([3.0, -2.0, 1.0], abs=0.06)
-
-
-def test_the_spread_of_a_fit_is_that_of_another_measurement() -> None:
-    """Of a mean of n values: sigma of one value times sqrt(1 + 1/n), also for what took no part."""
-    values = np.array([-1.0, 1.0] * 6)
-    found = fit_robustly(np.ones((12, 1)), values, np.ones(12, bool), 1e-3)
-    assert found.sigma0 == pytest.approx(np.std(values, ddof=1))
-    assert found.spread == pytest.approx(np.full(12, found.sigma0 * np.sqrt(1 + 1 / 12)))
-    assert found.sigma == pytest.approx([found.sigma0 / np.sqrt(12)])
+    count = 30
+    plan = rng.uniform(-1000, 1000, (count, 2))
+    x, y = (plan / 1000).T
+    columns = np.column_stack([np.ones(count), x, y, x**2, x * y, y**2])[:, : (1, 3, 6)[degree]]
+    off = columns @ rng.normal(0, 3.0, (columns.shape[1], 2)) + rng.normal(0, 0.1, (count, 2))
+    wrong = rng.choice(count, 3, replace=False)
+    turned = rng.uniform(0, 2 * np.pi, 3)
+    off[wrong] += np.column_stack([np.cos(turned), np.sin(turned)]) * rng.uniform(20, 1e4, 3)[:, None]
+    ties = TiesOfStrips(
+        points=np.arange(count),
+        names=tuple(f"T{number}" for number in range(count)),
+        plan=plan,
+        difference=off,
+        rays=np.full(count, 3),
+        sigma=0.1,
+        depth=1500.0,
+        strips=("A", "B"),
+    )
+    odd = odd_ties(ties)
+    assert odd is not None
+    assert odd.rows.tolist() == sorted(wrong.tolist())
+    assert odd.far[wrong].min() > 10.0
+    assert np.delete(odd.far, wrong).max() < 1.0
 
 
 def test_a_finding_says_between_which_photos_control_lies() -> None:
