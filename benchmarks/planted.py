@@ -968,7 +968,7 @@ MISTAKES = (
     Mistake("their heights in feet", of_positions(lambda _, enu: enu / [1.0, 1.0, FOOT]), ("P205",), 1, with_positions),
     Mistake("one height of them off by half", of_positions(one_high), ("P205", *OFF), 1, with_positions),
     Mistake("two camera positions exchanged", of_positions(neighbours_swapped),
-            ("P206", "P207", *OFF), 1, with_positions),
+            ("P208", "P206", "P207", *OFF), 1, with_positions),
     Mistake("camera positions in reversed order", of_positions(lambda _, enu: enu[::-1]), ("P208",), 1, with_positions),
     Mistake("camera positions moved by one photo",
             of_positions(lambda case, enu: np.roll(enu, case.rng.choice([-1, 1]), axis=0)),

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -46,6 +47,8 @@ ALL = "all"  # positions of all groups share one error
 EACH = "each"  # those of every group have one of their own
 REVERSED, FORWARDS, BACKWARDS = "reversed", "forwards", "backwards"  # rows of positions that belong to other photos
 ORDERS = REVERSED, FORWARDS, BACKWARDS
+EXCHANGED = "exchanged"  # two of them
+MOST_ASKED = 4  # positions of which any two may be exchanged: those that go least with the photos
 ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most in common
 LEAST_SHARE = 1e-6  # of a column that the other unknowns leave to it, for it to be asked about at all
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
@@ -59,7 +62,8 @@ class Hypothesis:
 
     kind: str
     number: int = -1  # of a camera, a control list or a photo
-    of: str = EACH  # of positions: ``ALL`` or ``EACH``, or one of ``ORDERS``
+    of: str = EACH  # of positions: ``ALL`` or ``EACH``, one of ``ORDERS``, or ``EXCHANGED``
+    pair: tuple[int, ...] = ()  # rows of two positions that are exchanged
     rivals: tuple[str, ...] = ()  # kinds of others that explain nearly as much
     # shift, sigma: how a list lies beside everything else, along its axes, metres; NaN where it gives nothing
     shift: tuple[float, ...] = ()
@@ -327,7 +331,7 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
         control = replace(problem.control, sigma=np.where(outside, np.inf, problem.control.sigma))
         return replace(problem, control=control)
     if hypothesis.kind == ORDER:
-        return replace(problem, positions=_in_order(positions, hypothesis.of))
+        return replace(problem, positions=_in_order(positions, hypothesis))
     if hypothesis.kind in OF_PHOTOS:
         return _with_own_camera(problem, hypothesis.number, OF_PHOTOS[hypothesis.kind])
     if hypothesis.kind in OF_CAMERAS:
@@ -389,10 +393,14 @@ def log_probability_again(without: BundleSolution, hypothesis: Hypothesis, unit:
     return log_probability(max(gain.squares, 0.0) / unit**2, max(len(gain.value), 1))
 
 
-def _in_order(positions: PositionObservations, order: str) -> PositionObservations:
+def _in_order(positions: PositionObservations, order: Hypothesis) -> PositionObservations:
     """Give photos the positions that other rows state; a photo at an end that loses its own has none."""
     rows = np.arange(len(positions))
-    source = {REVERSED: rows[::-1], FORWARDS: rows - 1, BACKWARDS: rows + 1}[order]
+    if order.of == EXCHANGED:
+        source = rows.copy()
+        source[list(order.pair)] = order.pair[::-1]
+    else:
+        source = {REVERSED: rows[::-1], FORWARDS: rows - 1, BACKWARDS: rows + 1}[order.of]
     inside = (source >= 0) & (source < len(rows))
     source = np.where(inside, source, rows)
     sigma = np.where(inside[:, None], positions.sigma[source], np.inf)
@@ -407,18 +415,23 @@ def order_of_positions(
     solution, cofactors: of an adjustment in which the positions took no part.
     The misfits about their mean are compared, in units of what is stated and what the photos know, by an F test.
     """
-    orders = {each: _misfit(solution, cofactors, _in_order(positions, each)) for each in ORDERS}
-    least = min(orders, key=lambda each: orders[each].mean)
-    given, best = _misfit(solution, cofactors, positions), orders[least]
+    given, rows = _misfit(solution, cofactors, positions), len(positions)
+    worst = np.sort(np.argsort(-given.of_row, kind="stable")[:MOST_ASKED]).tolist()
+    asked = [Hypothesis(ORDER, of=each) for each in ORDERS]
+    asked += [Hypothesis(ORDER, of=EXCHANGED, pair=pair) for pair in combinations(worst, 2)]
+    misfits = [_misfit(solution, cofactors, _in_order(positions, each)) for each in asked]
+    least, best = min(zip(asked, misfits, strict=True), key=lambda each: each[1].mean)
     if not (given.freedom > 0 and best.freedom > 0 and given.mean > best.mean):
         return None
-    p = len(ORDERS) * fdtrc(given.freedom, best.freedom, given.mean / max(best.mean, 1.0))
-    return Hypothesis(ORDER, of=least) if p < level / 2 else None
+    number = len(ORDERS) + rows * (rows - 1) // 2
+    p = number * fdtrc(given.freedom, best.freedom, given.mean / max(best.mean, 1.0))
+    return least if p < level / 2 else None
 
 
 class _Misfit(NamedTuple):
     mean: float  # mean square of standardised misfits
     freedom: int
+    of_row: Floats  # (g,): their squares
 
 
 def _misfit(solution: BundleSolution, cofactors: Cofactors, positions: PositionObservations) -> _Misfit:
@@ -432,4 +445,5 @@ def _misfit(solution: BundleSolution, cofactors: Cofactors, positions: PositionO
     total = weight.sum(axis=0)
     off = off - (weight * off).sum(axis=0) / np.where(total > 0.0, total, 1.0)
     freedom = int(used.sum() - (total > 0.0).sum())
-    return _Misfit(float((weight * off**2).sum()) / max(freedom, 1), freedom)
+    squares = (weight * off**2).sum(axis=1)
+    return _Misfit(mean=float(squares.sum()) / max(freedom, 1), freedom=freedom, of_row=squares)

@@ -91,6 +91,7 @@ def test_what_the_end_does_not_support_is_given_up_whatever_it_is() -> None:
     problem = with_positions_and_lists()
     every, begun = Selection.everything(problem), solve(problem)
     orders = [hypotheses.Hypothesis(ORDER, of=each) for each in ORDERS]
+    orders.append(hypotheses.Hypothesis(ORDER, of=hypotheses.EXCHANGED, pair=(1, 2)))
     for each in (*nonempty(asked(begun)), *orders):
         if each.kind == LIST:
             each = replace(each, shift=(1.0,) * 3, sigma=(0.1,) * 3)  # noqa: PLW2901

@@ -137,9 +137,13 @@ def _bent(block: BlockProblem) -> BlockProblem:
 
 
 def _refilled(block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame]) -> BlockProblem:
-    """Adjust once beforehand where plan or height points need present positions."""
+    """Adjust once beforehand where plan or height points need present positions.
+
+    What is given may be wrong and bend that; the search starts where the strips were formed.
+    """
     if not len(block.control) or control.use[block.control].all():
         return block
+    start = block.problem.start
     for _ in range(REFILLS):
         solution = _any_solution(block)
         block = replace(block, problem=restarted(block.problem, solution))
@@ -147,7 +151,7 @@ def _refilled(block: BlockProblem, control: ControlPoints, frames: Sequence[Grou
         block, moved = block_problem.refilled(block, control, frames, points)
         if moved < REFILLED:
             break
-    return block
+    return replace(block, problem=replace(block.problem, start=start))
 
 
 def _any_solution(block: BlockProblem) -> BundleSolution:

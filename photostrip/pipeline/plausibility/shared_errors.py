@@ -13,6 +13,7 @@ from photostrip.network.hypotheses import (
     BACKWARDS,
     DISTANCE,
     DRIFT,
+    EXCHANGED,
     FILM,
     FORWARDS,
     LENS,
@@ -106,13 +107,16 @@ ORDERS = {
     REVERSED: "are those of the photos in reversed order",
     FORWARDS: "each belong to the photo after the one that they are given for",
     BACKWARDS: "each belong to the photo before the one that they are given for",
+    EXCHANGED: "are exchanged",
 }
 
 
 def _order(error: Hypothesis, bundle: Bundle) -> Finding:
     problem = bundle.screened.problem
-    photos = tuple(dict.fromkeys(problem.photo_name(int(each)) for each in problem.positions.photo))
-    message = f"the camera positions {ORDERS[error.of]}; the adjustment continued with them so"
+    of_rows = problem.positions.photo[list(error.pair) or slice(None)].tolist()
+    photos = tuple(dict.fromkeys(problem.photo_name(each) for each in of_rows))
+    whose = f"the camera positions of photos {listed(photos)}" if error.pair else "the camera positions"
+    message = f"{whose} {ORDERS[error.of]}; the adjustment continued with them so"
     return found("P208", message, CAUSES[ORDER].cure, {"order": error.of}, photos=photos, key="camera_positions")
 
 

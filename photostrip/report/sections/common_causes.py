@@ -25,6 +25,7 @@ ORDERS = {
     "reversed": "in reversed order",
     "forwards": "each given to the photo after its own",
     "backwards": "each given to the photo before its own",
+    "exchanged": "of two photos exchanged",
 }
 
 
