@@ -50,7 +50,8 @@ ORDERS = REVERSED, FORWARDS, BACKWARDS
 EXCHANGED = "exchanged"  # two of them
 MOST_ASKED = 4  # positions of which any two may be exchanged: those that go least with the photos
 ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most in common
-LEAST_SHARE = 1e-6  # of a column that the other unknowns leave to it, for it to be asked about at all
+LEAST_SHARE = 1e-9  # of a column that the other unknowns leave to it, for it to be more than rounding
+ALIKE = 1e-6  # of columns of one hypothesis, from which they are one
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
 UP_AXIS = 2
 HEIGHTS_ONLY = -1  # in place of the number of a list: what is given in height only
@@ -237,7 +238,7 @@ def _gain(explained: Explained) -> _Gain:
     pull, normal, size = explained
     if not len(pull) or (np.diag(normal) < LEAST_SHARE * size).any():
         return _Gain(0.0, np.zeros(len(pull)), np.full(len(pull), np.inf))
-    inverse = np.linalg.pinv(normal, rcond=LEAST_SHARE, hermitian=True)
+    inverse = np.linalg.pinv(normal, rcond=ALIKE, hermitian=True)
     value = inverse @ pull
     return _Gain(float(pull @ value), value, np.sqrt(np.diag(inverse)))
 
