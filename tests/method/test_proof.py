@@ -144,8 +144,10 @@ def test_a_strip_of_any_length_comes_back(photos: int) -> None:
     assert_exact(recovered(exact(Spec(flight=Flight(photos=photos)))))
 
 
-@pytest.mark.parametrize("rotation", [0.0, 90.0, 180.0, 270.0, 33.0])
-@pytest.mark.parametrize("heading", [0.0, 45.0, 90.0, 197.0, 300.0])
+@pytest.mark.parametrize(
+    ("heading", "rotation"),
+    [(0.0, 0.0), (0.0, 33.0), (45.0, 90.0), (90.0, 180.0), (90.0, 270.0), (197.0, 33.0), (300.0, 0.0)],
+)
 def test_photos_turned_in_any_way_and_flown_anywhere_come_back(heading: float, rotation: float) -> None:
     assert_exact(recovered(exact(Spec(flight=Flight(photos=6, heading_deg=heading, photo_rotation_deg=rotation)))))
 
@@ -231,18 +233,18 @@ def test_any_ground_frame_comes_back(ground: Ground, control: dict[str, str]) ->
 
 
 @pytest.mark.parametrize(
-    "control",
+    ("control", "crs"),
     [
-        Control(layout="corners"),
-        Control(layout="corners+centre"),
-        Control(layout="random", count=6),
-        Control(bands=4, use={"xyz": 0.5, "xy": 0.25, "z": 0.25}),
-        Control(bands=4, use={"xy": 0.4, "z": 0.6}),
-        Control(bands=2, per_band=2),
+        (Control(layout="corners"), "EPSG:32633"),
+        (Control(layout="corners+centre"), "local"),
+        (Control(layout="random", count=6), "EPSG:32633"),
+        (Control(bands=4, use={"xyz": 0.5, "xy": 0.25, "z": 0.25}), "local"),
+        (Control(bands=4, use={"xy": 0.4, "z": 0.6}), "EPSG:32633"),
+        (Control(bands=4, use={"xy": 0.4, "z": 0.6}), "local"),
+        (Control(bands=2, per_band=2), "EPSG:32633"),
     ],
-    ids=["corners", "corners and centre", "anywhere", "mixed", "plan or height", "two bands of two"],
+    ids=["corners", "corners and centre", "anywhere", "mixed", "plan or height", "the same, local", "two bands of two"],
 )
-@pytest.mark.parametrize("crs", ["EPSG:32633", "local"])
 def test_any_control_that_determines_the_strip_brings_it_back(control: Control, crs: str) -> None:
     assert_exact(recovered(exact(Spec(ground=Ground(crs=crs, center_deg=(16.5, 49.2)), control=control))))
 
@@ -308,7 +310,7 @@ def test_refraction_is_taken_out(tilt_deg: float, left: float) -> None:
 
 
 @pytest.mark.slow
-@hypothesis_settings(max_examples=25)
+@hypothesis_settings(max_examples=12)
 @given(
     seed=st.integers(0, 10_000),
     photos=st.integers(3, 14),
@@ -538,8 +540,18 @@ def moved(control: ControlPoints, shift: Floats) -> ControlPoints:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("curvature", ["auto", "model"])
-@pytest.mark.parametrize("change", ["wild", "slightly", "removed", "first", "plan only", "sure"])
+@pytest.mark.parametrize(
+    ("change", "curvature"),
+    [
+        ("wild", "auto"),
+        ("wild", "model"),
+        ("slightly", "model"),
+        ("removed", "auto"),
+        ("first", "model"),
+        ("plan only", "auto"),
+        ("sure", "auto"),
+    ],
+)
 def test_a_check_point_never_influences_anything(change: str, curvature: str) -> None:
     crs = "local" if curvature == "model" else "EPSG:32633"
     done, inputs = noisy_project(crs)
@@ -595,7 +607,7 @@ def coordinates(result: Result) -> dict[str, Floats]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_the_order_of_rows_and_ids_does_not_matter(seed: int) -> None:
     _, inputs = noisy_project()
     straight = coordinates(noisy_result())
