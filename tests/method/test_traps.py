@@ -403,7 +403,7 @@ def test_points_beyond_the_control_are_warned_of() -> None:
             squares[name].append(rms(errors(done, result)[end]) ** 2)
         squares["inside"].append(rms(errors(done, result)[~end]) ** 2)
         assert "extrapolation" in codes(result)
-        assert "extrapolation" not in codes(triangulate(inputs, degree("3")))
+    assert "extrapolation" not in codes(triangulate(inputs, degree("3")))
     assert np.mean(squares["3"]) > 1.5 * np.mean(squares["similarity"])
     assert np.mean(squares["3"]) > 30 * np.mean(squares["inside"])
 

@@ -193,7 +193,7 @@ def test_the_wrong_ray_of_a_pair_of_six_points_is_named_by_the_strip() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("photo", [0, 1, 6, 12])
+@pytest.mark.parametrize("photo", [0, 6])
 def test_a_photo_with_a_fifth_of_its_rays_wrong_is_oriented(photo: int) -> None:
     strip, rows = one_photo_spoiled(photo, photo, extra=200)
     assert len(rows) >= 5
@@ -203,8 +203,8 @@ def test_a_photo_with_a_fifth_of_its_rays_wrong_is_oriented(photo: int) -> None:
 
 @pytest.mark.slow
 def test_strips_without_errors_lose_nothing() -> None:
-    lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.wrong_rays) for seed in range(20)]
-    assert sum(each > 0 for each in lost) <= 2
+    lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.wrong_rays) for seed in range(10)]
+    assert sum(each > 0 for each in lost) <= 1
 
 
 @pytest.mark.slow
