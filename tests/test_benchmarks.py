@@ -164,9 +164,7 @@ def test_screening_prints_how_the_time_grows() -> None:
 def test_causes_prints_a_row_for_each_kind_and_layout_beside_the_goals() -> None:
     options = ("--first", "43003", "short or long one way", "two neighbours", "corners", "strips held by GNSS")
     out = printed("causes.py", *options)
-    rows = re.findall(
-        r"^(film|two)[\w .%,]+? +1 +([01])((?: +(?:\d+ %|-)){3})(?: +[.1]){4}$", out, re.MULTILINE
-    )
+    rows = re.findall(r"^(film|two)[\w .%,]+? +1 +([01])((?: +(?:\d+ %|-)){3})(?: +[.1]){4}$", out, re.MULTILINE)
     assert [name for name, _, _ in rows] == ["film", "two"]
     assert rows[0][1] == "1"
     assert rows[0][2].split()[:2] == ["100", "%"]

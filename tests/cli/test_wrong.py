@@ -282,8 +282,7 @@ def test_a_full_disk_takes_the_same_form(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("closed", [1, 2])
-@pytest.mark.parametrize(("name", "expected"), [("project.yaml", 0), ("nothing.yaml", 2)])
+@pytest.mark.parametrize(("closed", "name", "expected"), [(1, "project.yaml", 0), (2, "nothing.yaml", 2)])
 def test_an_output_that_the_caller_closed_takes_everything(
     tmp_path: Path, closed: int, name: str, expected: int
 ) -> None:

@@ -46,9 +46,15 @@ def linked(given: Inputs, settings: Settings = PLAIN) -> StripResult:
     return strip
 
 
-@pytest.mark.parametrize("crs", ["EPSG:32633", "local", "geocentric"])
-@pytest.mark.parametrize("adjustment", ["similarity", "polynomial"])
-@pytest.mark.parametrize("hand", ["right-handed", "left-handed"])
+@pytest.mark.parametrize(
+    ("crs", "adjustment", "hand"),
+    [
+        ("EPSG:32633", "polynomial", "right-handed"),
+        ("local", "similarity", "left-handed"),
+        ("geocentric", "polynomial", "left-handed"),
+        ("geocentric", "similarity", "right-handed"),
+    ],
+)
 def test_models_without_errors_come_back_to_the_truth(crs: str, adjustment: str, hand: str) -> None:
     axes = ("x", "y", "z") if crs == "geocentric" else ("east", "north", "up")
     asked = Models(sigma_um=FREE, center_sigma_um=FREE, axes="any", hand=hand)
@@ -224,7 +230,7 @@ def test_check_points_lie_within_what_is_stated() -> None:
 def test_the_network_is_better_than_the_chain_with_polynomials() -> None:
     """Plan by a third and more; heights as far as the control leaves them to the models."""
     off: dict[str, list[Floats]] = {"auto": [], "polynomial": []}
-    for seed in range(101, 113):
+    for seed in range(101, 107):
         simulated = simulate(Spec(seed=seed, flight=Flight(photos=25), control=Control(bands=5), models=Models()))
         given = inputs_of(simulated)
         for adjustment, found in off.items():
