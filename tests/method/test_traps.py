@@ -417,9 +417,7 @@ def test_long_strips_are_warned_of(photos: int, warned: bool) -> None:
 # ------------------------------------------------------------------------------------------ the base across the frame
 
 
-@pytest.mark.parametrize(
-    ("kappa", "across"), [(0.0, False), (31.0, False), (85.0, False), (90.0, False), (95.7, False), (0.0, True)]
-)
+@pytest.mark.parametrize(("kappa", "across"), [(0.0, False), (31.0, False), (90.0, False), (0.0, True)])
 def test_the_printed_intersection_is_as_good_at_any_kappa(kappa: float, across: bool, tmp_path: Path) -> None:
     """Eq. 138 divides by x1 - x2: with the base along Y of the strip's frame points were 25 m off under GOOD.
 

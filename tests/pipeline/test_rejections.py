@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs
     from photostrip.simulation.simulation import Simulation
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 STAGES = {"relative", "rays", "control"}
 
 

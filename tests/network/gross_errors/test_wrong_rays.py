@@ -142,7 +142,7 @@ def test_a_photo_that_is_measured_worse_is_told_from_the_others(monkeypatch: pyt
         return found[-1]
 
     monkeypatch.setattr(strip_network, "_spread_of_photos", kept)
-    strip = flown(extra=400)
+    strip = flown(extra=200)
     xy, at = strip.observations.xy.copy(), strip.observations.photo == 6
     xy[at] += np.random.default_rng(3).normal(0, np.sqrt(24) * SIGMA, (at.sum(), 2))
     adjusted(replace(strip, observations=replace(strip.observations, xy=xy)))

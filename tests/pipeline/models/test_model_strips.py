@@ -183,6 +183,7 @@ SEARCHED_FOR_NOTHING = Settings(links=LinkSettings("none"))
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
 def test_standard_deviations_are_those_of_repetitions() -> None:
     """The squares of errors at right angles that have their own size add up to the variance of what is linear."""
     given, rng = truth(3, 3, 1), np.random.default_rng(5)
@@ -213,6 +214,7 @@ def test_standard_deviations_are_those_of_repetitions() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
 def test_check_points_lie_within_what_is_stated() -> None:
     squares = coordinates = 0.0
     for seed in range(12):
@@ -227,6 +229,7 @@ def test_check_points_lie_within_what_is_stated() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
 def test_the_network_is_better_than_the_chain_with_polynomials() -> None:
     """Plan by a third and more; heights as far as the control leaves them to the models."""
     off: dict[str, list[Floats]] = {"auto": [], "polynomial": []}
@@ -241,6 +244,7 @@ def test_the_network_is_better_than_the_chain_with_polynomials() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_no_findings")
 def test_correlated_model_coordinates_count_as_such() -> None:
     """Heights that go with x, as of a plotter read obliquely: known, they are weighted; ignored, points get worse."""
     given, rng = truth(8, 3, 1), np.random.default_rng(3)

@@ -22,6 +22,8 @@ from tests.loops import nonempty
 if TYPE_CHECKING:
     from photostrip.planning.strip.ideal_strip import IdealStrip
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 SIMPLE = Points(rows=3, scatter_percent=0.0, extra_per_model=0)
 
 
