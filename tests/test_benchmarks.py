@@ -123,18 +123,9 @@ def test_gross_errors_prints_two_tables_for_one_project() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["perimeter", "wrong-control"])
-def test_gross_errors_finds_nearly_all_and_loses_little(kind: str) -> None:
-    out = printed("gross_errors.py", "1", "--kind", kind, "--workers", "1", "--first-seed", "3")
-    if kind == "wrong-control":
-        assert re.search(r"1 of 1 strips\nlose just that; (\d+) of \1 wrong coordinates named, 0 others; 0 failed", out)
-        return
-    ((plan, height, placing, wrong, lost, good),) = re.findall(
-        rf"^{kind} +(\S+)/(\S+) +\S+ +(\d+) of (\d+) +(\d+) of (\d+)", out, re.MULTILINE
-    )
-    assert max(float(plan), float(height)) < 1.5
-    assert int(placing) < 0.3 * int(wrong)
-    assert int(lost) < 0.02 * int(good)
+def test_gross_errors_finds_wrong_control() -> None:
+    out = printed("gross_errors.py", "1", "--kind", "wrong-control", "--workers", "1", "--first-seed", "3")
+    assert re.search(r"1 of 1 strips\nlose just that; (\d+) of \1 wrong coordinates named, 0 others; 0 failed", out)
 
 
 @pytest.mark.slow

@@ -109,9 +109,9 @@ def simulated() -> Sample:
 @pytest.mark.slow
 @pytest.mark.parametrize(("method", "axis"), [("polynomial", "x"), ("bundle", "y")])
 def test_a_wrong_image_of_control_is_told_whatever_it_costs(simulated: Sample, method: str, axis: str) -> None:
-    """One image of each control point in turn: all lost their coordinates with x parallaxes, most under GOOD."""
+    """One image of every other control point in turn: all lost their coordinates with x parallaxes, most under GOOD."""
     size = MOVED if method == "bundle" else FOUND_IN_STRIP
-    for point in simulated.given("control"):
+    for point in simulated.given("control")[::2]:
         row = simulated.images(point)[0]
         require_told(simulated.run(method, [(row, axis)], size), point, simulated.observations["photo"][row])
 

@@ -28,12 +28,11 @@ def told(made: Project) -> tuple[list[str], list[str], list[str]]:
 @pytest.mark.parametrize(
     "fly",
     [
-        corridor,
         lambda rng: corridor(rng, height=100.0, wind=0.03),
         lambda rng: corridor(rng, ahead=40.0),
         orbit,
     ],
-    ids=["corridor", "wind", "oblique", "orbit"],
+    ids=["wind", "oblique", "orbit"],
 )
 def test_a_sound_flight_has_no_finding(fly: Callable[[np.random.Generator], Flown]) -> None:
     rng = np.random.default_rng(0)
@@ -53,8 +52,9 @@ def test_dense_points_with_heavy_tails_share_no_ids() -> None:
         wrong = rng.random(shape[0]) < 0.01
         return rng.standard_t(4, shape) + 20.0 * rng.normal(size=shape) * wrong[:, None]
 
-    before, after, _ = told(project(rng, corridor(rng, ahead=30.0), rays=400, noise=noise))
-    assert "P301" not in before + after
+    document, tables = project(rng, corridor(rng, ahead=30.0), rays=400, noise=noise)
+    found = photostrip.run(document, tables=tables).document["findings"]
+    assert "P301" not in [each["code"] for each in found]
 
 
 @pytest.mark.parametrize("ahead", [0.0, 40.0])
