@@ -222,6 +222,7 @@ def test_every_file_is_refused_in_the_same_words(
     assert line.startswith(f"error: {tmp_path}/project.yaml:")
 
 
+@pytest.mark.usefixtures("_quick_start")
 @pytest.mark.parametrize(("harm", "words"), [(folder, "is a folder"), (pipe, "is a device or a pipe")])
 def test_a_grid_that_is_no_file_is_refused_in_the_same_words(
     tmp_path: Path, harm: Callable[[Path], None], words: str
