@@ -49,6 +49,11 @@ LAYOUTS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "gross errors": ({"flight": {"photos": 5}, "gross_errors": [{"kind": "image"}, {"kind": "control"}]}, {}),
     "local": ({"flight": TWO, "ground": {"crs": "local"}}, by("bundle")),
     "geocentric": ({"flight": TWO, "ground": {"crs": "geocentric", "axes": ["x", "y", "z"]}}, {}),
+    "two zones": (
+        {"flight": FOUR, "ground": {"center_deg": [18.0, 49.2]}, "control": {"second_crs": "EPSG:32634"}},
+        {},
+    ),
+    "digital": ({"flight": FOUR, "camera": {"preset": "digital"}, "image": {"unit": "px", "y_axis": "down"}}, {}),
     "geographic": ({"flight": TWO, "ground": {"crs": "EPSG:4326"}}, {}),
 }
 
@@ -64,7 +69,6 @@ def written(folder: Path, specification: dict[str, Any], changed: dict[str, Any]
 
 
 SAMPLES = sorted(path.parent.name for path in ROOT.glob("sample_data/*/project.yaml"))
-SPECIFICATIONS = sorted(path.name for path in ROOT.glob("configs/simulate/*.yaml"))
 
 
 def check_reports(result: photostrip.Result, folder: Path) -> None:
@@ -88,13 +92,6 @@ def test_every_layout_is_reported(tmp_path: Path, layout: str) -> None:
 @pytest.mark.parametrize("sample", SAMPLES)
 def test_every_sample_is_reported(tmp_path: Path, sample: str) -> None:
     check_reports(photostrip.run(ROOT / "sample_data" / sample / "project.yaml"), tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("specification", SPECIFICATIONS)
-def test_every_specification_is_reported(tmp_path: Path, specification: str) -> None:
-    made = photostrip.simulate(ROOT / "configs/simulate" / specification)
-    check_reports(made.project.run(), tmp_path)
 
 
 def wrong(*_: object) -> None:
