@@ -46,9 +46,8 @@ def test_accuracy_prints_limits_and_what_was_measured() -> None:
 
 @pytest.mark.slow
 def test_strip_prints_seconds_memory_parts_and_growth() -> None:
-    out = printed("strip.py", "--rows", "short", "check", "--photos", "8", "--sizes", "4", "8", "--repeat", "1")
+    out = printed("strip.py", "--rows", "short", "--photos", "8", "--sizes", "4", "8", "--repeat", "1")
     assert re.search(r"^20 photos +\d+\.\d\d +\d+\.\d +5 +\d+", out, re.MULTILINE)
-    assert re.search(r"^check of 1000 photos +\d+\.\d\d +\d+\.\d +4 +\d+", out, re.MULTILINE)
     assert re.search(r"\d+ pairs of 24 points in one batch +\d+ us", out)
     assert re.search(r"^exponent of triangulate from 4 to 8 photos +-?\d", out, re.MULTILINE)
     shares = [float(value) for value in re.findall(r"^\w[\w ,.]+ +\d\.\d{4} +(\d+\.\d)%", out, re.MULTILINE)]
@@ -65,13 +64,21 @@ def test_methods_prints_errors_and_ratios() -> None:
 
 
 @pytest.mark.slow
-def test_bundle_prints_times_ratios_and_growth() -> None:
-    out = printed("bundle.py", "--rounds", "1", "--cases", "strip", "corridor", "--largest", "1000", "--alone")
+def test_bundle_prints_times_and_ratios() -> None:
+    out = printed("bundle.py", "--rounds", "1", "--cases", "strip", "--largest", "100", "--alone")
     rows = re.findall(r"^(\d+) x (\d+) +\d+ +\d+ +(\d+) +(\d+) +- +- +- +3/0/0 +-$", out, re.MULTILINE)
-    assert [row[:2] for row in rows] == [("100", "40"), ("100", "300"), ("300", "40"), ("300", "300"), ("1000", "40")]
+    assert [row[:2] for row in rows] == [("100", "40"), ("100", "300")]
     assert all(int(solve) > 0 and int(covariances) > 0 for _, _, solve, covariances in nonempty(rows))
-    assert len(re.findall(r"^\d+ x \d+ +- +- +- +\d\.\d\d of 1\.00 +(?:yes|no)$", out, re.MULTILINE)) == 5
-    assert re.search(r"^1000 x 40 +\d+ +\d+ +\d+ +\d+\.\d\d +1\.00$", out, re.MULTILINE)
+    assert len(re.findall(r"^\d+ x \d+ +- +- +- +\d\.\d\d of 1\.00 +(?:yes|no)$", out, re.MULTILINE)) == 2
+
+
+def test_bundle_prints_growth(capsys: pytest.CaptureFixture[str]) -> None:
+    from benchmarks.bundle import Case, corridor  # limits the threads of the process
+
+    corridor([Case(1, 10, 40), Case(1, 20, 40)], 1)
+    out = capsys.readouterr().out
+    assert re.search(r"^10 x 40 +\d+ +\d+ +\d+ +\d+\.\d\d +1\.00$", out, re.MULTILINE)
+    assert re.search(r"^20 x 40 +\d+ +\d+ +\d+ +\d+\.\d\d +\d\.\d\d$", out, re.MULTILINE)
 
 
 @pytest.mark.slow
@@ -116,18 +123,9 @@ def test_gross_errors_prints_two_tables_for_one_project() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["perimeter", "wrong-control"])
-def test_gross_errors_finds_nearly_all_and_loses_little(kind: str) -> None:
-    out = printed("gross_errors.py", "1", "--kind", kind, "--workers", "1", "--first-seed", "3")
-    if kind == "wrong-control":
-        assert re.search(r"1 of 1 strips\nlose just that; (\d+) of \1 wrong coordinates named, 0 others; 0 failed", out)
-        return
-    ((plan, height, placing, wrong, lost, good),) = re.findall(
-        rf"^{kind} +(\S+)/(\S+) +\S+ +(\d+) of (\d+) +(\d+) of (\d+)", out, re.MULTILINE
-    )
-    assert max(float(plan), float(height)) < 1.5
-    assert int(placing) < 0.3 * int(wrong)
-    assert int(lost) < 0.02 * int(good)
+def test_gross_errors_finds_wrong_control() -> None:
+    out = printed("gross_errors.py", "1", "--kind", "wrong-control", "--workers", "1", "--first-seed", "3")
+    assert re.search(r"1 of 1 strips\nlose just that; (\d+) of \1 wrong coordinates named, 0 others; 0 failed", out)
 
 
 @pytest.mark.slow
@@ -155,15 +153,13 @@ def test_screening_prints_how_the_time_grows() -> None:
 
 @pytest.mark.slow
 def test_causes_prints_a_row_for_each_kind_and_layout_beside_the_goals() -> None:
-    options = ("--first", "43003", "short or long one way", "heights in feet", "corners", "strips held by GNSS")
+    options = ("--first", "43003", "short or long one way", "two neighbours", "corners", "strips held by GNSS")
     out = printed("causes.py", *options)
-    rows = re.findall(
-        r"^(film|their|heights)[\w .%,]+? +1 +([01])((?: +(?:\d+ %|-)){3})(?: +[.1]){4}$", out, re.MULTILINE
-    )
-    assert [name for name, _, _ in rows] == ["film", "their", "heights"]
+    rows = re.findall(r"^(film|two)[\w .%,]+? +1 +([01])((?: +(?:\d+ %|-)){3})(?: +[.1]){4}$", out, re.MULTILINE)
+    assert [name for name, _, _ in rows] == ["film", "two"]
     assert rows[0][1] == "1"
     assert rows[0][2].split()[:2] == ["100", "%"]
-    assert re.search(r"^true cause first: \d+\.\d % of [23] that can be told \(goal: 85 %\)$", out, re.MULTILINE)
+    assert re.search(r"^true cause first: \d+\.\d % of [12] that can be told \(goal: 85 %\)$", out, re.MULTILINE)
     assert len(re.findall(r"^(?:corners|strips)[\w ,]+ +1 +0 +0 +0  $", out, re.MULTILINE)) == 2
     assert re.search(r"^alarms: 0\.00 % of 2 sound projects \(goal: at most 0\.5 %\), 0 refused", out, re.MULTILINE)
 

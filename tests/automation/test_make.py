@@ -61,6 +61,7 @@ def listed(depfile: Path) -> set[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_quick_start")
 @pytest.mark.parametrize(
     ("strip", "more"), [("a", set()), ("b", {"b/own.gtx"})], ids=["tables and presets", "a geoid grid"]
 )

@@ -191,7 +191,7 @@ def test_a_project_that_crashes_or_hangs_leaves_the_machine_alone(
             (tmp_path / "strips" / name / path.name).write_bytes(path.read_bytes())
     monkeypatch.chdir(tmp_path)
     count = Count()
-    limits = Limits(seconds=4.0, megabytes=500.0)
+    limits = Limits(seconds=2.5, megabytes=500.0)
     with clusters.cluster(cluster, 1, limits, work=WORK) as executor:
         Run(choose(["strips"]), (), None, force=False).go(executor, count.finished, Stop())
     assert count.statuses == {"segfault": "crashed", "hang": "timeout", "memory": "memory", "good": "good"}

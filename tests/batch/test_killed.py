@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from photostrip.batch.tasks import Answer, Task
 
 PROJECTS = 4
-RUNS = int(os.environ.get("PHOTOSTRIP_KILLS", "15"))  # killed inside this process's children
+RUNS = int(os.environ.get("PHOTOSTRIP_KILLS", "10"))  # killed inside this process's children
 ADJUSTING = 0.05  # seconds that a result takes that is there already
-WHOLE_RUNS = 4  # killed as whole commands with their workers
+WHOLE_RUNS = 3  # killed as whole commands with their workers
 SUMMARIES = {"summary.txt", "summary.csv", "summary.json", "junit.xml"}
 BATCH = ["batch", "strips", "-o", "out", "-j", "2"]
 
@@ -203,9 +203,7 @@ def gone(mark: str) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("number", "executor"), [(signal.SIGINT, "local"), (signal.SIGTERM, "local"), (signal.SIGINT, "dask:local")]
-)
+@pytest.mark.parametrize(("number", "executor"), [(signal.SIGINT, "local"), (signal.SIGTERM, "dask:local")])
 def test_interrupted_in_good_order(tmp_path: Path, number: signal.Signals, executor: str) -> None:
     """As a terminal does on Ctrl-C: every process of the group gets the signal."""
     import json

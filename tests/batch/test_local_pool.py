@@ -38,7 +38,7 @@ FAULTS = {
     "segfault": ("crashed", "died, 2 times in a row: killed by SIGSEGV"),
     "exit": ("crashed", "died, 2 times in a row: it ended with exit code 5"),
     "raise": ("crashed", "died, 2 times in a row: it ended with exit code 0"),
-    "hang": ("timeout", "took longer than 4 s"),
+    "hang": ("timeout", "took longer than 2.5 s"),
     "memory": ("memory", "needs more memory than a worker may have"),
     "unlucky": ("good", ""),
 }
@@ -49,7 +49,7 @@ FAULTS = {
 def test_every_fault_takes_only_its_own_project_along(tmp_path: Path) -> None:
     names = ["good1", *(name for fault in FAULTS for name in (fault, f"after-{fault}"))]
     tasks = tasks_of(tmp_path, names)
-    with LocalPool(2, Limits(seconds=4.0, megabytes=500.0), WORK) as pool:
+    with LocalPool(2, Limits(seconds=2.5, megabytes=500.0), WORK) as pool:
         answers = list(pool.answers(iter(tasks), never))
         assert len({worker.process.pid for worker in pool.workers}) == len(pool.workers) <= 2
     assert sorted(answer.number for answer in answers) == list(range(len(tasks)))  # one for each, none twice

@@ -25,7 +25,7 @@ def right(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, bytes]]:
 
 
 @pytest.mark.slow
-@settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 @given(seed=st.integers(0, 2**32), command=st.sampled_from(["check", "run"]))
 def test_a_damaged_project_ends_well(right: list[dict[str, bytes]], seed: int, command: str) -> None:
     case = damaged(right, Random(seed))
@@ -39,7 +39,7 @@ def right_blocks(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, byt
 
 
 @pytest.mark.slow
-@settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 @given(seed=st.integers(0, 2**32), command=st.sampled_from(["check", "run"]))
 def test_a_damaged_block_ends_well(right_blocks: list[dict[str, bytes]], seed: int, command: str) -> None:
     case = damaged(right_blocks, Random(seed))

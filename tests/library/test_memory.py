@@ -16,9 +16,9 @@ from photostrip.simulation.spec import Control, Flight, Points, Spec
 from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
 
-FEW, MANY = (2000, 40), (10_000, 180)  # check points, and points of each model beside its rows of Gruber points
-# bytes a check point at most, of a run and of its result; 7541 and 1355, 6427 and 4266 when this was written
-MOST = {"polynomial": (7700, 1400), "auto": (6600, 4400)}
+FEW, MANY = (1000, 20), (5000, 90)  # check points, and points of each model beside its rows of Gruber points
+# bytes a check point at most, of a run and of its result; 7009 and 1695, 4086 and 4494 when this was written
+MOST = {"polynomial": (7200, 1750), "auto": (4200, 4600)}
 
 
 def peaks(check: int, extra: int, adjustment: str) -> tuple[int, int]:

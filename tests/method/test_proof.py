@@ -45,8 +45,6 @@ from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from photostrip.pipeline.results import Result
@@ -144,8 +142,10 @@ def test_a_strip_of_any_length_comes_back(photos: int) -> None:
     assert_exact(recovered(exact(Spec(flight=Flight(photos=photos)))))
 
 
-@pytest.mark.parametrize("rotation", [0.0, 90.0, 180.0, 270.0, 33.0])
-@pytest.mark.parametrize("heading", [0.0, 45.0, 90.0, 197.0, 300.0])
+@pytest.mark.parametrize(
+    ("heading", "rotation"),
+    [(0.0, 0.0), (0.0, 33.0), (45.0, 90.0), (90.0, 180.0), (90.0, 270.0), (197.0, 33.0), (300.0, 0.0)],
+)
 def test_photos_turned_in_any_way_and_flown_anywhere_come_back(heading: float, rotation: float) -> None:
     assert_exact(recovered(exact(Spec(flight=Flight(photos=6, heading_deg=heading, photo_rotation_deg=rotation)))))
 
@@ -231,18 +231,18 @@ def test_any_ground_frame_comes_back(ground: Ground, control: dict[str, str]) ->
 
 
 @pytest.mark.parametrize(
-    "control",
+    ("control", "crs"),
     [
-        Control(layout="corners"),
-        Control(layout="corners+centre"),
-        Control(layout="random", count=6),
-        Control(bands=4, use={"xyz": 0.5, "xy": 0.25, "z": 0.25}),
-        Control(bands=4, use={"xy": 0.4, "z": 0.6}),
-        Control(bands=2, per_band=2),
+        (Control(layout="corners"), "EPSG:32633"),
+        (Control(layout="corners+centre"), "local"),
+        (Control(layout="random", count=6), "EPSG:32633"),
+        (Control(bands=4, use={"xyz": 0.5, "xy": 0.25, "z": 0.25}), "local"),
+        (Control(bands=4, use={"xy": 0.4, "z": 0.6}), "EPSG:32633"),
+        (Control(bands=4, use={"xy": 0.4, "z": 0.6}), "local"),
+        (Control(bands=2, per_band=2), "EPSG:32633"),
     ],
-    ids=["corners", "corners and centre", "anywhere", "mixed", "plan or height", "two bands of two"],
+    ids=["corners", "corners and centre", "anywhere", "mixed", "plan or height", "the same, local", "two bands of two"],
 )
-@pytest.mark.parametrize("crs", ["EPSG:32633", "local"])
 def test_any_control_that_determines_the_strip_brings_it_back(control: Control, crs: str) -> None:
     assert_exact(recovered(exact(Spec(ground=Ground(crs=crs, center_deg=(16.5, 49.2)), control=control))))
 
@@ -308,7 +308,7 @@ def test_refraction_is_taken_out(tilt_deg: float, left: float) -> None:
 
 
 @pytest.mark.slow
-@hypothesis_settings(max_examples=25)
+@hypothesis_settings(max_examples=12)
 @given(
     seed=st.integers(0, 10_000),
     photos=st.integers(3, 14),
@@ -470,19 +470,13 @@ def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("bands", "degree", "strips", "limits"),
-    [(3, "2", 24, (4.8, 4.4, 9.2)), (4, "3", 12, (2.9, 2.9, 5.9))],
-    ids=["3 bands", "4 bands"],
-)
-def test_twenty_models_stay_within_their_limits(bands: int, degree: str, strips: int, limits: Sequence[float]) -> None:
-    found = rms(strip_of(20, bands), strips, "similarity", degree, "auto")
-    # 12 strips know their rms to 9 to 14 %, not well enough to compare with the similarity at three bands;
-    # benchmarks/accuracy.py takes more
-    assert (found[degree] < 1.1 * np.array(limits)).all()
-    assert (found[degree] > 0.5 * np.array(limits)).all()
-    assert (found["similarity"] > 1.5 * found[degree]).all()
-    assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found[degree])
+def test_twenty_models_stay_within_their_limits() -> None:
+    """With four bands: 12 strips know their rms to 9 to 14 %; benchmarks/accuracy.py takes more."""
+    found = rms(strip_of(20, 4), 12, "similarity", "3", "auto")
+    assert (found["3"] < 1.1 * np.array([2.9, 2.9, 5.9])).all()
+    assert (found["3"] > 0.5 * np.array([2.9, 2.9, 5.9])).all()
+    assert (found["similarity"] > 1.5 * found["3"]).all()
+    assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found["3"])
 
 
 # ----------------------------------------------------------------------------------- what must not influence
@@ -538,8 +532,18 @@ def moved(control: ControlPoints, shift: Floats) -> ControlPoints:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("curvature", ["auto", "model"])
-@pytest.mark.parametrize("change", ["wild", "slightly", "removed", "first", "plan only", "sure"])
+@pytest.mark.parametrize(
+    ("change", "curvature"),
+    [
+        ("wild", "auto"),
+        ("wild", "model"),
+        ("slightly", "model"),
+        ("removed", "auto"),
+        ("first", "model"),
+        ("plan only", "auto"),
+        ("sure", "auto"),
+    ],
+)
 def test_a_check_point_never_influences_anything(change: str, curvature: str) -> None:
     crs = "local" if curvature == "model" else "EPSG:32633"
     done, inputs = noisy_project(crs)
@@ -595,7 +599,7 @@ def coordinates(result: Result) -> dict[str, Floats]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_the_order_of_rows_and_ids_does_not_matter(seed: int) -> None:
     _, inputs = noisy_project()
     straight = coordinates(noisy_result())

@@ -403,7 +403,7 @@ def test_points_beyond_the_control_are_warned_of() -> None:
             squares[name].append(rms(errors(done, result)[end]) ** 2)
         squares["inside"].append(rms(errors(done, result)[~end]) ** 2)
         assert "extrapolation" in codes(result)
-        assert "extrapolation" not in codes(triangulate(inputs, degree("3")))
+    assert "extrapolation" not in codes(triangulate(inputs, degree("3")))
     assert np.mean(squares["3"]) > 1.5 * np.mean(squares["similarity"])
     assert np.mean(squares["3"]) > 30 * np.mean(squares["inside"])
 
@@ -417,9 +417,7 @@ def test_long_strips_are_warned_of(photos: int, warned: bool) -> None:
 # ------------------------------------------------------------------------------------------ the base across the frame
 
 
-@pytest.mark.parametrize(
-    ("kappa", "across"), [(0.0, False), (31.0, False), (85.0, False), (90.0, False), (95.7, False), (0.0, True)]
-)
+@pytest.mark.parametrize(("kappa", "across"), [(0.0, False), (31.0, False), (90.0, False), (0.0, True)])
 def test_the_printed_intersection_is_as_good_at_any_kappa(kappa: float, across: bool, tmp_path: Path) -> None:
     """Eq. 138 divides by x1 - x2: with the base along Y of the strip's frame points were 25 m off under GOOD.
 

@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.network.solution import BundleSolution, Cofactors
+    from tests.bundles import Dense
+
     Floats = NDArray[np.float64]
 
 SAME = 1e-8  # of the standard deviations
@@ -106,6 +109,14 @@ PROBLEMS: dict[str, Callable[[], BundleProblem]] = {
 }
 
 
+@cache
+def adjusted(name: str) -> tuple[BundleProblem, BundleSolution, Cofactors, Dense]:
+    """Adjust a problem, and once more without any zero left out."""
+    problem = PROBLEMS[name]()
+    solution = solve(problem)
+    return problem, solution, cofactors_of(solution), dense(problem, solution)
+
+
 def against(found: Floats, expected: Floats) -> float:
     """Largest difference of covariances in units of the standard deviations."""
     deviation = np.sqrt(np.einsum("nii->ni", expected))
@@ -115,9 +126,7 @@ def against(found: Floats, expected: Floats) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_estimate_and_cofactors_are_those_of_a_dense_adjustment(name: str) -> None:
-    problem = PROBLEMS[name]()
-    solution = solve(problem)
-    found, expected = cofactors_of(solution), dense(problem, solution)
+    problem, solution, found, expected = adjusted(name)
     m, q, n, p = problem.photos, problem.points, len(problem.images), len(solution.common)
     cofactors = expected.cofactors
     deviations = np.sqrt(np.diag(cofactors))
@@ -142,10 +151,8 @@ def test_estimate_and_cofactors_are_those_of_a_dense_adjustment(name: str) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
-    problem = PROBLEMS[name]()
-    solution = solve(problem)
-    found, expected = cofactors_of(solution), dense(problem, solution).of_misfits()
-    done = 0
+    problem, solution, found, whole = adjusted(name)
+    expected, done = whole.of_misfits(), 0
     for cofactors, sigma in (
         (found.image_residuals, problem.images.sigma),
         (found.control_residuals, problem.control.sigma),

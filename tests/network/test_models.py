@@ -84,7 +84,7 @@ def residuals(problem: BundleProblem, unknowns: Floats) -> Floats:
 
 @pytest.mark.parametrize("correlated", [False, True])
 def test_the_estimate_and_its_cofactors_are_those_of_a_general_optimiser(*, correlated: bool) -> None:
-    problem = network(correlated=correlated)
+    problem = network(3, correlated=correlated)
     solution = solve(problem)
     begin = np.concatenate([np.zeros(7 * problem.photos), problem.start.points.ravel()])
     size = np.concatenate([np.tile([1.0] * 3 + [1e-3] * 4, problem.photos), np.ones(problem.start.points.size)])

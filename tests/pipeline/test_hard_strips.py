@@ -12,6 +12,8 @@ from photostrip.simulation import Control, Flight, Spec, simulate
 from tests.pipeline import blocks
 from tests.simulated import inputs_of, settings_of
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 
 @pytest.mark.slow
 def test_control_across_a_very_long_strip_is_no_line() -> None:

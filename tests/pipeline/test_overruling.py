@@ -17,6 +17,8 @@ from tests.strips import Flown, control_points, fly, project
 
 WRONG = ("105", "p4_1")
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 
 def spoiled() -> Flown:
     strip = fly(3, 7, sigma=0.005, extra=60)

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs
     from photostrip.simulation.simulation import Simulation
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 STAGES = {"relative", "rays", "control"}
 
 
@@ -111,8 +113,7 @@ def test_there_is_something_to_reject() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
+@pytest.mark.parametrize(("seed", "adjustment"), [(1, "polynomial"), (2, "bundle")])
 def test_the_order_of_rows_does_not_decide(seed: int, adjustment: str) -> None:
     inputs = inputs_of(flown())
     assert rejected(shuffled(inputs, seed), adjustment) == rejected(inputs, adjustment)

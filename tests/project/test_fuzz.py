@@ -35,7 +35,7 @@ def load(folder: str, files: dict[str, bytes]) -> None:
     assert before == {name: (Path(folder) / name).read_bytes() for name in files}
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(mutations)
 def test_mutated_text(changes: list[tuple[str, float, int, str]]) -> None:
     files = dict(MARKED_FILES)
@@ -46,7 +46,7 @@ def test_mutated_text(changes: list[tuple[str, float, int, str]]) -> None:
         load(folder, {name: text.encode(errors="replace") for name, text in files.items()})
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(st.sampled_from(sorted(MARKED_FILES)), st.binary(max_size=200), st.floats(0, 1))
 def test_mutated_bytes(name: str, data: bytes, where: float) -> None:
     files = {each: text.encode() for each, text in MARKED_FILES.items()}
@@ -92,7 +92,7 @@ PATHS = [
 ]
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from(PATHS), trees), min_size=1, max_size=3))
 def test_any_tree_at_any_key(changes: list[tuple[str, object]]) -> None:
     import json

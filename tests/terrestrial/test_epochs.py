@@ -66,9 +66,7 @@ def test_without_turns_displacements_are_differences_of_two_intersections_also_o
 FACE = world(number=90, moving=20, stable=12)
 KINDS = {
     "coordinates": FACE,
-    "coordinates, camera turned": turned(FACE, *TURN),
     "coordinates, z right not measured, camera turned": replace(turned(FACE, *TURN), right_z=False),
-    "pseudo-parallaxes": replace(FACE, shared=0.02),
     "pseudo-parallaxes, camera turned": replace(turned(FACE, *TURN), shared=0.02),
     "third epoch, camera turned": turned(replace(FACE, epochs=3), *TURN),
 }
@@ -175,11 +173,10 @@ def test_steps_add_up_and_their_covariances_too() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shared", [0.0, 0.02])
-def test_rates_and_steps_are_as_precise_as_stated(shared: float) -> None:
-    truth = turned(replace(world(), epochs=4, shared=shared), *TURN)
+def test_rates_and_steps_are_as_precise_as_stated() -> None:
+    truth = turned(replace(world(), epochs=4, shared=0.02), *TURN)
     rates, steps, misfits = [], [], []
-    for seed in range(1, 61):
+    for seed in range(1, 41):
         result = run(truth, seed)
         assert result.rates is not None
         ordinary = ~result.series.stable

@@ -19,6 +19,7 @@ MOST_HEIGHT_OFF = 0.2  # of the flying height, from the line of the neighbours
 LONG_BASE, SHORT_BASE = 1.75, 0.5  # of the usual base
 TURNED_DEG = 30.0  # of a base against its neighbours
 BESIDE = 3  # bases on either side that say what is usual
+BESIDES = np.array([step for step in range(-BESIDE, BESIDE + 1) if step])
 LEAST_PHOTOS = 4
 LEVEL = 0.01  # of one false name in a flight that scatters
 SIGMA_FROM_LINE = 1.5**0.5  # of a height off the line of its neighbours, over that of a height
@@ -64,14 +65,13 @@ def _below(photos: Sequence[str], depth: Floats, below: Numbers, names: tuple[st
 def _heights(
     height: Floats, flying: float, photos: Sequence[str], names: tuple[str, ...], known: float
 ) -> Iterator[Finding]:
-    step = np.diff(height, 2) / flying
-    for number in range(len(photos)):
-        near = _beside(number, len(photos))
-        line = _robust_line(np.array(near, float), height[near])
-        off = float(height[number] - line[0] - line[1] * number) / flying
-        inside = near[0] < number < near[-1]  # at an end a line is extended
-        limit = MOST_HEIGHT_OFF if inside else 2.0 * MOST_HEIGHT_OFF
-        if abs(off) > max(limit, _by_chance(step, range(number - 2, number + 1), known)):
+    step, place = np.diff(height, 2) / flying, np.arange(len(height), dtype=float)
+    level, slope = _robust_lines(place[:, None] + BESIDES, _beside(height))
+    all_off = (height - level - slope * place) / flying
+    at_end = (place == 0) | (place == place[-1])  # where a line is extended
+    for number in np.flatnonzero(np.abs(all_off) > np.where(at_end, 2.0, 1.0) * MOST_HEIGHT_OFF).tolist():
+        off = float(all_off[number])
+        if abs(off) > _by_chance(step, range(number - 2, number + 1), known):
             message = (
                 f"the perspective centre of photo {photos[number]} lies {100 * abs(off):.0f} % of the flying height "
                 f"{'above' if off > 0 else 'below'} those of its neighbours"
@@ -91,25 +91,26 @@ def _by_chance(step: Floats, own: range, known: float) -> float:
     return normal_quantile(1.0 - LEVEL / (2.0 * (len(step) + 1))) * max(sigma, known)
 
 
-def _beside(number: int, count: int) -> list[int]:
-    """Neighbours of one of `count` photos or bases, itself left out."""
-    return [k for k in range(max(number - BESIDE, 0), min(number + BESIDE + 1, count)) if k != number]
+def _beside(values: Floats) -> Floats:
+    """Values (n, ...) of the neighbours of each of n photos or bases, (n, 6, ...); NaN beyond the ends."""
+    beyond = np.full((BESIDE, *values.shape[1:]), np.nan)
+    return np.concatenate([beyond, values, beyond])[np.arange(len(values))[:, None] + BESIDE + BESIDES]
 
 
-def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
-    """Line whose slope is the median of those of all pairs of points."""
-    i, j = np.triu_indices(len(x), 1)
-    slope = np.median((y[j] - y[i]) / (x[j] - x[i]))
-    return np.median(y - slope * x), slope
+def _robust_lines(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Lines (n,) through points (n, k) whose slopes are the medians of those of all pairs."""
+    i, j = np.triu_indices(y.shape[1], 1)
+    slope = np.nanmedian((y[:, j] - y[:, i]) / (x[:, j] - x[:, i]), axis=1)
+    return np.nanmedian(y - slope[:, None] * x, axis=1), slope
 
 
 def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...], known: float) -> Iterator[Finding]:
     step = np.diff(np.log(np.maximum(length, 1e-12)))
-    for number in range(len(length)):
-        usual = np.median(length[_beside(number, len(length))])
-        ratio = float(length[number]) / max(usual, 1e-12)
-        by_chance = _by_chance(step, range(number - 1, number + 1), known)
-        if SHORT_BASE < ratio < LONG_BASE or min(abs(np.log(ratio)), abs(ratio - 1.0)) < by_chance:
+    ratios = length / np.maximum(np.nanmedian(_beside(length), axis=1), 1e-12)
+    for number, ratio in enumerate(ratios.tolist()):
+        if SHORT_BASE < ratio < LONG_BASE:
+            continue
+        if min(abs(np.log(ratio)), abs(ratio - 1.0)) < _by_chance(step, range(number - 1, number + 1), known):
             continue
         pair = (photos[number], photos[number + 1])
         message = f"the base of photos {pair[0]} and {pair[1]} is {ratio:.2f} times as long as those beside it"
@@ -121,11 +122,10 @@ def _directions(
     bases: Floats, up: Floats, photos: Sequence[str], names: tuple[str, ...], known: float
 ) -> Iterator[Finding]:
     unit = bases / np.maximum(np.linalg.norm(bases, axis=1, keepdims=True), 1e-12)
-    step = _turns(unit[:-1], unit[1:], up)
-    for number in range(len(bases)):
-        usual = np.median(unit[_beside(number, len(bases))], axis=0)
-        turn = float(_turns(usual, bases[number], up))
-        if abs(turn) <= max(TURNED_DEG, _by_chance(step, range(number - 1, number + 1), known)):
+    step, turns = _turns(unit[:-1], unit[1:], up), _turns(np.nanmedian(_beside(unit), axis=1), bases, up)
+    for number in np.flatnonzero(np.abs(turns) > TURNED_DEG).tolist():
+        turn = float(turns[number])
+        if abs(turn) <= _by_chance(step, range(number - 1, number + 1), known):
             continue
         pair = (photos[number], photos[number + 1])
         message = f"the base of photos {pair[0]} and {pair[1]} turns by {turn:+.0f} degrees against those beside it"

@@ -62,11 +62,12 @@ def number(value: float) -> str:
 
 def element(name: str, content: str = "", **attributes: str | float) -> str:
     """Return one element; underscores in names of attributes stand for hyphens, ``kind`` for ``class``."""
-    names = {"kind": "class"}
-    words = {key: number(value) if isinstance(value, float) else str(value) for key, value in attributes.items()}
-    parts = [f" {names.get(key, key).replace('_', '-')}={quoteattr(value)}" for key, value in words.items()]
-    inside = f">{content}</{name}>" if content else "/>"
-    return f"<{name}{''.join(parts)}{inside}"
+    parts = [f"<{name}"]
+    for key, value in attributes.items():
+        words = f'"{number(value)}"' if isinstance(value, float) else quoteattr(str(value))
+        parts.append(f" {'class' if key == 'kind' else key.replace('_', '-')}={words}")
+    parts.append(f">{content}</{name}>" if content else "/>")
+    return "".join(parts)
 
 
 def text(place: Point, words: str, kind: str = "", anchor: str = "start") -> str:

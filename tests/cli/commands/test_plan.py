@@ -293,7 +293,6 @@ def test_pictures_are_the_same_every_time(capsys: pytest.CaptureFixture[str], tm
     for command, endings in (
         (("camera", str(file)), [".svg", ".svg", ".png", ".png"]),
         (("camera", "--source-table"), [".svg"]),
-        (("model",), [".svg"]),
         (("model", "--source-table"), [".svg"]),
         (("model", "--elements", "5,-3,10,-8,12"), [".svg"]),
     ):

@@ -162,7 +162,7 @@ def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("rays", "points", "fewest", "most"), [(2, 4000, 0.35, 0.7), (3, 2000, 0.5, 6.0), (4, 2000, 0.5, 8.0)]
+    ("rays", "points", "fewest", "most"), [(2, 4000, 0.35, 0.7), (3, 1000, 0.5, 6.0), (4, 1000, 0.5, 8.0)]
 )
 def test_good_points_are_called_wrong_as_often_as_the_level_says(
     rays: int, points: int, fewest: float, most: float

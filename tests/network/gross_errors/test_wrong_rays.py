@@ -142,7 +142,7 @@ def test_a_photo_that_is_measured_worse_is_told_from_the_others(monkeypatch: pyt
         return found[-1]
 
     monkeypatch.setattr(strip_network, "_spread_of_photos", kept)
-    strip = flown(extra=400)
+    strip = flown(extra=200)
     xy, at = strip.observations.xy.copy(), strip.observations.photo == 6
     xy[at] += np.random.default_rng(3).normal(0, np.sqrt(24) * SIGMA, (at.sum(), 2))
     adjusted(replace(strip, observations=replace(strip.observations, xy=xy)))
@@ -193,7 +193,7 @@ def test_the_wrong_ray_of_a_pair_of_six_points_is_named_by_the_strip() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("photo", [0, 1, 6, 12])
+@pytest.mark.parametrize("photo", [0, 6])
 def test_a_photo_with_a_fifth_of_its_rays_wrong_is_oriented(photo: int) -> None:
     strip, rows = one_photo_spoiled(photo, photo, extra=200)
     assert len(rows) >= 5
@@ -203,8 +203,8 @@ def test_a_photo_with_a_fifth_of_its_rays_wrong_is_oriented(photo: int) -> None:
 
 @pytest.mark.slow
 def test_strips_without_errors_lose_nothing() -> None:
-    lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.wrong_rays) for seed in range(20)]
-    assert sum(each > 0 for each in lost) <= 2
+    lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.wrong_rays) for seed in range(10)]
+    assert sum(each > 0 for each in lost) <= 1
 
 
 @pytest.mark.slow

@@ -246,10 +246,10 @@ def test_check_points_do_not_influence_a_bundle() -> None:
 @pytest.mark.slow
 def test_a_strip_that_polynomials_leave_kilometres_off_starts_without_them() -> None:
     spec = Spec(
-        flight=Flight(photos=600, end_lap_percent=62.0, heading_deg=0.0, scale=1500.0),
-        points=Points(rows=5, extra_per_model=6, reach_percent=75.0),
-        control=Control(every=300, check=0),
-        image=Image(sigma_um=150.0),
+        flight=Flight(photos=400, end_lap_percent=62.0, heading_deg=0.0, scale=1500.0),
+        points=Points(rows=5, extra_per_model=2, reach_percent=75.0),
+        control=Control(every=200, check=0),
+        image=Image(sigma_um=300.0),
     )
     bundle = adjusted(simulate(spec)).bundle
     assert bundle is not None

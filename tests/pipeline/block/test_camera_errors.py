@@ -59,9 +59,8 @@ def up(simulation: Simulation, result: Result) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [21, 22])
-def test_an_unstated_lens_is_named_and_costs_nothing(seed: int) -> None:
-    spec = strip(seed)
+def test_an_unstated_lens_is_named_and_costs_nothing() -> None:
+    spec = strip(21)
     sound, bent = simulate(spec), simulate(replace(spec, camera=replace(FILM, distortion=LENS)))
     result = adjusted(bent)
     (finding,) = result.findings
@@ -77,9 +76,8 @@ def test_an_unstated_lens_is_named_and_costs_nothing(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [25, 26])
-def test_film_that_shrank_one_way_is_named_and_no_control_is_doubted(seed: int) -> None:
-    sound = simulate(strip(seed, 12))
+def test_film_that_shrank_one_way_is_named_and_no_control_is_doubted() -> None:
+    sound = simulate(strip(25, 12))
     inputs = inputs_of(sound)
     shrunk = replace(inputs, observations=replace(inputs.observations, xy=inputs.observations.xy * [0.998, 1.0]))
     result = triangulate(shrunk, settings_of(sound))
@@ -93,7 +91,7 @@ def test_film_that_shrank_one_way_is_named_and_no_control_is_doubted(seed: int) 
 
 @pytest.mark.slow
 def test_gross_errors_are_no_error_of_a_camera() -> None:
-    for seed in range(31, 35):
+    for seed in range(31, 33):
         wrong = (GrossError("image", count=8, size_um=150.0), GrossError("control", count=2, size_m=3.0))
         assert taken_up(adjusted(simulate(strip(seed, 20, *wrong)))) == []
 
@@ -101,7 +99,7 @@ def test_gross_errors_are_no_error_of_a_camera() -> None:
 @pytest.mark.slow
 def test_a_lens_is_told_among_gross_errors() -> None:
     wrong = (GrossError("image", count=8, size_um=300.0), GrossError("control", count=1, size_m=3.0))
-    result = adjusted(simulate(replace(strip(41, 30, *wrong), camera=replace(FILM, distortion=LENS))))
+    result = adjusted(simulate(replace(strip(41, 20, *wrong), camera=replace(FILM, distortion=LENS))))
     assert taken_up(result) == ["k1"]
     assert control_lost(result) <= 3
 

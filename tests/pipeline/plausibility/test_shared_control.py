@@ -94,8 +94,7 @@ def with_moved_checks(shift: Sequence[float], count: int, adjustment: str) -> Re
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("adjustment", ["polynomial", "bundle"])
-@pytest.mark.parametrize("shift", [(2.0, 1.0, 0.0), (0.0, 0.0, 2.0)])
+@pytest.mark.parametrize(("shift", "adjustment"), [((2.0, 1.0, 0.0), "polynomial"), ((0.0, 0.0, 2.0), "bundle")])
 def test_check_points_that_lie_beside_the_result_are_named_together(
     shift: tuple[float, float, float], adjustment: str
 ) -> None:
@@ -107,7 +106,7 @@ def test_check_points_that_lie_beside_the_result_are_named_together(
     assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.3)
     (line,) = document_of(result)["verdict"]["look_at"]
     assert line.startswith("P411 the check points of control[0] all lie")
-    for count in (0, 1, 2):
+    for count in (1, 2):
         assert "P411" not in {each.code for each in with_moved_checks(shift, count, adjustment).findings}
 
 

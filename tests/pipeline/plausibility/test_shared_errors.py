@@ -73,8 +73,7 @@ def lost(result: Result) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shift", [(10.0, 0.0, 0.0), (7.0, -7.0, 0.0), (0.0, 0.0, 10.0)])
-@pytest.mark.parametrize("strips", [1, 2])
+@pytest.mark.parametrize(("strips", "shift"), [(1, (10.0, 0.0, 0.0)), (2, (7.0, -7.0, 0.0)), (1, (0.0, 0.0, 10.0))])
 def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shift: tuple[float, float, float]) -> None:
     """Tested one by one, 12 control coordinates and 23 positions went, and points were 7 to 10 m off."""
     simulation, result = adjusted(strips=strips, shift=shift)
@@ -187,7 +186,7 @@ def on_hills(share: float, *errors: GrossError) -> Result:
     return triangulate(replace(inputs, strips=(replace(strip, camera=camera),)), settings_of(simulation))
 
 
-@pytest.mark.parametrize("share", [-0.01, 0.01, 0.02])
+@pytest.mark.parametrize("share", [-0.01, 0.02])
 def test_the_strip_method_names_a_principal_distance_off_by_a_percent(share: float) -> None:
     """Control was rejected one by one, or bent the strip, and heights were off by a metre."""
     result = on_hills(share)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +34,7 @@ def spec(seed: int = 1, count: int = 60, photos: int = 4) -> Spec:
     )
 
 
+@cache
 def run(seed: int = 1, *, twist_arcsec: float = 0.0, **more: int) -> Result:
     """Adjust a strip; the right photo of the middle model may get an x error x y domega / f."""
     simulation = simulate(spec(seed, **more))

@@ -94,8 +94,8 @@ def test_the_result_is_as_good_as_without_the_wrong_control() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("_no_findings")
 def test_good_control_is_left_alone() -> None:
-    alarms = [bool(adjusted(flown(seed)).strips[0].wrong_control) for seed in range(25)]
-    assert sum(alarms) <= 2  # level 1 % a strip
+    alarms = [bool(adjusted(flown(seed)).strips[0].wrong_control) for seed in range(12)]
+    assert sum(alarms) <= 1  # level 1 % a strip
 
 
 # --------------------------------------------------------------------------------------------------------- the log
@@ -141,7 +141,7 @@ def scattered(strip: Flown, seed: int, share: float) -> tuple[ControlPoints, Fla
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_two_fifths_of_wrong_control_come_out_and_nothing_else(seed: int) -> None:
     strip = flown(seed % 2)
     control, bad = scattered(strip, seed, 0.4)
