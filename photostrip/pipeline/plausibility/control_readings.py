@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from photostrip.arrays import Flags, Floats
 from photostrip.geodesy.frame_spec import GROUND_AXES
@@ -200,7 +199,12 @@ def _best_distance(
         return costs[logarithm]
 
     if closely:
-        best = int(np.argmin([cost(each) for each in DISTANCES]))
+        from scipy.optimize import minimize_scalar  # a sixth of a second that few runs need
+
+        coarse = [cost(each) for each in DISTANCES]
+        if not np.isfinite(coarse).any():
+            return 1.0, None
+        best = int(np.argmin(coarse))
         around = DISTANCES[max(best - 1, 0)], DISTANCES[min(best + 1, len(DISTANCES) - 1)]
         for inside in (around, (-LITTLE, LITTLE)):  # one that is off by little is likely in a narrow range only
             with np.errstate(invalid="ignore"):  # where it is not formed
