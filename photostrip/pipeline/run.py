@@ -12,6 +12,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.block.adjust import adjust_block
 from photostrip.pipeline.block.datum import FormedStrips
+from photostrip.pipeline.block.own_frame import laid_on_ground
 from photostrip.pipeline.common_points import join_photos, join_strips
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
@@ -142,6 +143,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     """Every stage takes what the stages before it found."""
     # 1 lens distortion, refraction
     refined = correct(photo, inputs, settings, ground)
+    inputs, ground, laid = laid_on_ground(inputs, refined.observations, ground)
     # 2-3 relative orientation; base direction, orientation chain, space intersection, scale transfer
     formed = form_strips(inputs, refined.observations, settings)
 
@@ -168,6 +170,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
             not_determined=missing,
             notes=(
                 *(photo.interior.notes if photo.interior is not None else ()),
+                *laid,
                 *adjusted.notes,
                 *curvature_notes(inputs, settings, adjusted.strips),
                 *datum_notes(inputs, ground),

@@ -1,0 +1,29 @@
+"""What the files of another program hold, in the words of a project."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from photostrip.arrays import Floats, Numbers
+from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
+
+
+@dataclass(frozen=True, eq=False)
+class ForeignBlock:
+    """Photos in no order, measured in pixels from the corner of the first one, with rough orientations."""
+
+    source: str  # what was read, as "COLMAP model (binary)"
+    files: tuple[str, ...]
+    cameras: Mapping[str, PixelCamera]
+    photos: tuple[str, ...]  # ids
+    camera_of: tuple[str, ...]  # of each photo
+    points: tuple[str, ...]  # ids
+    # rays, (n,): number of their photo and of their point; (n, 2): x to the right, y down
+    photo: Numbers
+    point: Numbers
+    xy: Floats
+    # (m, 3), (m, 3, 3): perspective centres, and rotations from image axes (x right, y up, z towards the viewer)
+    centers: Floats
+    rotations: Floats
+    left_out: tuple[str, ...] = ()  # sentences
