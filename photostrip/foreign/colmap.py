@@ -22,7 +22,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.tables import ForeignBlock
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
-from photostrip.formats.text.numbers import LARGEST_NUMBER, shown
+from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
 from photostrip.notes import counted, listed
 from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera, in_millimetres
 
@@ -272,7 +272,7 @@ def _camera(place: Place, model: str, values: list[float]) -> PixelCamera:
     focal = given.pop("fx", 0.0) or given.pop("f", 0.0)
     focals = focal, given.pop("fy", focal)
     point = given.pop("cx"), given.pop("cy")
-    if not all(0.0 < each < LARGEST_NUMBER for each in (width, height, *focals)):
+    if not all(SMALLEST_LENGTH < each < LARGEST_NUMBER for each in (width, height, *focals)):
         raise place.wrong("width, height and focal length are not above 0", "range")
     if not (np.abs([*point, *given.values()]) < LARGEST_NUMBER).all():
         raise place.wrong("a parameter is no number", "number")

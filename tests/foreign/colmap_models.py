@@ -99,7 +99,7 @@ def simulated(folder: Path, **changes: object) -> Model:
         center = TO_MODEL.apply(SCALE * np.array([photo[name] for name in "xyz"])) + SHIFT
         upright = np.array(photo["rotation"]).reshape(3, 3) * (1.0, -1.0, -1.0)  # camera, y down, to the ground
         to_camera = (TO_MODEL * Rotation.from_matrix(upright)).inv()
-        own = [row for row in rows if row[0] == photo["id"]]
+        own = [row for row in rows if row[0] == photo["id"] and row[1][0] not in "GK"]  # control is marked by hand
         points = [numbers.setdefault(row[1], 5 * len(numbers) + 2) for row in own]
         quaternion, shift = to_camera.as_quat()[[3, 0, 1, 2]], -to_camera.apply(center)
         xy = np.array([[float(each) for each in row[2:4]] for row in own])
