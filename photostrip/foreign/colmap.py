@@ -24,6 +24,7 @@ from photostrip.foreign.tables import ForeignBlock
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
 from photostrip.notes import counted, listed
+from photostrip.strip.image_coordinates import lens_distortion
 from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera, in_millimetres
 
 LARGEST = 4000 * MEGABYTE
@@ -284,10 +285,11 @@ def _camera(place: Place, model: str, values: list[float]) -> PixelCamera:
         distortion=given,
     )
     try:
-        in_millimetres("", found)
+        faults = lens_distortion.faults(in_millimetres(model, found))
     except InputError as error:
-        fault = error.faults[0]
-        raise place.wrong(fault.message, fault.code, fix=fault.fix) from None
+        faults = list(error.faults)
+    for fault in faults:
+        raise place.wrong(fault.message, fault.code, fix=fault.fix)
     return found
 
 
