@@ -226,7 +226,7 @@ TEXTS: dict[str, tuple[str, str, str]] = {  # cameras, images, what is told
     "model": ("1 OPENCV_FISHEYE 9 9 9 9 5 5 0 0 0 0", "", "cameras.txt:1: the model OPENCV_FISHEYE has no counterpart"),
     "unknown": ("1 LENS 9 9 9 9 5 5 0 0 0 0", "", "cameras.txt:1: the model LENS has no counterpart"),
     "rational": ("1 FULL_OPENCV 9 9 9 9 5 5 0 0 0 0 0 0.1 0 0", "", "cameras.txt:1: the coefficient k4 of"),
-    "folded": ("1 RADIAL 99 99 9 5 5 -1 1", "", "cameras.txt:1: camera RADIAL: the distortion has no inverse: the"),
+    "folded": ("1 RADIAL 99 99 9 50 50 -1 0.01", "", "cameras.txt:1: camera RADIAL: the distortion has no inverse"),
     "count": ("# c\n1 RADIAL 9 9 9 5 5 0", "", "cameras.txt:2: 4 parameters of the model RADIAL; expected 5: f, cx"),
     "short": ("1 RADIAL 9 9", "", "cameras.txt:1: 4 values in the line"),
     "number": ("1 PINHOLE 9 9 9 9 5 five", "", "cameras.txt:1: `five` is no number of camera 1"),
