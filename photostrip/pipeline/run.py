@@ -75,6 +75,8 @@ def _of_failure(
     error: InputError | GeometryError,
 ) -> tuple[Finding, ...]:
     """Find out why a run failed: strips that can be adjusted each by itself say more than strips only formed."""
+    if inputs.orientations is not None and inputs.orientations.has_own_frame:
+        inputs = replace(inputs, orientations=None)  # nothing can be said against them
     broken = error.photos if isinstance(error, GeometryError) else ()
     if settings.adjustment == BUNDLE and not broken and ground is not None and photo is not None:
         try:

@@ -64,6 +64,17 @@ def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, 
     assert any("laid on 9 control points: 1 unit of it is 27.0" in each["message"] for each in found.document["notes"])
 
 
+def test_nothing_is_said_against_orientations_of_an_arbitrary_frame(tmp_path: Path) -> None:
+    model = simulated(tmp_path / "native")
+    assert convert(model.write_text(tmp_path / "model"), tmp_path / "block", "-q") == 0
+    project = with_control(tmp_path / "native", tmp_path / "block")
+    before, _, rest = project.read_text(encoding="utf-8").partition("control:")
+    project.write_text(f"{before}control:{rest.replace('[east, north, up]', '[north, east, up]')}", encoding="utf-8")
+    with pytest.raises(photostrip.InputError, match="fits the control only upside down") as refusal:
+        photostrip.run(project)
+    assert [each.code for each in refusal.value.findings if each.key.startswith("orientations")] == []
+
+
 def test_camera_positions_say_where_the_model_lies(tmp_path: Path) -> None:
     model = simulated(tmp_path / "native", gnss={"sigma": [0.03, 0.03, 0.05]})
     assert convert(model.write_text(tmp_path / "model"), tmp_path / "block", "-q") == 0
