@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isnan
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.foreign.tables import ForeignBlock
+from photostrip.foreign.tables import ForeignBlock, GivenControl
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.text.writing import Content
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geometry.rotation import separable_angles
 from photostrip.notes import counted
 from photostrip.number_columns import as_repr, as_texts, joined, repeated, texts_of
@@ -44,8 +46,11 @@ def project_files(name: str, block: ForeignBlock, wanted: Wanted) -> dict[str, C
     rays = [(block.photos, block.photo), (block.points, block.point)]
     project = _project(name, block, wanted, system)
     return {
-        "observations.csv": _table("photo,point,x,y", rays, block.xy),
+        "observations.csv": _table("photo,point,x,y", rays, block.xy)
+        if block.sigma is None
+        else _table("photo,point,x,y,sx,sy", rays, np.column_stack([block.xy, block.sigma, block.sigma])),
         "orientations.csv": orientations,
+        **({} if block.control is None else {"control.csv": _control(block.control)}),
         "project.yaml": HEADER.format(source=block.source) + "".join(f"{line}\n" for line in lines_of(project)),
     }
 
@@ -67,14 +72,27 @@ def _project(name: str, block: ForeignBlock, wanted: Wanted, system: str) -> dic
             "origin": "top-left",
             "sigma": wanted.sigma,
         },
+        **({} if block.control is None else {"control": [{"file": "control.csv", **_frame(block.control.crs)}]}),
         "orientations": {
             "file": "orientations.csv",
-            "crs": "local",
-            "axes": ["east", "north", "up"],
+            **_frame("local"),
             "angles": {"system": system, "unit": "deg"},
             "role": "approximate",
         },
     }
+
+
+def _frame(crs: str) -> dict[str, object]:
+    return {"crs": Text(crs), "axes": list(GROUND_AXES)}
+
+
+def _control(given: GivenControl) -> str:
+    rows = zip(given.ids, given.xyz.tolist(), given.sigma.tolist(), given.check, strict=True)
+    cells = (
+        (name, x, y, "" if isnan(z) else z, "xy" if isnan(z) else "xyz", "check" if check else "control", *sigma)
+        for name, (x, y, z), sigma, check in rows
+    )
+    return to_csv(("point", "x", "y", "z", "use", "role", "sx", "sy", "sz"), cells)
 
 
 def _camera(given: PixelCamera) -> dict[str, object]:
@@ -128,9 +146,21 @@ def understood(block: ForeignBlock, wanted: Wanted) -> Mapping[str, str]:
         f"pixels from the corner of the first one, y down; standard deviation {wanted.sigma:g} px; a pixel is "
         + ("taken as 1 µm" if wanted.pixel_size is None else f"{wanted.pixel_size:g} mm")
     )
+    if block.control is not None:
+        said["control"] = _of_control(block.control)
     if block.left_out:
         said["left out"] = "; ".join(block.left_out)
     return said
+
+
+def _of_control(given: GivenControl) -> str:
+    x, y, z = given.xyz[0].tolist()
+    height = "not known" if isnan(z) else f"{z:.3f}"
+    checks = f", {sum(given.check)} of them check points" if any(given.check) else ""
+    return (
+        f"{counted(len(given.ids), 'point')}{checks}, {counted(given.marks, 'mark')}; {given.crs}, heights taken as "
+        f"ellipsoidal; {given.ids[0]}: east {x:.8g}, north {y:.9g}, up {height}"
+    )
 
 
 def _of_camera(name: str, given: PixelCamera) -> str:
