@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.tables import ForeignBlock
-from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
+from photostrip.formats.text.files import BOM, MEGABYTE, decode, read_bytes, refuse
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
 from photostrip.notes import counted, listed
 from photostrip.strip.image_coordinates import lens_distortion
@@ -76,7 +76,8 @@ def read(folder: Path) -> ForeignBlock:
     """
     kind = next((each for each in ("bin", "txt") if (folder / f"cameras.{each}").is_file()), "")
     if not kind:
-        inside = next(iter(sorted(each.parent for each in folder.glob("**/cameras.*") if each.stem == "cameras")), None)
+        near = [folder.parent] if folder.is_file() else [folder, *folder.glob("*"), *folder.glob("*/*")]
+        inside = next((each for each in sorted(near) if list(each.glob("cameras.[bt][ix][nt]"))), None)
         fix = f"did you mean `{inside}`?" if inside is not None else ""
         refuse(str(folder), "colmap", "is no model of COLMAP: it has no cameras.bin or cameras.txt", fix=fix)
     files = [str(folder / f"{name}.{kind}") for name in ("cameras", "images")]
@@ -101,8 +102,8 @@ def _unique(what: str, entries: Iterator[tuple[Place, Any, Any]]) -> Iterator[tu
 
 def _lines(file: str) -> Iterator[tuple[Place, bytes]]:
     data = read_bytes(file, LARGEST)
-    decode(file, data)  # refuses what is no text
-    start, number = 0, 0
+    _, marked = decode(file, data)  # refuses what is no text
+    start, number = len(BOM) if marked else 0, 0
     while start < len(data):
         end = data.find(b"\n", start)
         end = len(data) if end < 0 else end

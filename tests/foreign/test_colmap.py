@@ -302,3 +302,28 @@ def test_unknown_models_of_a_binary_file_are_refused_by_name(
 ) -> None:
     folder = replace(simulated(tmp_path / "native"), cameras={4: ("FOV", 9, 9, OPENCV[:5])}).write_binary(tmp_path)
     assert "cameras.bin: camera 1 of 1: the model FOV has no counterpart" in refused(capsys, folder, tmp_path / "block")
+
+
+def test_texts_of_other_systems_are_the_same(tmp_path: Path) -> None:
+    folder = simulated(tmp_path / "native").write_text(tmp_path / "model")
+    assert convert(folder, tmp_path / "one", "-q") == 0
+    for path in folder.iterdir():
+        path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b" \r\n"))
+    assert convert(folder, tmp_path / "other", "-q") == 0
+    for name in ("observations.csv", "orientations.csv"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
+
+
+def test_a_camera_for_each_photo(tmp_path: Path) -> None:
+    model = simulated(tmp_path / "native")
+    model.cameras = dict.fromkeys(range(7, 7 + len(model.images)), ("OPENCV", 5500, 3667, OPENCV))
+    model.images = [(*each[:3], 7 + number, *each[4:]) for number, each in enumerate(model.images)]
+    assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block", "-q") == 0
+    found = photostrip.run(with_control(tmp_path / "native", tmp_path / "block"))
+    assert found.document["verdict"]["look_at"] == []
+    assert len(found.document["photos"]) == len(model.images)
+
+
+def test_a_file_of_a_model_names_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = simulated(tmp_path / "native").write_binary(tmp_path / "model")
+    assert f"did you mean `{folder}`?" in refused(capsys, folder / "images.bin", tmp_path / "block")

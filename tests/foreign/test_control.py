@@ -230,8 +230,8 @@ def test_a_damaged_table_is_refused_or_written_whole(tmp_path: Path, kind: str) 
         path.write_bytes(damaged(whole, random, WORDS))
         target, said = tmp_path / f"block-{number}", io.StringIO()
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = main(["convert", str(tmp_path / "model"), "-o", str(target), "--sigma", "0.5", "--control", str(path),
-                         *UTM, *SIGMA])  # fmt: skip
+            code = main(["convert", str(tmp_path / "model"), "-o", str(target), "--sigma", "0.5",
+                         "--control", str(path), *UTM, *SIGMA])  # fmt: skip
         assert code in {0, 2}, (said.getvalue(), path.read_bytes())
         assert target.exists() == (code == 0)
         if code == 2:
