@@ -4,7 +4,7 @@ A pose takes the world to the camera (x right, y down, z ahead), pixels count fr
 ``points3D`` repeats the tracks with coordinates that a run finds itself; ``rigs`` and ``frames`` of newer versions
 repeat the poses in parts, those of ``images`` stay whole.
 
-Source: colmap.github.io/format.html, cameras.html.
+COLMAP documents the files in colmap.github.io/format.html, the cameras in cameras.html.
 """
 
 from __future__ import annotations

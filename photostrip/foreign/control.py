@@ -6,7 +6,7 @@ line, then rows ``X Y Z px py image [name]`` (X to the east, whatever the CRS sa
 name that begins with ``CHK-`` is a check point, rows without names are one point where their coordinates are the same.
 Pixels count from the corner of the first one.
 
-Source: docs.opendronemap.org/gcp, github.com/shippp/history.
+The layouts are documented in docs.opendronemap.org/gcp and github.com/shippp/history.
 """
 
 from __future__ import annotations
