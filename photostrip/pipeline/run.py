@@ -157,7 +157,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
         # 6 residuals, check points
         rows, differences = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
         return Result(
-            inputs=inputs,
+            inputs=replace(inputs, orientations=None) if laid else inputs,  # they are ours, and nothing to be judged
             settings=settings,
             frames=ground.control,
             output=ground.output,

@@ -17,9 +17,10 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.notes import Note, counted
 from photostrip.pipeline.block.datum import OF_PHOTO, Known, Oriented, known_of, on_given, with_cameras
 from photostrip.pipeline.frames import GroundFrames
-from photostrip.pipeline.given_points import measured_control
+from photostrip.pipeline.given_points import cartesian_of, measured_control
 from photostrip.pipeline.inputs import Inputs
 from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.strip.gross_errors.control.control_screening import majority
 from photostrip.strip.resection.collinearity import KnownPhotos
 from photostrip.strip.resection.ray_intersection import intersect_points
 
@@ -58,6 +59,10 @@ def _similarity(inputs: Inputs, observations: PhotoPoints, known: Known, block: 
     xyz = _intersected(inputs, observations, known.control, block)
     there = np.isfinite(xyz[:, 0])
     control, xyz = known.control.take(there), xyz[there]
+    full = np.flatnonzero(control.use.all(axis=1))
+    fit = majority(xyz[full], cartesian_of(control.take(full), known.frames))  # wrong ones are found later
+    kept = np.delete(np.arange(len(control)), full[~fit])
+    control, xyz = control.take(kept), xyz[kept]
     named = [counted(len(each), noun) for each, noun in ((control, "control point"), (cameras, "camera")) if len(each)]
     try:
         return on_given(xyz, control, known, np.concatenate([xyz, block.centers])), named[0]
