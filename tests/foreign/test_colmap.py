@@ -61,7 +61,7 @@ def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, 
     for name in ("x", "y", "z", "sigma_x", "sigma_z"):
         given = [each for each in expected if each[0] in "GK"]
         assert [at[each][name] for each in given] == pytest.approx([expected[each][name] for each in given], abs=3e-4)
-    assert any("laid on 9 control points: 1 unit of it is 27.0" in each["message"] for each in found.document["notes"])
+    assert any("laid on the control: 1 unit of it is 27.0" in each["message"] for each in found.document["notes"])
 
 
 def test_nothing_is_said_against_orientations_of_an_arbitrary_frame(tmp_path: Path) -> None:

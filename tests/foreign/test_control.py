@@ -157,6 +157,32 @@ def test_heights_of_opendronemap_that_are_not_known(tmp_path: Path, unknown: str
     assert block.run()["verdict"]["look_at"] == []
 
 
+def test_wrong_control_is_named_although_the_start_lies_on_it(tmp_path: Path) -> None:
+    block = Block(tmp_path)
+    five = ["G01", "G02", "G03", "G04", "G05"]
+    block.marks = [row for row in block.marks if row["point"] in five or row["point"].startswith("K")]
+    assert block.convert(block.odm(), *SIGMA) == 0
+    sound = places(block.run())
+    one, other = block.control["G01"], block.control["G04"]
+    block.control |= {"G01": other, "G04": one}
+    assert block.convert(block.odm(), *SIGMA, "--force") == 0
+    exchanged = block.run()
+    assert "P408 given points G01 and G04 fit when their coordinates are exchanged" in told(exchanged)
+    block.control |= {"G01": {**one, "y": str(float(one["y"]) + 1000.0)}, "G04": other}
+    assert block.convert(block.odm(), *SIGMA, "--force") == 0
+    far = block.run()
+    assert "G01" in told(far)
+    assert "+1000" in told(far)
+    for result in (exchanged, far):
+        at = places(result)
+        assert all(at[name] == pytest.approx(sound[name], abs=0.2) for name in at if name.startswith("CHK-"))
+
+
+def told(document: dict[str, Any]) -> str:
+    """Give what is to be looked at, in one text."""
+    return " ".join(each if isinstance(each, str) else each["message"] for each in document["verdict"]["look_at"])
+
+
 def test_marks_of_photos_of_another_width(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     block = Block(tmp_path)
     for row in block.marks:

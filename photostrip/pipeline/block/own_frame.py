@@ -14,7 +14,7 @@ from photostrip.arrays import Floats
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_angles, separable_angles
 from photostrip.geometry.similarity import Similarity
-from photostrip.notes import Note, counted
+from photostrip.notes import Note
 from photostrip.pipeline.block.datum import OF_PHOTO, Known, Oriented, known_of, on_given, with_cameras
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.given_points import cartesian_of, measured_control
@@ -63,17 +63,17 @@ def _similarity(inputs: Inputs, observations: PhotoPoints, known: Known, block: 
     fit = majority(xyz[full], cartesian_of(control.take(full), known.frames))  # wrong ones are found later
     kept = np.delete(np.arange(len(control)), full[~fit])
     control, xyz = control.take(kept), xyz[kept]
-    named = [counted(len(each), noun) for each, noun in ((control, "control point"), (cameras, "camera")) if len(each)]
     try:
-        return on_given(xyz, control, known, np.concatenate([xyz, block.centers])), named[0]
-    except (GeometryError, IndexError) as error:
+        return on_given(xyz, control, known, np.concatenate([xyz, block.centers])), "the control"
+    except GeometryError as error:
         if not len(cameras):
             message = (
-                "control that is measured on two photos or more does not say where the given orientations lie, whose "
-                f"frame is `local`: {counted(len(control), 'point')} of it {'is' if len(control) == 1 else 'are'} there"
+                f"nothing says where the given orientations lie, whose frame is `local`: of the control {len(there)} "
+                f"points are measured, {int(there.sum())} of them on two photos or more, {len(control)} of these agree; "
+                "three that are not on a line are needed, or camera positions"
             )
             raise GeometryError(message, photos=block.names, code="strip-not-tied") from error
-    return with_cameras(block, (xyz, control), cameras, known), " and ".join(named)
+    return with_cameras(block, (xyz, control), cameras, known), "the camera positions"
 
 
 def _intersected(inputs: Inputs, observations: PhotoPoints, control: ControlPoints, block: Oriented) -> Floats:
