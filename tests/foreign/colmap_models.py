@@ -103,5 +103,5 @@ def simulated(folder: Path, **changes: object) -> Model:
         points = [numbers.setdefault(row[1], 5 * len(numbers) + 2) for row in own]
         quaternion, shift = to_camera.as_quat()[[3, 0, 1, 2]], -to_camera.apply(center)
         xy = np.array([[float(each) for each in row[2:4]] for row in own])
-        images.append((97 - 3 * number, quaternion, shift, 4, name_of(photo["id"]), xy, points))
+        images.append((997 - 3 * number, quaternion, shift, 4, name_of(photo["id"]), xy, points))
     return Model({4: ("OPENCV", 5500, 3667, OPENCV)}, images)

@@ -69,7 +69,7 @@ def _similarity(inputs: Inputs, observations: PhotoPoints, known: Known, block: 
         if not len(cameras):
             message = (
                 f"nothing says where the given orientations lie, whose frame is `local`: of the control {len(there)} "
-                f"points are measured, {int(there.sum())} of them on two photos or more, {len(control)} of these agree; "
+                f"are measured, {int(there.sum())} of them on two photos or more, {len(control)} of these agree; "
                 "three that are not on a line are needed, or camera positions"
             )
             raise GeometryError(message, photos=block.names, code="strip-not-tied") from error
