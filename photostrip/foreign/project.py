@@ -126,9 +126,10 @@ def _quoted(name: str) -> str:
 
 def understood(block: ForeignBlock, wanted: Wanted) -> Mapping[str, str]:
     """Say what was read in the program's own words, by what it is about."""
+    of_control = (0, 0) if block.control is None else (len(block.control.ids), block.control.marks)
     counts = (
         f"{counted(len(block.photos), 'photo')} of {counted(len(block.cameras), 'camera')}, "
-        f"{counted(len(block.points), 'point')}, {counted(len(block.xy), 'ray')}"
+        f"{counted(len(block.points) - of_control[0], 'point')}, {counted(len(block.xy) - of_control[1], 'ray')}"
     )
     said = {"read": f"{block.source}: {counts}"}
     said |= {f"camera {name}": _of_camera(name, given) for name, given in list(block.cameras.items())[:5]}
@@ -159,7 +160,7 @@ def _of_control(given: GivenControl) -> str:
     checks = f", {sum(given.check)} of them check points" if any(given.check) else ""
     return (
         f"{counted(len(given.ids), 'point')}{checks}, {counted(given.marks, 'mark')}; {given.crs}, heights taken as "
-        f"ellipsoidal; {given.ids[0]}: east {x:.8g}, north {y:.9g}, up {height}"
+        f"ellipsoidal; {given.ids[0]}: east {x:.10g}, north {y:.10g}, up {height}"
     )
 
 
