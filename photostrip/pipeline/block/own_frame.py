@@ -16,6 +16,7 @@ from photostrip.geometry.rotation import from_angles, separable_angles
 from photostrip.geometry.similarity import Similarity
 from photostrip.notes import Note
 from photostrip.pipeline.block.datum import OF_PHOTO, Known, Oriented, known_of, on_given, with_cameras
+from photostrip.pipeline.block.start import points_as_given
 from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.given_points import cartesian_of, measured_control
 from photostrip.pipeline.inputs import Inputs
@@ -37,11 +38,15 @@ def laid_on_ground(
         return inputs, ground, ()
     known = known_of(inputs, measured_control(inputs.control, observations), ground)
     block = Oriented(given.photos, given.enu, from_angles(given.angles, given.system))
+    local, as_they_are = known.output.kind == "local", (inputs, replace(ground, orientations=ground.output), ())
+    given_of = dict(zip(block.names, zip(block.centers, block.rotations, strict=True), strict=True))
+    if local and points_as_given(inputs, observations, given_of) is None:
+        return as_they_are  # angles in another unit agree with nothing, and are judged in the frame that is named
     try:
         similarity, what = _similarity(inputs, observations, known, block)
     except GeometryError:
-        if known.output.kind == "local":  # it may be theirs
-            return inputs, replace(ground, orientations=ground.output), ()
+        if local:
+            return as_they_are
         raise
     centers = similarity(block.centers)
     turned = known.output.axes_at(centers) @ similarity.rotation @ block.rotations

@@ -170,7 +170,7 @@ def _together(
         centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
         turned = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
         oriented |= {photo: (c, r) for photo, c, r in zip(strip.strip.photos, centers, turned, strict=True)}
-    given = None if strips else _as_given(inputs, observations, known)
+    given = None if strips else points_as_given(inputs, observations, known.orientations)
     points = _with_control(points if given is None else given, observations, known)
     rough: set[str] = set()
     singles = {strip.photos[0]: strip.camera.principal_distance for strip in inputs.strips if len(strip.photos) == 1}
@@ -211,19 +211,21 @@ def _together(
     )
 
 
-def _as_given(inputs: Inputs, observations: PhotoPoints, known: Known) -> Floats | None:
+def points_as_given(
+    inputs: Inputs, observations: PhotoPoints, given: Mapping[str, tuple[Floats, Floats]]
+) -> Floats | None:
     """Points from the given orientations of all photos; None where some have none, or the points miss most rays.
 
     Orientations that agree with each other, as those of an earlier adjustment, are a better start than what single
     photos find on the control, of which some may be wrong.
     """
-    if {photo for strip in inputs.strips for photo in strip.photos} - known.orientations.keys():
+    if {photo for strip in inputs.strips for photo in strip.photos} - given.keys():
         return None
-    points = _rest(inputs, observations, known.orientations, np.full((len(observations.point_ids), 3), np.nan))
+    points = _rest(inputs, observations, given, np.full((len(observations.point_ids), 3), np.nan))
     rows = np.flatnonzero(np.isfinite(points[observations.point, 0]))
     if not len(rows):
         return None
-    photos, photo = _known_photos(inputs, known.orientations), observations.places(tuple(known.orientations))[rows]
+    photos, photo = _known_photos(inputs, given), observations.places(tuple(given))[rows]
     miss = np.abs(observations.xy[rows] - project(points[observations.point[rows]], photos, photo))
     return points if np.median(miss / observations.sigma[rows]) < LEAST_FAR else None
 
