@@ -32,4 +32,6 @@ class Camera:
     # calibrated coordinates of the fiducial marks in mm
     fiducials: dict[str, tuple[float, float]] = field(default_factory=dict)
     pixel_size: float | None = None  # size of a pixel in mm, for digital cameras
+    # b1, b2: how pixels of x depart from squares: u = (1 + b1) x + b2 y, of measured u and x, y in the image
+    pixel_affinity: tuple[float, float] = (0.0, 0.0)
     distortion: Distortion | None = None

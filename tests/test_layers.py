@@ -27,6 +27,7 @@ LAYERS = (
     {"comparison"},
     {"formats"},
     {"project"},
+    {"foreign"},
     {"report"},
     {"library"},
     {"batch"},

@@ -23,6 +23,11 @@ class CommandEntry(NamedTuple):
 
 _TEXTS = (
     ("init", "Write a commented project file and the headers of its tables.", "photostrip init strip-a"),
+    (
+        "convert",
+        "Write a project from other programs' files: COLMAP.",
+        "photostrip convert sparse/0 -o block --sigma 0.7",
+    ),
     ("check", "Check projects without adjusting them, and name all faults.", "photostrip check project.yaml"),
     ("run", "Adjust the strips of a project and report the accuracy.", "photostrip run project.yaml -o result"),
     ("batch", "Adjust many projects, on all cores or many machines.", "photostrip batch strips/* -o results -j 4"),

@@ -90,6 +90,17 @@ def angles(matrix: ArrayLike, system: str) -> Floats:
     return np.stack([first_angle, np.arcsin(np.clip(sine, -1, 1)), last], axis=-1)
 
 
+def separable_angles(matrix: ArrayLike) -> tuple[str, Floats]:
+    """Give the first system of ``SYSTEMS`` in which the angles of all rotations can be told apart, and these."""
+    *others, last = SYSTEMS
+    for system in others:
+        try:
+            return system, angles(matrix, system)
+        except GeometryError:
+            continue
+    return last, angles(matrix, last)
+
+
 def from_angles(values: ArrayLike, system: str) -> Floats:
     """Rotations from angles (..., 3) in a system of ``SYSTEMS``; the inverse of ``angles``."""
     (i, _, _), sign = _axes_of(system)

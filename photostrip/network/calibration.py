@@ -31,25 +31,33 @@ def corrected(cameras: BundleCameras, values: Floats, xy: Floats, camera: Number
 
     so that c, x0, y0 (mm) are corrections of the principal distance and the principal point, k and p are those of
     Brown's model from image to ideal coordinates, b1 is the affinity and b2 the shear. Distortion has its centre in the
-    principal point: that which is given moves with it, (x0', y0') = J (x0, y0) with J of ``by_image``.
+    principal point: that which is given moves with it, (x0', y0') = J (x0, y0) with J of ``by_image`` half way, right
+    but for third powers of x0 and y0.
     """
     found = xy.copy()
     for number in np.unique(camera):
         some = camera == number
         own, center = values[number], values[number, POINT]
-        shifted = by_image(cameras, number, xy[some]) @ center
+        shifted = by_image(cameras, number, xy[some], center / 2.0) @ center
         bends = corrections((xy[some] - center).T)
         found[some] += np.einsum("kan,k->na", bends[POINT[-1] + 1 :], own[POINT[-1] + 1 :]) - shifted
     return found
 
 
-def by_image(cameras: BundleCameras, camera: int, xy: Floats) -> Floats:
-    """Differentiate ideal image coordinates (n, 2) by measured ones: (n, 2, 2), the given distortion's part."""
+def by_image(cameras: BundleCameras, camera: int, xy: Floats, center: Floats) -> Floats:
+    """Differentiate ideal image coordinates (n, 2) by measured ones: (n, 2, 2), the given distortion's part.
+
+    It is that at the points once the principal point of their distortion has moved to ``center``.
+    """
     given = cameras.distortion[camera] if cameras.distortion else None
     if given is None:
         return np.broadcast_to(np.eye(2), (len(xy), 2, 2))
-    found = lens_distortion.jacobian(xy, given)
-    return found if given.direction == "image_to_ideal" else np.asarray(np.linalg.inv(found), float)
+    slope = lens_distortion.jacobian(xy, given)
+    if given.direction == "image_to_ideal":
+        image = xy - np.linalg.solve(slope, lens_distortion.shift(xy, given)[..., None])[..., 0]
+        return lens_distortion.jacobian(image - center, given)
+    moved = xy - np.linalg.solve(slope, np.broadcast_to(center, xy.shape)[..., None])[..., 0]
+    return np.asarray(np.linalg.inv(lens_distortion.jacobian(moved, given)), float)
 
 
 def partials(cameras: BundleCameras, values: Floats, camera: int, xy: Floats, ratio: Floats) -> Floats:
@@ -62,7 +70,7 @@ def partials(cameras: BundleCameras, values: Floats, camera: int, xy: Floats, ra
     found[PRINCIPAL_DISTANCE] = ratio.T
     estimated = Distortion("brown", "image_to_ideal", k=tuple(own[K]), p=tuple(own[P]), b=tuple(own[AFFINE]))
     slope = lens_distortion.jacobian(xy - center, estimated) - np.eye(2)
-    found[POINT] = (by_image(cameras, camera, xy) + slope).transpose(2, 1, 0)
+    found[POINT] = (by_image(cameras, camera, xy, center) + slope).transpose(2, 1, 0)
     return found
 
 

@@ -61,6 +61,8 @@ def tie_ground_frames(
     radius = settings.absolute.earth_radius if settings.absolute.earth_curvature == "model" else None
     refuse_curvature_twice(inputs, settings)
     cameras = [None if given is None else given.frame for given in (inputs.positions, inputs.orientations)]
+    if inputs.orientations is not None and inputs.orientations.has_own_frame and (inputs.frames or cameras[0]):
+        cameras[1] = None
     if not settings.together:
         cameras = [None, None]
     if settings.together and inputs.models is None and _nothing_given(inputs):

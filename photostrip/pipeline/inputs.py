@@ -96,6 +96,11 @@ class GivenOrientations:
     # whether they are observations; otherwise a start without influence, and the standard deviations are NaN
     observed: bool
 
+    @property
+    def has_own_frame(self) -> bool:
+        """Whether place, direction and scale of their frame may be any: they are laid on what is known."""
+        return not self.observed and self.frame.crs == "local"
+
 
 @dataclass(frozen=True, eq=False)
 class Inputs:

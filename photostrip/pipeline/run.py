@@ -12,6 +12,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.block.adjust import adjust_block
 from photostrip.pipeline.block.datum import FormedStrips
+from photostrip.pipeline.block.own_frame import laid_on_ground
 from photostrip.pipeline.common_points import join_photos, join_strips
 from photostrip.pipeline.frames import GroundFrames, TiedFrames, curvature_notes, datum_notes, tie_ground_frames
 from photostrip.pipeline.given_points import compare_with_given, measured_control
@@ -74,6 +75,8 @@ def _of_failure(
     error: InputError | GeometryError,
 ) -> tuple[Finding, ...]:
     """Find out why a run failed: strips that can be adjusted each by itself say more than strips only formed."""
+    if inputs.orientations is not None and inputs.orientations.has_own_frame:
+        inputs = replace(inputs, orientations=None)  # nothing can be said against them
     broken = error.photos if isinstance(error, GeometryError) else ()
     if settings.adjustment == BUNDLE and not broken and ground is not None and photo is not None:
         try:
@@ -142,6 +145,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
     """Every stage takes what the stages before it found."""
     # 1 lens distortion, refraction
     refined = correct(photo, inputs, settings, ground)
+    inputs, ground, laid = laid_on_ground(inputs, refined.observations, ground)
     # 2-3 relative orientation; base direction, orientation chain, space intersection, scale transfer
     formed = form_strips(inputs, refined.observations, settings)
 
@@ -153,7 +157,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
         # 6 residuals, check points
         rows, differences = compare_with_given(inputs.control, ground.control, adjusted.points, adjusted.observations)
         return Result(
-            inputs=inputs,
+            inputs=replace(inputs, orientations=None) if laid else inputs,  # they are ours, and nothing to be judged
             settings=settings,
             frames=ground.control,
             output=ground.output,
@@ -168,6 +172,7 @@ def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: Photo
             not_determined=missing,
             notes=(
                 *(photo.interior.notes if photo.interior is not None else ()),
+                *laid,
                 *adjusted.notes,
                 *curvature_notes(inputs, settings, adjusted.strips),
                 *datum_notes(inputs, ground),

@@ -22,7 +22,7 @@ from photostrip.geodesy.ground_frame import WGS84
 from photostrip.geometry.rotation import from_angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints, concatenated
-from photostrip.project.schema.cameras import AUTO, Camera, Distortion, FirstPhoto
+from photostrip.project.schema.cameras import AUTO, Camera, Distortion, FirstPhoto, PixelCamera
 from photostrip.project.schema.ground import CameraPositions as PositionsBlock
 from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
 from photostrip.project.schema.sections import Section
@@ -58,19 +58,21 @@ def cameras(project: ProjectFile) -> dict[str, camera.Camera]:
     return {name: _camera(name, each) for name, each in project.cameras.items()}
 
 
-def certificate_of(given: Camera) -> Certificate | None:
+def certificate_of(given: Camera | PixelCamera) -> Certificate | None:
     """Solve the distances between the fiducial marks of a camera; None when no distances are given.
 
     Raises InputError when the distances give no figure; keys begin at the camera.
     """
-    if not given.fiducial_distances:
+    if isinstance(given, PixelCamera) or not given.fiducial_distances:
         return None
     nominal = dict(given.fiducials) if given.fiducials else None
     distances = [(str(first), str(second), length) for first, second, length in given.fiducial_distances]
     return certificate.solve(distances, nominal=nominal, places=given.fiducial_places)
 
 
-def _camera(name: str, given: Camera) -> camera.Camera:
+def _camera(name: str, given: Camera | PixelCamera) -> camera.Camera:
+    if isinstance(given, PixelCamera):
+        return given.in_millimetres(name)
     solved = certificate_of(given)
     return camera.Camera(
         name=name,
@@ -151,6 +153,10 @@ def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, c
     if system.origin != "center":
         half = system.origin == "first-pixel"
         xy += _per_photo([_corner(each, half_pixel=half) for each in owners], read, rows)
+    affinity = [(0.0, 0.0) if each is None else each.pixel_affinity for each in owners]
+    if np.any(affinity):
+        stretch, shear = _per_photo(affinity, read, rows).T
+        xy[:, 0] = (xy[:, 0] - shear * xy[:, 1]) / (1.0 + stretch)
     photo_ids, photo = _renumbered(read.photo_ids, read.photo[rows])
     point_ids, point = _renumbered(read.target_ids, read.target[rows])
     return PhotoPoints(

@@ -71,6 +71,9 @@ def _key(entry: Key, annotation: Any, blocks: dict[str, Any]) -> dict[str, Any]:
 
 def _value(annotation: Any, blocks: dict[str, Any]) -> dict[str, Any]:  # noqa: ANN401 (a type)
     """Describe values of a type."""
+    kinds = [each for each in get_args(annotation) if isinstance(each, type) and issubclass(each, Section)]
+    if len(kinds) > 1:
+        return {"anyOf": [_value(each, blocks) for each in kinds]}
     inner = bare(annotation)
     if get_origin(inner) is Annotated:
         own = [each.schema for each in inner.__metadata__ if isinstance(each, Read)]

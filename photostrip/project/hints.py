@@ -94,7 +94,7 @@ def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
     yield from _unused_cameras(project, root)
     yield from _without_effect(project, root)
     for name, camera in project.cameras.items():
-        if (solved := certificate_of(camera)) is not None:
+        if isinstance(camera, Camera) and (solved := certificate_of(camera)) is not None:
             yield _solved_marks(name, camera, solved, root)
     for measured in (tables.observations, tables.fiducials):
         if measured is not None:

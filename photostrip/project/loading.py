@@ -216,7 +216,8 @@ def _read(project: ProjectFile) -> tuple[dict[str, GivenList | None], Output]:
     """Give the lists of given coordinates by their keys, and the frame of the results."""
     lists: dict[str, GivenList | None] = {f"control[{i}]": each for i, each in enumerate(project.control)}
     others = {"camera_positions": project.camera_positions, "orientations": project.orientations}
-    return lists | {name: each for name, each in others.items() if each is not None}, project.output
+    lists |= {name: each for name, each in others.items() if each is not None}
+    return _without_own_frame(lists), project.output
 
 
 def _read_alone(root: Node) -> tuple[dict[str, GivenList | None], Output | None]:
@@ -227,7 +228,14 @@ def _read_alone(root: Node) -> tuple[dict[str, GivenList | None], Output | None]
     blocks += [("camera_positions", CameraPositionsBlock, root.find("camera_positions"))]
     blocks += [("orientations", Orientations, root.find("orientations"))]
     given = {name: valid_section(kind, node) for name, kind, node in blocks if node is not None}
-    return given, valid_section(Output, root.find("output"))
+    return _without_own_frame(given), valid_section(Output, root.find("output"))
+
+
+def _without_own_frame(given: dict[str, GivenList | None]) -> dict[str, GivenList | None]:
+    """Leave out orientations in a frame of their own beside anything else: nothing ties that to the others."""
+    own = given.get("orientations")
+    alone = len(given) == 1 or not isinstance(own, Orientations) or own.role != "approximate" or own.crs != "local"
+    return given if alone else {name: each for name, each in given.items() if each is not own}
 
 
 def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:

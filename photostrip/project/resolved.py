@@ -125,7 +125,7 @@ def text_of(project: ProjectFile) -> str:
     plain = _plain(project)
     for name in OF_PHOTOS if project.models is not None else OF_MODELS:
         plain["processing"].pop(name, None)
-    return HEADER + "".join(f"{line}\n" for line in _block(plain, ""))
+    return HEADER + "".join(f"{line}\n" for line in lines_of(plain))
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
@@ -143,16 +143,17 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
     return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
 
 
-def _block(mapping: dict[str, Any], indent: str) -> Iterator[str]:
+def lines_of(mapping: dict[str, Any], indent: str = "") -> Iterator[str]:
+    """Write mappings, lists and values as the lines of a project file; what is to be quoted is a ``Text``."""
     for name, value in mapping.items():
         begin = f"{indent}{_scalar(name)}:"
         if isinstance(value, dict) and value:
             yield begin
-            yield from _block(value, indent + "  ")
+            yield from lines_of(value, indent + "  ")
         elif isinstance(value, list) and value and isinstance(value[0], dict):
             yield begin
             for each in value:
-                first, *rest = _block(each, indent + "    ")
+                first, *rest = lines_of(each, indent + "    ")
                 yield f"{indent}  - {first.strip()}"
                 yield from rest
         elif isinstance(value, list):

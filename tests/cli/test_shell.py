@@ -52,7 +52,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ("co", {"compare", "completion"}),
+        ("co", {"compare", "completion", "convert"}),
         ("run --verb", {"--verbose"}),
         ("compare a b --format j", {"json", "junit"}),
         ("terrestrial dis", {"displacement"}),
@@ -68,7 +68,7 @@ def test_bash_completes(forked: Path, words: str, expected: set[str]) -> None:
 @pytest.mark.skipif(shutil.which("fish") is None, reason="needs fish")
 def test_fish_completes(forked: Path) -> None:
     found = asked(forked, "fish", "photostrip completion fish | source; complete -C 'photostrip co'")
-    assert {"compare", "completion"} <= set(found)
+    assert {"compare", "completion", "convert"} <= set(found)
 
 
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="needs zsh")

@@ -46,6 +46,7 @@ def truth_text(simulation: Simulation, output: GroundFrame) -> str:
         inner = ",\n".join(f"  {row}" for row in rows)
         lines.append(f" {on_one_line(name)}: [\n{inner}\n ]" if rows else f" {on_one_line(name)}: []")
     spec = {key: value for key, value in asdict(simulation.spec).items() if key != "models" or value is not None}
+    del spec["camera"]["pixel_affinity"]  # which no specification has
     lines.append(f' "spec": {on_one_line(spec)}')
     return "{\n" + ",\n".join(lines) + "\n}\n"
 

@@ -84,21 +84,22 @@ def _of_adjustment(bundle: Bundle) -> Iterator[Note]:
 def _given_notes(bundle: Bundle) -> Iterator[Note]:
     """Name control and camera positions that contradict the rest, whether they were taken out or had to stay."""
     problem = bundle.block.problem
+    early = "found in its strip" if bundle.start.strips else "found before the adjustment"
     for each in bundle.screened.rejections:
         if not each.readmitted and each.kind != reliability.IMAGE:
-            text, photos, points = _contradiction(problem, each)
+            text, photos, points = _contradiction(problem, each, early)
             text += "; not used"
             yield Note("control-rejected" if points else "position-rejected", text, photos=photos, points=points)
     for each in bundle.screened.held:
-        text, photos, points = _contradiction(problem, each)
+        text, photos, points = _contradiction(problem, each, early)
         text += "; it was used: the adjustment fails without it"
         yield Note("control-doubtful" if points else "position-doubtful", text, photos=photos, points=points)
 
 
-def _contradiction(problem: BundleProblem, each: Rejection) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
-    """Say how far a given coordinate is off; of which photo or point it is."""
+def _contradiction(problem: BundleProblem, each: Rejection, early: str) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    """Say how far a given coordinate is off; of which photo or point it is. ``early``: where no test found it."""
     axis = ("east (X)", "north (Y)", "up (Z)")[each.axes[0]]
-    reached = "found in its strip"
+    reached = early
     if np.isfinite(each.value):
         reached = f"test value {each.value:.2f}, limit {each.limit:.2f}"
     if each.kind == reliability.CONTROL:

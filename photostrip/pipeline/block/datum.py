@@ -133,12 +133,12 @@ def datum(
     refusal: GeometryError | None = None
     if len(control):
         try:
-            return _on_given(xyz, control, known, group.points), False
+            return on_given(xyz, control, known, group.points), False
         except GeometryError as error:
             refusal = error
     if len(cameras):
         try:
-            return _with_cameras(stages, group, (xyz, control), cameras, known), False
+            return with_cameras(_oriented(stages, group), (xyz, control), cameras, known), False
         except GeometryError as error:
             refusal = error
     if refusal is not None or not alone or len(known.cameras) or known.output.kind != "local":
@@ -152,7 +152,7 @@ def datum(
     return _of_its_own(stages, group), True
 
 
-def _on_given(xyz: Floats, given: ControlPoints, known: Known, of_block: Floats | Level) -> Similarity:
+def on_given(xyz: Floats, given: ControlPoints, known: Known, of_block: Floats | Level) -> Similarity:
     """Similarity of a block to what is given of it, plan and height points included.
 
     of_block: all its points, to judge whether they are determined; or what is level in it, and they are not judged.
@@ -199,8 +199,16 @@ def _levelled(strip: Floats, targets: absolute_orientation.Targets, level: Level
     return found
 
 
-def _oriented(stages: FormedStrips, group: JoinedStrips) -> tuple[Floats, Floats]:
-    """Centres and rotations of all photos, in the frame of the block; models have no rotations but stand upright."""
+class Oriented(NamedTuple):
+    """Photos of a block in a frame of its own."""
+
+    names: Sequence[str]
+    centers: Floats
+    rotations: Floats
+
+
+def _oriented(stages: FormedStrips, group: JoinedStrips) -> Oriented:
+    """All photos in the frame of the block; models have no rotations but stand upright."""
     centers, rotations = [], []
     for number in group.members:
         to_block, stage = group.joined[number], stages[number]
@@ -208,12 +216,12 @@ def _oriented(stages: FormedStrips, group: JoinedStrips) -> tuple[Floats, Floats
         upright = np.tile(np.eye(3), (len(centers[-1]), 1, 1))
         of_photos = stage.formed.rotations if isinstance(stage, FormedPhotos) else upright
         rotations.append(to_block.rotation @ of_photos)
-    return np.concatenate(centers), np.concatenate(rotations)
+    names = [name for number in group.members for name in stages[number].strip.photos]
+    return Oriented(names, np.concatenate(centers), np.concatenate(rotations))
 
 
-def _with_cameras(
-    stages: FormedStrips,
-    group: JoinedStrips,
+def with_cameras(
+    block: Oriented,
     on_ground: tuple[Floats, ControlPoints],
     cameras: ControlPoints,
     known: Known,
@@ -223,8 +231,7 @@ def _with_cameras(
     Known rotations say what is level; without any it starts with its cameras looking down, and the adjustment decides
     what is determined.
     """
-    names = [name for number in group.members for name in stages[number].strip.photos]
-    centers, rotations = _oriented(stages, group)
+    names, centers, rotations = block
     rows = locate(cameras.ids, [OF_PHOTO.format(name) for name in names])
     turned = [row for row in rows.tolist() if names[row] in known.orientations]
     if turned:
@@ -238,17 +245,17 @@ def _with_cameras(
     level = Level(up, TURNED if turned else np.inf)  # cameras may look aside
     xyz, control = on_ground
     given_of_all = concatenated([control, cameras])
-    found = _on_given(np.concatenate([xyz, centers[rows]]), given_of_all, known, level)
+    found = on_given(np.concatenate([xyz, centers[rows]]), given_of_all, known, level)
     if known.lever.any():  # the scale is known now: from perspective centres to antennas
         antenna = np.array([names[row] not in known.orientations for row in rows])
         arms = np.where(antenna[:, None], rotations[rows] @ (known.lever / found.scale), 0.0)
-        found = _on_given(np.concatenate([xyz, centers[rows] + arms]), given_of_all, known, level)
+        found = on_given(np.concatenate([xyz, centers[rows] + arms]), given_of_all, known, level)
     return found
 
 
 def _of_its_own(stages: FormedStrips, group: JoinedStrips) -> Similarity:
     """Frame and scale of a block that nothing ties to the ground: X along the first strip, Z against the view."""
-    centers, rotations = _oriented(stages, group)
+    _, centers, rotations = _oriented(stages, group)
     first, last = stages[group.members[0]].formed.ends
     base = np.linalg.norm(last - first) / max(len(stages[group.members[0]].strip.photos) - 1, 1)
     up = rotations[:, :, 2].mean(axis=0)

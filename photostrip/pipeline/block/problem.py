@@ -29,6 +29,7 @@ from photostrip.pipeline.frames import GroundFrames
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
 from photostrip.pipeline.results import BlockProblem, BlockStart
 from photostrip.points import ControlPoints, PhotoPoints, locate
+from photostrip.strip.gross_errors.control.control_screening import majority
 from photostrip.strip.resection.collinearity import KnownPhotos, project
 
 FAR_FROM_RAY = 5.0  # times the median: a ray of no pair that misses its point by more waits outside at first
@@ -308,8 +309,16 @@ def _begin(
 
 
 def control_begun(problem: BundleProblem, control: ControlPoints, control_rows: Numbers, start: BlockStart) -> Flags:
-    """Control coordinates (c, 3) that take part at first: those that the strips by themselves did not reject."""
+    """Control coordinates (c, 3) that take part at first: those that the strips by themselves did not reject.
+
+    Without strips those that most of the control agrees with, as the given orientations show it.
+    """
     given = Selection.everything(problem).control
+    if not start.strips:
+        at = problem.start.points[problem.control.point]
+        full = np.flatnonzero(control.use[control_rows].all(axis=1) & np.isfinite(at).all(axis=1))
+        given[full] &= majority(at[full], problem.control.xyz[full])[:, None]
+        return given
     wrong = {strip.control.ids[each.row]: list(each.axes) for strip in start.strips for each in strip.wrong_control}
     for row, number in enumerate(control_rows.tolist()):
         given[row, wrong.get(control.ids[number], [])] = False

@@ -39,7 +39,7 @@ from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility.photos.tied_strips import odd_ties
 from photostrip.points import ControlPoints, PhotoPoints, concatenated, locate
 from photostrip.strip.resection.closed_form import LEAST_POINTS, approximate
-from photostrip.strip.resection.collinearity import KnownPhotos
+from photostrip.strip.resection.collinearity import KnownPhotos, project
 from photostrip.strip.resection.ray_intersection import intersect_points
 from photostrip.strip.resection.resection import resect
 
@@ -170,9 +170,12 @@ def _together(
         centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
         turned = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
         oriented |= {photo: (c, r) for photo, c, r in zip(strip.strip.photos, centers, turned, strict=True)}
-    points = _with_control(points, observations, known)
+    given = None if strips else points_as_given(inputs, observations, known.orientations)
+    points = _with_control(points if given is None else given, observations, known)
     rough: set[str] = set()
     singles = {strip.photos[0]: strip.camera.principal_distance for strip in inputs.strips if len(strip.photos) == 1}
+    if given is not None:
+        oriented, singles = known.orientations, {}
     while singles:
         seen = np.bincount(
             observations.photo[np.isfinite(points[observations.point, 0])], minlength=len(observations.photo_ids)
@@ -206,6 +209,25 @@ def _together(
         scales=None,
         free=free,
     )
+
+
+def points_as_given(
+    inputs: Inputs, observations: PhotoPoints, given: Mapping[str, tuple[Floats, Floats]]
+) -> Floats | None:
+    """Points from the given orientations of all photos; None where some have none, or the points miss most rays.
+
+    Orientations that agree with each other, as those of an earlier adjustment, are a better start than what single
+    photos find on the control, of which some may be wrong.
+    """
+    if {photo for strip in inputs.strips for photo in strip.photos} - given.keys():
+        return None
+    points = _rest(inputs, observations, given, np.full((len(observations.point_ids), 3), np.nan))
+    rows = np.flatnonzero(np.isfinite(points[observations.point, 0]))
+    if not len(rows):
+        return None
+    photos, photo = _known_photos(inputs, given), observations.places(tuple(given))[rows]
+    miss = np.abs(observations.xy[rows] - project(points[observations.point[rows]], photos, photo))
+    return points if np.median(miss / observations.sigma[rows]) < LEAST_FAR else None
 
 
 def _strangers(strips: Sequence[StripResult], point_ids: Sequence[str]) -> dict[str, set[int]]:
@@ -288,7 +310,6 @@ def _rest(
     inputs: Inputs, observations: PhotoPoints, oriented: Mapping[str, tuple[Floats, Floats]], points: Floats
 ) -> Floats:
     """Intersect the points that no strip has from the photos oriented so far, as those of two strips."""
-    focal = {photo: strip.camera.principal_distance for strip in inputs.strips for photo in strip.photos}
     place = observations.places(tuple(oriented))
     missing = np.isnan(points[observations.point, 0]) & (place >= 0)
     rays = np.bincount(observations.point[missing], minlength=len(points))
@@ -296,14 +317,19 @@ def _rest(
     if not len(rows):
         return points
     numbers, point = np.unique(observations.point[rows], return_inverse=True)
-    photos = KnownPhotos(
-        centers=np.array([center for center, _ in oriented.values()]),
-        rotations=np.array([rotation for _, rotation in oriented.values()]),
-        focal=np.array([focal[photo] for photo in oriented]),
-    )
+    photos = _known_photos(inputs, oriented)
     found = intersect_points(
         observations.xy[rows], observations.sigma[rows], (place[rows], point), photos, len(numbers)
     )
     points = points.copy()
     points[numbers] = found.xyz
     return points
+
+
+def _known_photos(inputs: Inputs, oriented: Mapping[str, tuple[Floats, Floats]]) -> KnownPhotos:
+    focal = {photo: camera.principal_distance for photo, camera in inputs.cameras.items()}
+    return KnownPhotos(
+        centers=np.array([center for center, _ in oriented.values()]),
+        rotations=np.array([rotation for _, rotation in oriented.values()]),
+        focal=np.array([focal[photo] for photo in oriented]),
+    )

@@ -2,6 +2,8 @@
 
 from typing import Annotated
 
+from photostrip import camera
+from photostrip.errors import InputError
 from photostrip.network.settings import ASKED
 from photostrip.project.schema.ground import Angles
 from photostrip.project.schema.sections import Before, Length, Read, Rule, Section, key, wrong
@@ -15,13 +17,17 @@ from photostrip.project.schema.values import (
     if_empty,
     known_word,
     quoted,
+    read_positive,
     single,
 )
+from photostrip.strip.image_coordinates import pixel_cameras
 from photostrip.strip.image_coordinates.certificate import PLACES
+from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, PIXEL_SIZE
 
 Place = Annotated[str, choice(tuple(PLACES))]
 Parameter = Annotated[str, choice(ASKED)]
 AUTO, NEVER = "auto", "never"
+MILLIMETRES, PIXELS = "mm", "px"
 
 
 def _self_calibration(value: object) -> str | list[str]:
@@ -70,9 +76,61 @@ class Distortion(Section):
             raise wrong("the radii do not ascend", at="radius", expected="distances from 0 upwards")
 
 
-class Camera(Section):
-    """One camera."""
+Focal = Annotated[
+    tuple[float, ...],
+    Read(
+        lambda value: tuple(map(read_positive, value if isinstance(value, list) and len(value) in {1, 2} else [value])),
+        {"anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}]},
+    ),
+]
 
+
+class PixelCamera(Section):
+    """One camera as a program that counts in pixels gives it."""
+
+    unit: Annotated[str, choice((PIXELS,))] = key("`px`: all of it is in pixels, as its convention counts")
+    convention: Annotated[str, choice(tuple(CONVENTIONS))] = key(
+        f"Whose signs, names and origins these are: {quoted(tuple(CONVENTIONS))}"
+    )
+    image_size: tuple[Positive, Positive] = key("Width and height of the photo", unit="px")
+    focal_length: Focal = key("Focal length, or [fx, fy]", unit="px")
+    principal_point: Pair = key("Principal point where the convention counts from, y down", unit="px")
+    distortion: Annotated[dict[str, Number], Before(if_empty)] = key(
+        "Coefficients by the names of the convention, as `{k1: -0.1}`", {}
+    )
+    pixel_size: Positive = key(
+        "Size of a pixel; by default a micrometre, so that micrometres in reports are pixels", PIXEL_SIZE, unit="mm"
+    )
+    self_calibration: list[Parameter] | None = key(
+        "Parameters of this camera that the bundle adjustment estimates. Default: `processing.self_calibration`",
+        None,
+    )
+
+    @Rule
+    def _coefficients_have_counterparts(self) -> None:
+        try:
+            self.in_millimetres("")
+        except InputError as error:
+            fault = error.faults[0]
+            raise wrong(fault.message, code=fault.code, at="distortion", fix=fault.fix) from None
+
+    def in_millimetres(self, name: str) -> camera.Camera:
+        """Return the camera as the program computes with it."""
+        given = pixel_cameras.PixelCamera(
+            convention=self.convention,
+            image_size=self.image_size,
+            focal_length=(self.focal_length[0], self.focal_length[-1]),
+            principal_point=self.principal_point,
+            distortion=self.distortion,
+        )
+        return pixel_cameras.in_millimetres(name, given, self.pixel_size)
+
+
+class Camera(Section):
+    """One camera, in millimetres."""
+
+    kinds = "unit", {PIXELS: PixelCamera}
+    unit: Annotated[str, choice((MILLIMETRES,))] | None = key("`mm`; `px` for a camera that is given in pixels", None)
     principal_distance: Positive = key("Principal distance", unit="mm")
     principal_point: Pair = key("Principal point in the system of the image coordinates", (0.0, 0.0), unit="mm")
     format: tuple[Positive, Positive] | None = key("Width and height of the photo; needed for pixels", None, unit="mm")

@@ -5,7 +5,7 @@ from typing import Annotated
 from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.plausibility import KINDS
-from photostrip.project.schema.cameras import Camera, Photos, Strip
+from photostrip.project.schema.cameras import Camera, Photos, PixelCamera, Strip
 from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
 from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
 from photostrip.project.schema.processing import Processing
@@ -54,7 +54,7 @@ class ProjectFile(Section):
     photostrip: SchemaNumber = key("Number of this schema")
     name: Words | None = key("Name of the project; default: the file's name without its ending", None)
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
-    cameras: Annotated[dict[str, Camera], Before(if_empty), Length(1)] = key(
+    cameras: Annotated[dict[str, Camera | PixelCamera], Before(if_empty), Length(1)] = key(
         "Cameras by name; needed with `observations`", {}
     )
     strips: Annotated[list[Strip], Length(1)] = key(

@@ -18,6 +18,7 @@ from typing import (
     Self,
     TypeVar,
     Union,
+    cast,
     get_args,
     get_origin,
 )
@@ -117,6 +118,7 @@ class Section:
     keys: ClassVar[dict[str, Key]] = {}
     rules: ClassVar[tuple[Rule, ...]] = ()
     gone: ClassVar[dict[str, str]] = {}  # keys that were taken once, and what to do instead
+    kinds: ClassVar[tuple[str, dict[str, type[Section]]]] = "", {}  # a key, and other sections by its value
     types: ClassVar[dict[str, Any]]  # once they are asked for: the annotation of each key, and what reads it
     readers: ClassVar[dict[str, Reader]]
     given: frozenset[str]  # keys that are not left to their defaults
@@ -149,6 +151,9 @@ def read_section(kind: type[T], value: object, problems: list[Problem], path: Pa
     if not isinstance(value, dict):
         problems.append(Problem(path, _other_type(value, MAPPING)))
         return None
+    word, others = kind.kinds
+    if word in value and (other := others.get(str(value[word]))):
+        return cast("T | None", read_section(other, value, problems, path))
     before, readers = len(problems), _readers(kind)
     found = {name: readers[name](value[name], (*path, name), problems) for name in kind.keys if name in value}
     missing = [name for name, entry in kind.keys.items() if entry.default is ... and name not in value]
@@ -198,7 +203,7 @@ def _readers(kind: type[Section]) -> dict[str, Reader]:
 
 
 def bare(annotation: Any) -> Any:  # noqa: ANN401 (a type)
-    """Take ``| None`` off a type."""
+    """Take ``| None`` off a type, and the kinds of a section that one of its keys tells apart."""
     parts = get_args(annotation) if get_origin(annotation) in {Union, UnionType} else ()
     return next((each for each in parts if each is not NoneType), annotation)
 

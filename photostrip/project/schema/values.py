@@ -176,7 +176,7 @@ def quoted(words: tuple[str, ...]) -> str:
 
 _read_number = number_between("a number")
 _read_not_negative = number_between("a number from 0 on", least=-SMALLEST_LENGTH)
-_read_positive = number_between("a number larger than 0", least=SMALLEST_LENGTH)
+read_positive = number_between("a number larger than 0", least=SMALLEST_LENGTH)
 _read_fraction = number_between("a number between 0 and 1", least=0.0, most=1.0)
 _ANY = {"type": ["string", "number", "boolean", "null"]}  # whatever an id looks like, it is read as text
 _NUMBER = {"type": "number"}
@@ -188,9 +188,9 @@ Id = Annotated[str, Read(text, _ANY)]
 Words = Annotated[str, Read(text, {"type": "string", "minLength": 1})]
 Number = Annotated[float, Read(_read_number, _NUMBER)]
 NotNegative = Annotated[float, Read(_read_not_negative, {"type": "number", "minimum": 0})]
-Positive = Annotated[float, Read(_read_positive, _POSITIVE)]
+Positive = Annotated[float, Read(read_positive, _POSITIVE)]
 Fraction = Annotated[float, Read(_read_fraction, _FRACTION)]
-PositiveOrAuto = Annotated[float | None, Read(or_auto(_read_positive), {"anyOf": [AUTO, _POSITIVE]})]
+PositiveOrAuto = Annotated[float | None, Read(or_auto(read_positive), {"anyOf": [AUTO, _POSITIVE]})]
 NumberOrAuto = Annotated[float | None, Read(or_auto(_read_number), {"anyOf": [AUTO, _NUMBER]})]
 Flag = Annotated[bool, Read(_flag, {"type": "boolean"})]
 Whole = Annotated[int, Read(_whole, {"type": "integer"})]

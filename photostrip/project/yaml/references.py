@@ -213,6 +213,12 @@ def _cameras(root: Node) -> Iterator[Fault]:
             message = f"fiducial marks are measured, but camera {shown(name)} has none"
             fix = "give their calibrated coordinates, or remove fiducial_measurements"
             yield fault_at(root, (*path, "fiducials"), message, "missing-key", fix=fix)
+        if camera.word("unit") == "px":  # its pixels have a size, and its format is that of the image
+            if root.has("observations") and root.word("observations", "unit") != "px":
+                message = f"camera {shown(name)} is given in pixels, the image coordinates are not"
+                fix = "give the camera in millimetres"
+                yield fault_at(root, (*path, "unit"), message, "unit-elsewhere", expected="unit: mm", fix=fix)
+            continue
         told = scanned and marks is not None
         if (pixels or origin == "first-pixel") and not told and "pixel_size" not in camera.entries:
             message = f"coordinates are measured in pixels, but camera {shown(name)} has no pixel_size"

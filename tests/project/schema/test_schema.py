@@ -29,7 +29,8 @@ def keys(schema: dict[str, Any], definitions: dict[str, Any]) -> Iterator[tuple[
     for name, each in schema.get("properties", {}).items():
         yield name, each
         inside: tuple[Any, ...] = (each, each.get("items"), each.get("additionalProperties"))
-        for inner in inside:
+        kinds = [kind for inner in inside if isinstance(inner, dict) for kind in inner.get("anyOf", ())]
+        for inner in (*inside, *kinds):
             if isinstance(inner, dict) and "$ref" in inner:
                 yield from keys(definitions[inner["$ref"].rpartition("/")[2]], definitions)
 
@@ -137,13 +138,19 @@ def test_descriptions_are_found_through_lists_and_names() -> None:
     assert given.startswith("table `point,x,y,z")
 
 
+def pages() -> str:
+    """Give the page of the project file, and that of the one block that has its own."""
+    return "".join((ROOT / "docs" / "files" / f"{name}.md").read_text(encoding="utf-8")
+                   for name in ("project", "cameras-in-pixels"))  # fmt: skip
+
+
 def test_the_page_of_the_project_file_names_every_key() -> None:
-    page = (ROOT / "docs" / "files" / "project.md").read_text(encoding="utf-8")
+    page = pages()
     assert [name for name, _ in every_key() if f"`{name}`" not in page] == []
 
 
 def test_the_page_tells_every_default_and_unit() -> None:
-    lines = (ROOT / "docs" / "files" / "project.md").read_text(encoding="utf-8").splitlines()
+    lines = pages().splitlines()
     for name, each in nonempty(every_key()):
         rows = [line for line in lines if line.startswith("| ") and f"`{name}`" in line.split(" | ")[0]]
         assert rows, name

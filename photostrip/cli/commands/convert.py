@@ -1,0 +1,65 @@
+"""``photostrip convert``: other programs' files as a project."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from photostrip.cli.options import Silent
+
+
+def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
+    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="Folder of a COLMAP model, text or binary.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder to write the project into.")],
+    sigma: Annotated[
+        float | None,
+        typer.Option("--sigma", metavar="PX", help="Standard deviation of an image coordinate in pixels; needed."),
+    ] = None,
+    pixel_size: Annotated[
+        float | None,
+        typer.Option(
+            "--pixel-size", metavar="MM", help="Size of a pixel; else micrometres in reports stand for pixels."
+        ),
+    ] = None,
+    control: Annotated[
+        Path | None,
+        typer.Option("--control", metavar="FILE", help="Control with its marks: CSV, or gcp_list.txt of OpenDroneMap."),
+    ] = None,
+    crs: Annotated[str, typer.Option("--crs", metavar="CRS", help="Frame of the control, as EPSG:32633.")] = "",
+    control_sigma: Annotated[
+        str | None,
+        typer.Option("--control-sigma", metavar="M", help="Its standard deviation in metres: one, or EAST,NORTH,UP."),
+    ] = None,
+    mark_sigma: Annotated[
+        float | None, typer.Option("--mark-sigma", metavar="PX", help="That of a mark in pixels; else --sigma.")
+    ] = None,
+    mark_width: Annotated[
+        float | None,
+        typer.Option("--mark-width", metavar="PX", help="Width of the photos that were marked, where it is another."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the files of a project in DIR.")] = False,
+    quiet: Silent = False,
+) -> None:
+    """Write an ordinary project from other programs' files, to be checked, edited and run.
+
+    DIR gets project.yaml, observations.csv, orientations.csv and, with --control, control.csv. Printed is what was
+    understood: counts, cameras, one photo, frame, units. What the files do not carry is asked for by the name of an
+    option, and never guessed.
+    """
+    from photostrip.cli.jobs.convert import Options, converted
+
+    asked = Options(
+        sigma=sigma,
+        pixel_size=pixel_size,
+        control=control,
+        crs=crs,
+        control_sigma=control_sigma,
+        mark_sigma=mark_sigma,
+        mark_width=mark_width,
+    )
+    lines, written = converted(source, output, asked, force=force)
+    if not quiet:
+        typer.echo("\n".join(lines))
+        typer.echo(written, err=True)

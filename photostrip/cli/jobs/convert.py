@@ -1,0 +1,95 @@
+"""Files of another program as a project in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from photostrip.errors import Fault, InputError
+from photostrip.foreign import colmap
+from photostrip.foreign.control import Asked, with_control
+from photostrip.foreign.project import Wanted, project_files, understood
+from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
+from photostrip.formats.text.numbers import number as read_number
+from photostrip.formats.text.writing import write_files
+from photostrip.project.template import refuse_existing
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is said beside the files."""
+
+    sigma: float | None = None  # px
+    pixel_size: float | None = None  # mm
+    control: Path | None = None
+    crs: str = ""
+    control_sigma: str | None = None  # metres: one number, or three
+    mark_sigma: float | None = None  # px
+    mark_width: float | None = None  # px
+
+
+def converted(source: Path, output: Path, options: Options, *, force: bool) -> tuple[list[str], str]:
+    """Write a project, all of its files or none; say what was understood, and what was written.
+
+    Raises InputError with everything that is wrong with the options, or with the files.
+    """
+    faults = list(_faults(options))
+    if faults or options.sigma is None:
+        raise InputError(faults)
+    block, wanted = colmap.read(source), Wanted(options.sigma, options.pixel_size)
+    if options.control is not None:
+        asked = Asked(
+            file=str(options.control),
+            crs=options.crs,
+            sigma=_three(options.control_sigma),
+            mark_sigma=options.mark_sigma,
+            width=options.mark_width,
+        )
+        block = with_control(block, asked)
+    files = project_files(output.resolve().name or "project", block, wanted)
+    if not force:
+        refuse_existing(output, list(files))
+    write_files(output, files, block.files)
+    said = understood(block, wanted)
+    width = max(map(len, said))
+    lines = [f"{name:<{width}}  {text}" for name, text in said.items()]
+    return lines, f"wrote {', '.join(files)} to {output}; next: photostrip check {output / 'project.yaml'}"
+
+
+def _faults(options: Options) -> Iterator[Fault]:
+    if options.sigma is None:
+        message = "the files do not say how precise an image coordinate is"
+        fix = "give --sigma PX: features of SIFT scatter by 0.5 to 1 px"
+        yield Fault(message, "option", key="--sigma", fix=fix)
+    lengths: dict[str, tuple[float | None, str]] = {
+        "--sigma": (options.sigma, "px"),
+        "--pixel-size": (options.pixel_size, "mm"),
+        "--mark-sigma": (options.mark_sigma, "px"),
+        "--mark-width": (options.mark_width, "px"),
+    }
+    for option, (value, unit) in lengths.items():
+        if value is not None and not SMALLEST_LENGTH < value < LARGEST_NUMBER:
+            yield Fault(f"{value:g} {unit} is no length", "option", key=option, expected="a number larger than 0")
+    if options.control_sigma is not None and _three(options.control_sigma) is None:
+        expected = "one number in metres, or three with commas between them"
+        yield Fault(f"`{options.control_sigma}` is no precision", "option", key="--control-sigma", expected=expected)
+    given: dict[str, object] = {
+        "--crs": options.crs,
+        "--control-sigma": options.control_sigma,
+        "--mark-sigma": options.mark_sigma,
+        "--mark-width": options.mark_width,
+    }
+    for option, about in given.items():
+        if options.control is None and about:
+            yield Fault("there is no control that it is about", "option", key=option, fix="give --control FILE, too")
+
+
+def _three(text: str | None) -> tuple[float, float, float] | None:
+    """Read one standard deviation, or three; None for anything else."""
+    words = (text or "").split(",")
+    try:
+        east, north, up = map(read_number, words * 3 if len(words) == 1 else words)
+    except (NotANumber, ValueError):
+        return None
+    return (east, north, up) if min(east, north, up) > SMALLEST_LENGTH else None

@@ -1,0 +1,345 @@
+"""Models of COLMAP, as text or binary: ``cameras`` and ``images``; the rays in them are all that is measured.
+
+A pose takes the world to the camera (x right, y down, z ahead), pixels count from the corner of the first one.
+``points3D`` repeats the tracks with coordinates that a run finds itself; ``rigs`` and ``frames`` of newer versions
+repeat the poses in parts, those of ``images`` stay whole.
+
+COLMAP documents the files in colmap.github.io/format.html, the cameras in cameras.html.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from photostrip.arrays import Floats, Numbers
+from photostrip.errors import Fault, InputError
+from photostrip.foreign.tables import ForeignBlock
+from photostrip.formats.text.files import BOM, MEGABYTE, decode, read_bytes, refuse
+from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
+from photostrip.notes import counted, listed
+from photostrip.strip.image_coordinates import lens_distortion
+from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera, in_millimetres
+
+LARGEST = 4000 * MEGABYTE
+MODELS = {  # names of the parameters
+    "SIMPLE_PINHOLE": "f cx cy",
+    "PINHOLE": "fx fy cx cy",
+    "SIMPLE_RADIAL": "f cx cy k1",
+    "RADIAL": "f cx cy k1 k2",
+    "OPENCV": "fx fy cx cy k1 k2 p1 p2",
+    "FULL_OPENCV": "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6",
+}
+NUMBERED = (
+    *("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV", "FOV"),
+    *("SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE"),
+    *("SIMPLE_DIVISION", "DIVISION", "SIMPLE_FISHEYE", "FISHEYE", "EUCM", "EQUIRECTANGULAR"),
+)
+POINT = "colmap-{}"  # an id that no control point has
+RAY = np.dtype([("x", "<f8"), ("y", "<f8"), ("point", "<i8")])
+LARGEST_ID = 2.0**53  # of a point in a text: from there on a float is no whole number of its own
+
+
+class Place(NamedTuple):
+    """Where something stands: a line of a text, a record of a binary file."""
+
+    file: str
+    line: int = 0
+    record: str = ""
+
+    def wrong(self, message: str, code: str = "colmap", *, expected: str = "", fix: str = "") -> InputError:
+        text = f"{self.record}: {message}" if self.record else message
+        return InputError(Fault(text, code=code, file=self.file, line=self.line, expected=expected, fix=fix))
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    place: Place
+    id: int
+    pose: Floats  # (7,): quaternion w, x, y, z and translation, from the world to the camera
+    camera: int
+    name: str
+    xy: Floats  # (n, 2)
+    points: Numbers  # (n,): ids of points; -1 for a keypoint without one
+
+
+def read(folder: Path) -> ForeignBlock:
+    """Read a model, the binary one where both stand in a folder, as COLMAP does.
+
+    Raises InputError with file and line, or record, for all that is no such model or has no counterpart here.
+    """
+    kind = next((each for each in ("bin", "txt") if (folder / f"cameras.{each}").is_file()), "")
+    if not kind:
+        near = [folder.parent] if folder.is_file() else [folder, *folder.glob("*"), *folder.glob("*/*")]
+        inside = next((each for each in sorted(near) if list(each.glob("cameras.[bt][ix][nt]"))), None)
+        fix = f"did you mean `{inside}`?" if inside is not None else ""
+        refuse(str(folder), "colmap", "is no model of COLMAP: it has no cameras.bin or cameras.txt", fix=fix)
+    files = [str(folder / f"{name}.{kind}") for name in ("cameras", "images")]
+    binary = kind == "bin"
+    cameras = dict(_unique("camera", _binary_cameras(files[0]) if binary else _text_cameras(files[0])))
+    images = dict(_unique("image", ((each.place, each.id, each) for each in (_binary if binary else _text)(files[1]))))
+    return _block(f"COLMAP model ({'binary' if binary else 'text'})", tuple(files), cameras, list(images.values()))
+
+
+def _unique(what: str, entries: Iterator[tuple[Place, Any, Any]]) -> Iterator[tuple[Any, Any]]:
+    """Give ids and what they stand for; refuse one that stands twice."""
+    seen = set()
+    for place, name, entry in entries:
+        if name in seen:
+            raise place.wrong(f"{what} {shown(str(name))} is already given", fix="keep one of the two")
+        seen.add(name)
+        yield name, entry
+
+
+# ------------------------------------------------------------------------------------------------------- text
+
+
+def _lines(file: str) -> Iterator[tuple[Place, bytes]]:
+    data = read_bytes(file, LARGEST)
+    _, marked = decode(file, data)  # refuses what is no text
+    start, number = len(BOM) if marked else 0, 0
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end
+        number += 1
+        yield Place(file, number), data[start:end].strip()
+        start = end + 1
+
+
+def _numbers(place: Place, words: list[bytes], what: str) -> Floats:
+    try:
+        found = np.array(words, float)
+    except ValueError:
+        found = np.array([np.nan])
+    if not (np.abs(found) < LARGEST_NUMBER).all():
+        wrong = next(word.decode() for word in words if not _is_number(word))
+        raise place.wrong(f"`{shown(wrong)}` is no number of {what}", "number")
+    return found
+
+
+def _is_number(word: bytes) -> bool:
+    try:
+        return abs(float(word)) < LARGEST_NUMBER
+    except ValueError:
+        return False
+
+
+def _whole(place: Place, word: bytes, what: str) -> int:
+    if not word.isdigit() or len(word) > 18:
+        raise place.wrong(f"`{shown(word.decode())}` is no {what}", "number", expected="a whole number")
+    return int(word)
+
+
+def _text_cameras(file: str) -> Iterator[tuple[Place, int, PixelCamera]]:
+    for place, line in _lines(file):
+        if not line or line.startswith(b"#"):
+            continue
+        words = line.split()
+        if len(words) < 5:
+            message = f"{counted(len(words), 'value')} in the line"
+            raise place.wrong(message, "row-length", expected="id, model, width, height, parameters")
+        number, model = _whole(place, words[0], "id of a camera"), words[1].decode()
+        yield place, number, _camera(place, model, _numbers(place, words[2:], f"camera {number}").tolist())
+
+
+def _text(file: str) -> Iterator[Image]:
+    lines = _lines(file)
+    for place, line in lines:
+        if not line or line.startswith(b"#"):
+            continue
+        words = line.split(None, 9)
+        if len(words) < 10:
+            message = f"{counted(len(words), 'value')} in the line"
+            expected = "id, qw, qx, qy, qz, tx, ty, tz, camera, name; and a line of x, y, point below it"
+            raise place.wrong(message, "row-length", expected=expected)
+        number, name = _whole(place, words[0], "id of an image"), words[9].decode()
+        pose = _numbers(place, words[1:8], f"the pose of image {number}")
+        camera = _whole(place, words[8], "id of a camera")
+        below, measured = next(lines, (place, b""))
+        rays = _numbers(below, measured.split(), f"the points of image {number}")
+        if len(rays) % 3:
+            message = f"{counted(len(rays), 'value')} in the points of image {number}"
+            raise below.wrong(message, "row-length", expected="x, y, point for each, -1 for no point")
+        points = rays[2::3]
+        if ((points != np.floor(points)) | (points < -1) | (points >= LARGEST_ID)).any():
+            raise below.wrong(
+                f"an id of a point of image {number} is no id", "number", expected="a whole number, or -1"
+            )
+        xy = rays.reshape(-1, 3)[:, :2]
+        yield _image(place, (number, pose, camera, name), xy, points.astype(np.int64))
+
+
+# ----------------------------------------------------------------------------------------------------- binary
+
+
+class _Records:
+    """The bytes of a file, taken from its beginning on; none is taken that is not there."""
+
+    def __init__(self, file: str) -> None:
+        self.file, self.data, self.at, self.record = file, read_bytes(file, LARGEST), 0, "the head"
+
+    @property
+    def place(self) -> Place:
+        return Place(self.file, record=self.record)
+
+    def require(self, count: int, what: str) -> None:
+        if count > len(self.data) - self.at:
+            message = f"ends within {what}: {len(self.data) - self.at} bytes are left, {count} are needed"
+            raise self.place.wrong(message, fix="copy or write the model again")
+
+    def take(self, layout: str, what: str) -> tuple[Any, ...]:
+        size = struct.calcsize(layout)
+        self.require(size, what)
+        self.at += size
+        return struct.unpack_from(layout, self.data, self.at - size)
+
+    def text(self) -> str:
+        end = self.data.find(b"\0", self.at)
+        if end < 0:
+            raise self.place.wrong("its name has no end", fix="copy or write the model again")
+        try:
+            found = self.data[self.at : end].decode()
+        except UnicodeDecodeError:
+            raise self.place.wrong("its name is not UTF-8 text", "encoding") from None
+        self.at = end + 1
+        return found
+
+    def each(self, what: str, least: int) -> Iterator[int]:
+        """Count through the records that the file says it has, of so many bytes at least."""
+        (count,) = self.take("<Q", "the number of its records")
+        self.require(count * least, f"its {count} records of {what}s")
+        for number in range(1, count + 1):
+            self.record = f"{what} {number} of {count}"
+            yield number
+        if self.at < len(self.data):
+            message = f"{len(self.data) - self.at} bytes follow the last of its {count} {what}s"
+            raise Place(self.file).wrong(message, fix="copy or write the model again")
+
+
+def _binary_cameras(file: str) -> Iterator[tuple[Place, int, PixelCamera]]:
+    records = _Records(file)
+    for _ in records.each("camera", 24):
+        number, model, width, height = records.take("<iiQQ", "the record")
+        name = NUMBERED[model] if 0 <= model < len(NUMBERED) else f"number {model}"
+        values = records.take(f"<{len(MODELS.get(name, '').split())}d", "its parameters")
+        yield records.place, number, _camera(records.place, name, [width, height, *values])
+
+
+def _binary(file: str) -> Iterator[Image]:
+    records = _Records(file)
+    for _ in records.each("image", 73):
+        number, *pose, camera = records.take("<I7dI", "the pose")
+        name = records.text()
+        (count,) = records.take("<Q", "the number of its points")
+        records.require(count * RAY.itemsize, f"its {count} points")
+        rays = np.frombuffer(records.data, RAY, count, records.at)
+        records.at += count * RAY.itemsize
+        kept = rays[rays["point"] != -1]
+        xy = np.stack([kept["x"], kept["y"]], axis=-1)
+        if not ((np.abs(xy) < LARGEST_NUMBER).all() and (kept["point"] >= 0).all()):
+            raise records.place.wrong("a point of it has no place, or no id", "number")
+        values = np.array(pose)
+        if not (np.abs(values) < LARGEST_NUMBER).all():
+            raise records.place.wrong("its pose holds what is no number", "number")
+        yield _image(records.place, (number, values, camera, name), xy, kept["point"])
+
+
+# ------------------------------------------------------------------------------------------------------- both
+
+
+def _image(place: Place, head: tuple[int, Floats, int, str], xy: Floats, points: Numbers) -> Image:
+    number, pose, camera, name = head
+    if not np.linalg.norm(pose[:4]) > 0.0:
+        raise place.wrong("the quaternion of its pose is 0", "range")
+    return Image(place=place, id=number, pose=pose, camera=camera, name=name, xy=xy, points=points)
+
+
+def _camera(place: Place, model: str, values: list[float]) -> PixelCamera:
+    """Return a camera by its model, its size and its parameters."""
+    if model not in MODELS:
+        fix = "calibrate with OPENCV, or undistort the photos (colmap image_undistorter)"
+        raise place.wrong(f"the model {shown(model)} has no counterpart", "camera-model",
+                          expected=f"one of {', '.join(MODELS)}", fix=fix)  # fmt: skip
+    names, (width, height, *parameters) = MODELS[model].split(), values
+    if len(parameters) != len(names):
+        message = f"{counted(len(parameters), 'parameter')} of the model {model}"
+        raise place.wrong(message, "row-length", expected=f"{len(names)}: {', '.join(names)}")
+    given = dict(zip(names, parameters, strict=True))
+    focal = given.pop("fx", 0.0) or given.pop("f", 0.0)
+    focals = focal, given.pop("fy", focal)
+    point = given.pop("cx"), given.pop("cy")
+    if not all(SMALLEST_LENGTH < each < LARGEST_NUMBER for each in (width, height, *focals)):
+        raise place.wrong("width, height and focal length are not above 0", "range")
+    if not (np.abs([*point, *given.values()]) < LARGEST_NUMBER).all():
+        raise place.wrong("a parameter is no number", "number")
+    found = PixelCamera(
+        convention="colmap",
+        image_size=(width, height),
+        focal_length=focals,
+        principal_point=point,
+        distortion=given,
+    )
+    try:
+        faults = lens_distortion.faults(in_millimetres(model, found))
+    except InputError as error:
+        faults = list(error.faults)
+    for fault in faults:
+        raise place.wrong(fault.message, fault.code, fix=fault.fix)
+    return found
+
+
+def _block(
+    source: str, files: tuple[str, ...], cameras: Mapping[int, PixelCamera], images: list[Image]
+) -> ForeignBlock:
+    """Put the images in the order of their names, and leave out what determines nothing."""
+    images = sorted(images, key=lambda each: each.name)
+    named = ((each.place, each.name.strip(), each) for each in images)
+    by_name = dict(_unique("an image called", named))
+    for name, each in by_name.items():
+        if not name or not name.isprintable():
+            raise each.place.wrong(f"`{shown(name)}` is no name of a photo", expected="a text on one line")
+        if each.camera not in cameras:
+            raise each.place.wrong(f"there is no camera {each.camera}", "unknown-camera")
+    kept = [each.points >= 0 for each in images]
+    photo = np.repeat(np.arange(len(images)), [int(each.sum()) for each in kept])
+    ids = np.concatenate([np.zeros(0, np.int64), *(each.points[rows] for each, rows in zip(images, kept, strict=True))])
+    xy = np.concatenate([np.zeros((0, 2)), *(each.xy[rows] for each, rows in zip(images, kept, strict=True))])
+    numbers, point = np.unique(ids, return_inverse=True)
+    left_out = []
+    _, first, times = np.unique(photo * len(numbers) + point, return_index=True, return_counts=True)
+    if twice := int((times > 1).sum()):
+        left_out.append(f"{counted(twice, 'point')} of a photo that stand on it twice: nothing says which is right")
+    rows = first[times == 1]
+    seen = np.bincount(point[rows], minlength=len(numbers))
+    rows = np.sort(rows[seen[point[rows]] > 1])
+    if alone := int((seen == 1).sum()):
+        left_out.append(f"{counted(alone, 'point')} on one photo only")
+    used = np.unique(photo[rows])
+    if len(used) < len(images):
+        names = [each.name for number, each in enumerate(images) if number not in set(used.tolist())]
+        left_out.append(f"{counted(len(names), 'photo')} without points: {listed(names, 4)}")
+    if not len(used):
+        refuse(files[1], "no-points", "no point stands on two photos", fix="write a model with its tracks")
+    poses = np.array([images[number].pose for number in used.tolist()])
+    to_camera = Rotation.from_quat(poses[:, [1, 2, 3, 0]]).as_matrix()
+    points = np.unique(point[rows])
+    return ForeignBlock(
+        source=source,
+        files=files,
+        cameras={str(number): cameras[number] for number in sorted({images[each].camera for each in used.tolist()})},
+        photos=tuple(images[each].name.strip() for each in used.tolist()),
+        camera_of=tuple(str(images[each].camera) for each in used.tolist()),
+        points=tuple(map(POINT.format, numbers[points].tolist())),
+        photo=np.searchsorted(used, photo[rows]),
+        point=np.searchsorted(points, point[rows]),
+        xy=xy[rows],
+        centers=-np.einsum("nji,nj->ni", to_camera, poses[:, 4:]),
+        rotations=to_camera.transpose(0, 2, 1) * (1.0, -1.0, -1.0),
+        left_out=tuple(left_out),
+    )

@@ -1,0 +1,185 @@
+"""What was read of another program as a project: its files, and what was understood in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import isnan
+
+import numpy as np
+
+from photostrip.arrays import Floats, Numbers
+from photostrip.foreign.tables import ForeignBlock, GivenControl
+from photostrip.formats.output.csv_text import to_csv
+from photostrip.formats.text.writing import Content
+from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geometry.rotation import separable_angles
+from photostrip.notes import counted
+from photostrip.number_columns import as_repr, as_texts, joined, repeated, texts_of
+from photostrip.project.resolved import lines_of
+from photostrip.project.schema.values import Text
+from photostrip.strip.image_coordinates.lens_distortion import shift
+from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera, in_millimetres
+
+PIECE = 100_000  # rows that are written at a time
+HEADER = """\
+# Written by photostrip convert from a {source}, for you to edit; every key: docs/files/project.md.
+# Place, direction and scale of its orientations are arbitrary. They are a start: with control the photos are laid on
+# it, without any the result is a free network in the frame of the model.
+"""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the files do not carry."""
+
+    sigma: float  # standard deviation of an image coordinate in pixels
+    pixel_size: float | None = None  # mm
+
+
+def project_files(name: str, block: ForeignBlock, wanted: Wanted) -> dict[str, Content]:
+    """Return the files of a project, ``project.yaml`` last; the same for the same block to the byte."""
+    system, turned = separable_angles(block.rotations)
+    header = f"photo,x,y,z,{system.replace('-', ',')}"
+    posed = np.hstack([block.centers, np.degrees(turned)])
+    orientations = _table(header, [(block.photos, np.arange(len(block.photos)))], posed)
+    rays = [(block.photos, block.photo), (block.points, block.point)]
+    project = _project(name, block, wanted, system)
+    return {
+        "observations.csv": _table("photo,point,x,y", rays, block.xy)
+        if block.sigma is None
+        else _table("photo,point,x,y,sx,sy", rays, np.column_stack([block.xy, block.sigma, block.sigma])),
+        "orientations.csv": orientations,
+        **({} if block.control is None else {"control.csv": _control(block.control)}),
+        "project.yaml": HEADER.format(source=block.source) + "".join(f"{line}\n" for line in lines_of(project)),
+    }
+
+
+def _project(name: str, block: ForeignBlock, wanted: Wanted, system: str) -> dict[str, object]:
+    size = {} if wanted.pixel_size is None else {"pixel_size": wanted.pixel_size}
+    owners: dict[str, list[Text]] = {camera: [] for camera in block.cameras}
+    for photo, camera in zip(block.photos, block.camera_of, strict=True):
+        owners[camera].append(Text(photo))
+    return {
+        "photostrip": 1,
+        "name": Text(name),
+        "cameras": {Text(camera): _camera(given) | size for camera, given in block.cameras.items()},
+        "photos": [{"camera": Text(camera), "photos": photos} for camera, photos in owners.items()],
+        "observations": {
+            "file": "observations.csv",
+            "unit": "px",
+            "y_axis": "down",
+            "origin": "top-left",
+            "sigma": wanted.sigma,
+        },
+        **({} if block.control is None else {"control": [{"file": "control.csv", **_frame(block.control.crs)}]}),
+        "orientations": {
+            "file": "orientations.csv",
+            **_frame("local"),
+            "angles": {"system": system, "unit": "deg"},
+            "role": "approximate",
+        },
+    }
+
+
+def _frame(crs: str) -> dict[str, object]:
+    return {"crs": Text(crs), "axes": list(GROUND_AXES)}
+
+
+def _control(given: GivenControl) -> str:
+    rows = zip(given.ids, given.xyz.tolist(), given.sigma.tolist(), given.check, strict=True)
+    cells = (
+        (name, x, y, "" if isnan(z) else z, "xy" if isnan(z) else "xyz", "check" if check else "control", *sigma)
+        for name, (x, y, z), sigma, check in rows
+    )
+    return to_csv(("point", "x", "y", "z", "use", "role", "sx", "sy", "sz"), cells)
+
+
+def _camera(given: PixelCamera) -> dict[str, object]:
+    fx, fy = given.focal_length
+    return {
+        "unit": "px",
+        "convention": given.convention,
+        "image_size": [int(each) if each == int(each) else each for each in given.image_size],
+        "focal_length": fx if fx == fy else [fx, fy],
+        "principal_point": list(given.principal_point),
+        **({"distortion": dict(given.distortion)} if any(given.distortion.values()) else {}),
+    }
+
+
+def _table(header: str, ids: Sequence[tuple[Sequence[str], Numbers]], values: Floats) -> Iterator[str]:
+    """Write a table in pieces: columns of ids by their numbers, then columns of numbers."""
+    yield f"{header}\n"
+    names = [(texts_of([_quoted(name) for name in every]), number) for every, number in ids]
+    for start in range(0, len(values), PIECE):
+        rows = slice(start, start + PIECE)
+        columns = [as_texts(every[number[rows]]) for every, number in names]
+        columns += [as_repr(column, "") for column in values[rows].T]
+        comma = repeated(",", columns[0].shape[1])
+        cells = [each for column in columns for each in (column, comma)][:-1]
+        yield joined(cells, "\n") + "\n"
+
+
+def _quoted(name: str) -> str:
+    return to_csv([name], ())[:-1] if set(name) & set(',"') else name
+
+
+def understood(block: ForeignBlock, wanted: Wanted) -> Mapping[str, str]:
+    """Say what was read in the program's own words, by what it is about."""
+    of_control = (0, 0) if block.control is None else (len(block.control.ids), block.control.marks)
+    counts = (
+        f"{counted(len(block.photos), 'photo')} of {counted(len(block.cameras), 'camera')}, "
+        f"{counted(len(block.points) - of_control[0], 'point')}, {counted(len(block.xy) - of_control[1], 'ray')}"
+    )
+    said = {"read": f"{block.source}: {counts}"}
+    said |= {f"camera {name}": _of_camera(name, given) for name, given in list(block.cameras.items())[:5]}
+    if len(block.cameras) > 5:
+        said["more"] = counted(len(block.cameras) - 5, "camera")
+    rays = int(np.count_nonzero(block.photo == 0))
+    x, y, z = block.centers[0] + 0.0
+    along, right = -block.rotations[0][:, 2], block.rotations[0][:, 0]
+    said[f"photo {block.photos[0]}"] = (
+        f"{counted(rays, 'ray')}; perspective center {x:.5g}, {y:.5g}, {z:.5g}, view along {_vector(along)}, "
+        f"its x along {_vector(right)}"
+    )
+    said["frame"] = "the model's own, of any place, direction and scale; the orientations are only a start"
+    said["image"] = (
+        f"pixels from the corner of the first one, y down; standard deviation {wanted.sigma:g} px; a pixel is "
+        + ("taken as 1 µm" if wanted.pixel_size is None else f"{wanted.pixel_size:g} mm")
+    )
+    if block.control is not None:
+        said["control"] = _of_control(block.control)
+    if block.left_out:
+        said["left out"] = "; ".join(block.left_out)
+    return said
+
+
+def _of_control(given: GivenControl) -> str:
+    x, y, z = given.xyz[0].tolist()
+    height = "not known" if isnan(z) else f"{z:.3f}"
+    checks = f", {sum(given.check)} of them check points" if any(given.check) else ""
+    return (
+        f"{counted(len(given.ids), 'point')}{checks}, {counted(given.marks, 'mark')}; {given.crs}, heights taken as "
+        f"ellipsoidal; {given.ids[0]}: east {x:.10g}, north {y:.10g}, up {height}"
+    )
+
+
+def _of_camera(name: str, given: PixelCamera) -> str:
+    camera = in_millimetres(name, given)
+    (width, height), size = given.image_size, PIXEL_SIZE
+    x0, y0 = (each / size for each in camera.principal_point)
+    said = (
+        f"{width:g} x {height:g} px, f {camera.principal_distance / size:.2f} px, principal point "
+        f"{x0:+.2f}, {y0:+.2f} px from the middle, y up"
+    )
+    if camera.pixel_affinity[0]:
+        said += f", pixels {1e6 * camera.pixel_affinity[0]:+.0f} ppm narrower than high"
+    if camera.distortion is None:
+        return f"{said}, no distortion"
+    corner = np.array([[width / 2.0, height / 2.0]]) * size
+    moved = float(np.linalg.norm(shift(corner, camera.distortion))) / size
+    return f"{said}, distortion {moved:.1f} px in a corner"
+
+
+def _vector(direction: Floats) -> str:
+    return ", ".join(f"{each:+.2f}" for each in direction)

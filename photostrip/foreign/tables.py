@@ -1,0 +1,45 @@
+"""What the files of another program hold, in the words of a project."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from photostrip.arrays import Floats, Numbers
+from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
+
+
+@dataclass(frozen=True, eq=False)
+class GivenControl:
+    """Ground coordinates of points, which are rays of the block, too."""
+
+    source: str  # what was read
+    ids: tuple[str, ...]
+    crs: str
+    # (m, 3): east, north, up; heights that are not known are NaN
+    xyz: Floats
+    sigma: Floats  # metres
+    check: tuple[bool, ...]
+    marks: int  # how many were taken
+
+
+@dataclass(frozen=True, eq=False)
+class ForeignBlock:
+    """Photos in no order, measured in pixels from the corner of the first one, with rough orientations."""
+
+    source: str  # what was read, as "COLMAP model (binary)"
+    files: tuple[str, ...]
+    cameras: Mapping[str, PixelCamera]
+    photos: tuple[str, ...]  # ids
+    camera_of: tuple[str, ...]  # of each photo
+    points: tuple[str, ...]  # ids
+    # rays, (n,): number of their photo and of their point; (n, 2): x to the right, y down
+    photo: Numbers
+    point: Numbers
+    xy: Floats
+    # (m, 3), (m, 3, 3): perspective centres, and rotations from image axes (x right, y up, z towards the viewer)
+    centers: Floats
+    rotations: Floats
+    sigma: Floats | None = None  # (n,): standard deviation of each ray in pixels; NaN, or None: as for all
+    control: GivenControl | None = None
+    left_out: tuple[str, ...] = ()  # sentences

@@ -1,0 +1,329 @@
+"""``photostrip convert`` of COLMAP models, as a user calls it."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import photostrip
+from photostrip.cli.main import main
+from photostrip.project.checks.check import check_project
+from tests.foreign.colmap_models import OPENCV, SCALE, SHIFT, SPEC, TO_MODEL, name_of, simulated
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+KINDS = ("text", "binary")
+
+
+def convert(source: Path, target: Path, *options: str) -> int:
+    return main(["convert", str(source), "-o", str(target), "--sigma", "0.5", *options])
+
+
+def refused(capsys: pytest.CaptureFixture[str], source: Path, target: Path, *options: str) -> str:
+    """Give what is said of a source that is refused; nothing is written then."""
+    assert convert(source, target, *options) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert not target.exists()
+    return captured.err
+
+
+def with_control(native: Path, converted: Path) -> Path:
+    """Give a converted project the control of the native one, and its measurements."""
+    rows = [line.split(",") for line in (native / "observations.csv").read_text(encoding="utf-8").splitlines()[1:]]
+    with (converted / "observations.csv").open("a", encoding="utf-8") as file:
+        file.writelines(",".join([name_of(row[0]), *row[1:]]) + "\n" for row in rows if row[1][0] in "GK")
+    (converted / "control.csv").write_bytes((native / "control.csv").read_bytes())
+    text = (native / "project.yaml").read_text(encoding="utf-8")
+    with (converted / "project.yaml").open("a", encoding="utf-8") as file:
+        file.write(text[text.index("control:") :])
+    return converted / "project.yaml"
+
+
+# ----------------------------------------------------------------------------------------------------- results
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("crs", ["local", "EPSG:32633"])
+def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, kind: str, crs: str) -> None:
+    model = simulated(tmp_path / "native", ground={"crs": crs})
+    assert convert(model.write(tmp_path / "model", kind), tmp_path / "block", "-q") == 0
+    project = with_control(tmp_path / "native", tmp_path / "block")
+    assert check_project(project).faults == ()
+    found, known = photostrip.run(project), photostrip.run(tmp_path / "native" / "project.yaml")
+    assert found.document["verdict"]["look_at"] == known.document["verdict"]["look_at"] == []
+    at, expected = ({each["id"]: each for each in result.document["points"]} for result in (found, known))
+    for name in ("x", "y", "z", "sigma_x", "sigma_z"):
+        given = [each for each in expected if each[0] in "GK"]
+        assert [at[each][name] for each in given] == pytest.approx([expected[each][name] for each in given], abs=3e-4)
+    assert any("laid on the control: 1 unit of it is 27.0" in each["message"] for each in found.document["notes"])
+
+
+def test_nothing_is_said_against_orientations_of_an_arbitrary_frame(tmp_path: Path) -> None:
+    model = simulated(tmp_path / "native")
+    assert convert(model.write_text(tmp_path / "model"), tmp_path / "block", "-q") == 0
+    project = with_control(tmp_path / "native", tmp_path / "block")
+    before, _, rest = project.read_text(encoding="utf-8").partition("control:")
+    project.write_text(f"{before}control:{rest.replace('[east, north, up]', '[north, east, up]')}", encoding="utf-8")
+    with pytest.raises(photostrip.InputError, match="fits the control only upside down") as refusal:
+        photostrip.run(project)
+    assert [each.code for each in refusal.value.findings if each.key.startswith("orientations")] == []
+
+
+def test_camera_positions_say_where_the_model_lies(tmp_path: Path) -> None:
+    model = simulated(tmp_path / "native", gnss={"sigma": [0.03, 0.03, 0.05]})
+    assert convert(model.write_text(tmp_path / "model"), tmp_path / "block", "-q") == 0
+    rows = (tmp_path / "native" / "gnss.csv").read_text(encoding="utf-8").splitlines()
+    renamed = [f"{name_of(row.partition(',')[0])},{row.partition(',')[2]}" for row in rows[1:]]
+    (tmp_path / "block" / "gnss.csv").write_text("\n".join([rows[0], *renamed]) + "\n", encoding="utf-8")
+    project = tmp_path / "block" / "project.yaml"
+    with project.open("a", encoding="utf-8") as file:
+        file.write(
+            "camera_positions: {file: gnss.csv, crs: local, axes: [east, north, up], sigma: [0.03, 0.03, 0.05]}\n"
+        )
+    found = {each["id"]: each for each in photostrip.run(project).document["photos"]}
+    for line in rows[1:]:
+        photo, *xyz = line.split(",")[:4]
+        at = [found[name_of(photo)][name] for name in "xyz"]
+        assert at == pytest.approx([float(each) for each in xyz], abs=0.3)
+
+
+def test_without_control_it_is_a_free_network_in_the_frame_of_the_model(tmp_path: Path) -> None:
+    model = simulated(tmp_path / "native")
+    assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block", "-q") == 0
+    found = photostrip.run(tmp_path / "block" / "project.yaml")
+    assert [each["code"] for each in found.document["notes"] if each["code"] == "free-network"]
+    truth = photostrip.simulate(SPEC).truth["photos"]
+    expected = TO_MODEL.apply(SCALE * np.array([[each[name] for name in "xyz"] for each in truth])) + SHIFT
+    at = {each["id"]: [each[name] for name in "xyz"] for each in found.document["photos"]}
+    assert np.abs([at[name_of(each["id"])] for each in truth] - expected).max() < 0.02  # of a flight of 3.7 units
+
+
+def test_text_and_binary_are_the_same_project(tmp_path: Path) -> None:
+    model = simulated(tmp_path / "native")
+    for kind in KINDS:
+        assert convert(model.write(tmp_path / kind, kind), tmp_path / kind / "block", "-q") == 0
+    for name in ("observations.csv", "orientations.csv"):
+        assert (tmp_path / "text/block" / name).read_bytes() == (tmp_path / "binary/block" / name).read_bytes()
+    one, other = ((tmp_path / kind / "block/project.yaml").read_text(encoding="utf-8") for kind in KINDS)
+    assert one.partition("\n")[2] == other.partition("\n")[2]  # but for the first line, which says what it is from
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("rigs", "cameras"), [(2, 1), (1, 2)])
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [
+        ("SIMPLE_PINHOLE", [1280.0, 520.0, 380.0]),
+        ("PINHOLE", [1280.0, 1275.0, 520.0, 380.0]),
+        ("SIMPLE_RADIAL", [1280.0, 520.0, 380.0, 0.05]),
+        ("RADIAL", [1280.0, 520.0, 380.0, 0.05, -0.02]),
+        ("OPENCV", [1280.0, 1275.0, 520.0, 380.0, 0.05, -0.02, 0.001, -0.002]),
+        ("FULL_OPENCV", [1280.0, 1275.0, 520.0, 380.0, 0.05, -0.02, 0.001, -0.002, 0.01, 0.0, 0.0, 0.0]),
+    ],
+)
+def test_what_pycolmap_writes_fits_without_residuals(
+    tmp_path: Path, kind: str, rigs: int, cameras: int, model: str, parameters: list[float]
+) -> None:
+    import pycolmap
+
+    options = pycolmap.SyntheticDatasetOptions()
+    options.num_rigs, options.num_cameras_per_rig, options.num_frames_per_rig = rigs, cameras, 4
+    options.num_points3D, options.num_points2D_without_point3D = 40, 5
+    options.camera_model_id, options.camera_params = getattr(pycolmap.CameraModelId, model), parameters
+    synthetic = pycolmap.synthesize_dataset(options)
+    (tmp_path / "model").mkdir()
+    (synthetic.write_text if kind == "text" else synthetic.write_binary)(tmp_path / "model")
+    assert convert(tmp_path / "model", tmp_path / "block", "-q") == 0
+    found = photostrip.run(tmp_path / "block" / "project.yaml").document
+    assert found["bundle"]["sigma0"] < 1e-3  # of 0.5 px
+    at = {each["id"]: [each[name] for name in "xyz"] for each in found["photos"]}
+    for image in synthetic.images.values():
+        assert at[image.name] == pytest.approx(image.projection_center(), abs=1e-3)
+    assert len(found["points"]) == 40
+
+
+# -------------------------------------------------------------------------------------------- what is understood
+
+
+def test_what_was_understood_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = simulated(tmp_path / "native")
+    assert convert(model.write_text(tmp_path / "model"), tmp_path / "block") == 0
+    captured = capsys.readouterr()
+    assert "COLMAP model (text): 12 photos of 1 camera, " in captured.out
+    assert "5500 x 3667 px, f 3666.67 px, principal point +10.00, -4.83 px from the middle, y up" in captured.out
+    assert "standard deviation 0.5 px; a pixel is taken as 1 µm" in captured.out
+    assert captured.err.startswith("wrote observations.csv, orientations.csv, project.yaml to")
+
+
+def test_what_determines_nothing_is_left_out_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = simulated(tmp_path / "native")
+    _, quaternion, shift, camera, name, xy, points = model.images[0]
+    points[1] = points[0]  # twice on this photo
+    points[2] = -1  # a keypoint without a point
+    points[3] = 10**12  # on one photo only
+    model.images += [(1000, quaternion, shift, camera, 'empty, "quoted".jpg', xy[:0], [])]
+    assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block") == 0
+    assert (
+        "1 point of a photo that stand on it twice: nothing says which is right; 1 point on one photo only; "
+        '1 photo without points: empty, "quoted".jpg'
+    ) in capsys.readouterr().out
+    rows = (tmp_path / "block" / "observations.csv").read_text(encoding="utf-8").splitlines()
+    assert sum(row.startswith(name + ",") for row in rows) == len(points) - 4
+    assert check_project(tmp_path / "block" / "project.yaml").faults == ()
+
+
+def test_names_of_any_kind_are_ids(tmp_path: Path) -> None:
+    model = simulated(tmp_path / "native")
+    names = [
+        "0123",
+        "a,b",
+        'say "x".jpg',
+        "NO",
+        "1:20",
+        "# no comment",
+        "x" * 300,
+        "Фото",
+        "日本/1 2.tif",
+        "-1",
+        "~",
+        "a'b",
+    ]
+    model.images = [(*each[:4], name, *each[5:]) for each, name in zip(model.images, names, strict=True)]
+    for kind in KINDS:
+        assert convert(model.write(tmp_path / kind, kind), tmp_path / kind / "block", "-q") == 0
+        checked = check_project(tmp_path / kind / "block" / "project.yaml")
+        assert (checked.faults, checked.notes) == ((), ())
+    found = photostrip.run(tmp_path / "text" / "block" / "project.yaml")
+    assert sorted(each["id"] for each in found.document["photos"]) == sorted(names)
+
+
+# ----------------------------------------------------------------------------------------------------- refusals
+
+
+def test_what_the_files_do_not_carry_is_asked_for_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = simulated(tmp_path / "native").write_text(tmp_path / "model")
+    assert main(["convert", str(source), "-o", str(tmp_path / "block")]) == 2
+    assert "the files do not say how precise an image coordinate is; give --sigma PX" in capsys.readouterr().err
+    assert "--sigma: 0 px is no length" in refused(capsys, source, tmp_path / "block", "--sigma", "0")
+    assert "--pixel-size: nan mm is no length" in refused(capsys, source, tmp_path / "block", "--pixel-size", "nan")
+
+
+def test_nothing_is_overwritten_without_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = simulated(tmp_path / "native").write_text(tmp_path / "model")
+    before = (tmp_path / "native" / "project.yaml").read_bytes()
+    assert convert(source, tmp_path / "native") == 2
+    assert "project.yaml: already exists and is not overwritten" in capsys.readouterr().err
+    assert (tmp_path / "native" / "project.yaml").read_bytes() == before
+    assert convert(source, tmp_path / "native", "--force", "-q") == 0
+    assert (tmp_path / "native" / "project.yaml").read_bytes() != before
+
+
+def test_a_folder_that_is_no_model_names_one_inside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    simulated(tmp_path / "native").write_text(tmp_path / "colmap" / "sparse" / "0")
+    told = refused(capsys, tmp_path / "colmap", tmp_path / "block")
+    assert "is no model of COLMAP: it has no cameras.bin or cameras.txt" in told
+    assert f"did you mean `{tmp_path / 'colmap' / 'sparse' / '0'}`?" in told
+    assert "is no model of COLMAP" in refused(capsys, tmp_path / "nowhere", tmp_path / "block")
+
+
+IMAGE = "1 1 0 0 0 0 0 9 1 a.jpg"
+TEXTS: dict[str, tuple[str, str, str]] = {  # cameras, images, what is told
+    "model": ("1 OPENCV_FISHEYE 9 9 9 9 5 5 0 0 0 0", "", "cameras.txt:1: the model OPENCV_FISHEYE has no counterpart"),
+    "unknown": ("1 LENS 9 9 9 9 5 5 0 0 0 0", "", "cameras.txt:1: the model LENS has no counterpart"),
+    "rational": ("1 FULL_OPENCV 9 9 9 9 5 5 0 0 0 0 0 0.1 0 0", "", "cameras.txt:1: the coefficient k4 of"),
+    "folded": ("1 RADIAL 99 99 9 50 50 -1 0.01", "", "cameras.txt:1: camera RADIAL: the distortion has no inverse"),
+    "count": ("# c\n1 RADIAL 9 9 9 5 5 0", "", "cameras.txt:2: 4 parameters of the model RADIAL; expected 5: f, cx"),
+    "short": ("1 RADIAL 9 9", "", "cameras.txt:1: 4 values in the line"),
+    "number": ("1 PINHOLE 9 9 9 9 5 five", "", "cameras.txt:1: `five` is no number of camera 1"),
+    "nan": ("1 PINHOLE 9 9 9 9 5 nan", "", "cameras.txt:1: `nan` is no number of camera 1"),
+    "focal": ("1 PINHOLE 9 9 9 -9 5 5", "", "cameras.txt:1: width, height and focal length are not above 0"),
+    "twice": ("1 PINHOLE 9 9 9 9 5 5\n1 PINHOLE 9 9 9 9 5 5", "", "cameras.txt:2: camera 1 is already given"),
+    "id": ("x PINHOLE 9 9 9 9 5 5", "", "cameras.txt:1: `x` is no id of a camera"),
+    "image": ("", "1 1 0 0 0 0 0 9 1", "images.txt:1: 9 values in the line"),
+    "pose": ("", "1 1 0 0 0 0 inf 9 1 a.jpg\n", "images.txt:1: `inf` is no number of the pose of image 1"),
+    "zero": ("", "1 0 0 0 0 0 0 9 1 a.jpg\n", "images.txt:1: the quaternion of its pose is 0"),
+    "owner": ("", "1 1 0 0 0 0 0 9 2 a.jpg\n1 1 1\n", "images.txt:1: there is no camera 2"),
+    "again": ("", f"{IMAGE}\n\n1{IMAGE[1:]}\n\n", "images.txt:3: image 1 is already given"),
+    "names": ("", f"{IMAGE}\n\n2{IMAGE[1:]}\n\n", "images.txt:3: an image called a.jpg is already given"),
+    "rays": ("", f"{IMAGE}\n1 2 3 4\n", "images.txt:2: 4 values in the points of image 1"),
+    "point": ("", f"{IMAGE}\n1 2 3.5\n", "images.txt:2: an id of a point of image 1 is no id"),
+    "far": ("", f"{IMAGE}\n1 1e300 3\n", "images.txt:2: `1e300` is no number of the points of image 1"),
+    "nothing": ("", f"{IMAGE}\n1 2 3\n", "images.txt: no point stands on two photos"),
+    "comments": ("", "# nothing\n", "images.txt: no point stands on two photos"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_faults_of_a_text_have_their_line(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    cameras, images, told = TEXTS[name]
+    (tmp_path / "cameras.txt").write_text((cameras or "1 PINHOLE 9 9 9 9 5 5") + "\n", encoding="utf-8")
+    (tmp_path / "images.txt").write_text(images or f"{IMAGE}\n\n", encoding="utf-8")
+    assert told in refused(capsys, tmp_path, tmp_path / "block")
+
+
+BYTES: dict[str, tuple[Any, str]] = {  # what is done to the bytes of images.bin, what is told
+    "count": (lambda data: struct.pack("<Q", 10**18) + data[8:], f"the head: ends within its {10**18} records"),
+    "points": (lambda data: data.replace(b"JPG\0", b"JPG\0" + struct.pack("<Q", 2**62), 1),
+               f"image 1 of 12: ends within its {2**62} points"),
+    "end": (lambda data: data[:-5], "image 12 of 12: ends within its"),
+    "more": (lambda data: data + b"12345", "5 bytes follow the last of its 12 images"),
+    "empty": (lambda _: b"", "is empty"),
+    "text": (lambda _: b"# Image list\n1 0 0", "the head: ends within its"),
+    "name": (lambda data: data.replace(b"JPG\0", b"\xff\xfe\xff\0", 1), "image 1 of 12: its name is not UTF-8 text"),
+    "nan": (lambda data: data[:12] + struct.pack("<d", np.nan) + data[20:], "image 1 of 12: its pose holds what is no"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BYTES)
+def test_faults_of_a_binary_model_have_their_record(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change, told = BYTES[name]
+    path = simulated(tmp_path / "native").write_binary(tmp_path / "model") / "images.bin"
+    path.write_bytes(change(path.read_bytes()))
+    assert f"images.bin: {told}" in refused(capsys, tmp_path / "model", tmp_path / "block")
+
+
+def test_a_binary_model_that_is_called_a_text_is_no_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = simulated(tmp_path / "native").write_binary(tmp_path / "model")
+    for path in list(folder.iterdir()):
+        path.rename(path.with_suffix(".txt"))
+    assert "cameras.txt: is not text: it has NUL bytes" in refused(capsys, folder, tmp_path / "block")
+
+
+def test_unknown_models_of_a_binary_file_are_refused_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = replace(simulated(tmp_path / "native"), cameras={4: ("FOV", 9, 9, OPENCV[:5])}).write_binary(tmp_path)
+    assert "cameras.bin: camera 1 of 1: the model FOV has no counterpart" in refused(capsys, folder, tmp_path / "block")
+
+
+def test_texts_of_other_systems_are_the_same(tmp_path: Path) -> None:
+    folder = simulated(tmp_path / "native").write_text(tmp_path / "model")
+    assert convert(folder, tmp_path / "one", "-q") == 0
+    for path in folder.iterdir():
+        path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b" \r\n"))
+    assert convert(folder, tmp_path / "other", "-q") == 0
+    for name in ("observations.csv", "orientations.csv"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
+
+
+def test_a_camera_for_each_photo(tmp_path: Path) -> None:
+    model = simulated(tmp_path / "native")
+    model.cameras = dict.fromkeys(range(7, 7 + len(model.images)), ("OPENCV", 5500, 3667, OPENCV))
+    model.images = [(*each[:3], 7 + number, *each[4:]) for number, each in enumerate(model.images)]
+    assert convert(model.write_binary(tmp_path / "model"), tmp_path / "block", "-q") == 0
+    found = photostrip.run(with_control(tmp_path / "native", tmp_path / "block"))
+    assert found.document["verdict"]["look_at"] == []
+    assert len(found.document["photos"]) == len(model.images)
+
+
+def test_a_file_of_a_model_names_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = simulated(tmp_path / "native").write_binary(tmp_path / "model")
+    assert f"did you mean `{folder}`?" in refused(capsys, folder / "images.bin", tmp_path / "block")
