@@ -1,4 +1,4 @@
-"""Files of another program as a project in a folder."""
+"""Files of another program as a project in a folder, and a result as files for other programs."""
 
 from __future__ import annotations
 
@@ -9,11 +9,15 @@ from pathlib import Path
 from photostrip.errors import Fault, InputError
 from photostrip.foreign import colmap
 from photostrip.foreign.control import Asked, with_control
+from photostrip.foreign.exports import exported
 from photostrip.foreign.project import Wanted, project_files, understood
+from photostrip.formats.output.result_json import read_result
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.writing import write_files
 from photostrip.project.template import refuse_existing
+
+RESULT = "result.json"
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,22 @@ def converted(source: Path, output: Path, options: Options, *, force: bool) -> t
     width = max(map(len, said))
     lines = [f"{name:<{width}}  {text}" for name, text in said.items()]
     return lines, f"wrote {', '.join(files)} to {output}; next: photostrip check {output / 'project.yaml'}"
+
+
+def is_result(source: Path) -> bool:
+    """Tell a result, by its file or by the folder of a run, from what is to become a project."""
+    return source.suffix == ".json" or (source / RESULT).is_file()
+
+
+def written_for_others(source: Path, target: str, form: str, *, force: bool) -> list[str]:
+    """Write a result in the form of another program, all of its files or none; say what is in them."""
+    file = source / RESULT if source.is_dir() else source
+    place = Path(target)
+    found = exported(read_result(str(file)), [place.name + ("/" if target.endswith("/") else "")], form)
+    if not force and any("/" in name for name in found.files):
+        refuse_existing(place.parent, list(found.files))
+    write_files(place.parent, found.files, [file])
+    return found.said
 
 
 def _faults(options: Options) -> Iterator[Fault]:

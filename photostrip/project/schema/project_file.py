@@ -6,6 +6,7 @@ from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.plausibility import KINDS
 from photostrip.project.schema.cameras import Camera, Photos, PixelCamera, Strip
+from photostrip.project.schema.exports import ENDINGS, export
 from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
 from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
 from photostrip.project.schema.processing import Processing
@@ -31,6 +32,9 @@ def _finding(value: object) -> str:
 
 
 Accepted = Annotated[str, Read(_finding, {"type": "string", "pattern": "^P[0-9]{3}(/.+)?$"})]
+
+
+Exported = Annotated[str, Read(export, {"type": "string"})]
 
 
 class Tolerances(Section):
@@ -74,6 +78,11 @@ class ProjectFile(Section):
     output: Output = key("Frame and angles of the results", Output())
     processing: Processing = key("What is computed and how", Processing())
     tolerances: Tolerances = key("Largest allowed values; where one is exceeded the exit code is 1", Tolerances())
+    export: list[Exported] = key(
+        "Files for other programs that each run with -o writes beside its result, by their ending: "
+        + ", ".join(f"`{ending}` {name}" for name, ending in ENDINGS.items()),
+        [],
+    )
     accept: list[Accepted] = key(
         "Findings that were looked at and are accepted: codes, or `code/id` for one photo, point or strip",
         [],
