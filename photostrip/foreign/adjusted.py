@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from photostrip.notes import Document
 from photostrip.strip.image_coordinates import lens_distortion
 from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera, in_pixels
 
+WHOLE = 1e-6  # of a pixel, up to which rounding may make a photo larger
 GRID = 21  # lines of points in which the nearest camera of another program is sought
 
 
@@ -40,8 +42,14 @@ class Rays(NamedTuple):
 class FileCamera:
     """A camera as other programs have it."""
 
-    pixels: PixelCamera  # by the convention of COLMAP
+    pixels: PixelCamera  # by the convention of COLMAP; its size may end within a pixel
     departure: float  # largest distance in pixels from the camera of the result
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in whole pixels."""
+        width, height = (ceil(each - WHOLE) for each in self.pixels.image_size)
+        return width, height
 
     def image(self, xy: Floats) -> Floats:
         """Image points in pixels from the corner of the first one, y down, of ideal ones at distance 1, y up."""
@@ -257,7 +265,7 @@ def _in_file(camera: Camera, values: Floats, edge: Floats) -> FileCamera:
     lens, pixel = camera.distortion, camera.pixel_size or PIXEL_SIZE
     reach = edge * camera.principal_distance
     width, height = camera.format or (2.0 * reach + 2.0 * np.abs(camera.principal_point)).tolist()
-    size = float(np.ceil(width / pixel - 1e-6)), float(np.ceil(height / pixel - 1e-6))
+    size = width / pixel, height / pixel
     known = lens is None or (lens.direction == "ideal_to_image" and lens.model == "brown" and not any(lens.b))
     if known and not values.any():
         return FileCamera(in_pixels(camera, "colmap", size), 0.0)
@@ -290,7 +298,7 @@ def _nearest(camera: Camera, ideal: Floats, image: Floats, *, stretched: bool) -
     found[wanted] = np.linalg.lstsq(design, image.T.ravel(), rcond=None)[0]
     f, (x0, y0), k, p = found[PRINCIPAL_DISTANCE], -found[POINT], found[K], found[P]
     stretch, shear = camera.pixel_affinity
-    wide = found[AFFINE[0]] / f
+    wide = float(found[AFFINE[0]] / f)
     return replace(
         camera,
         principal_distance=float(f),

@@ -18,7 +18,7 @@ from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
 from photostrip.formats.text.writing import Content
-from photostrip.notes import counted
+from photostrip.notes import counted, named
 
 TO_COLMAP = np.diag([1.0, -1.0, -1.0])  # image axes there: x to the right, y down, z ahead
 PARAMETERS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
@@ -35,6 +35,9 @@ def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, Content],
     if block.document["adjustment"] != "bundle" and len(block.document["strips"]) > 1:
         message = "strips adjusted each by itself have points of their own, where COLMAP has one for all"
         raise InputError(Fault(message, "export", fix="run with --set processing.adjustment=bundle"))
+    if blank := [each["id"] for each in block.photos if len(each["id"].split()) > 1]:
+        message = f"COLMAP ends the name of a photo at its first blank: {named('photo', blank)}"
+        raise InputError(Fault(message, "export", fix="call the photos otherwise"))
     frame, shift, axes = _frame(block)
     numbers = _numbers([each["id"] for each in block.points])
     comment = f"# {frame}\n"
@@ -81,8 +84,7 @@ def _cameras(block: Adjusted) -> Iterator[str]:
         kept = PARAMETERS if pixels.distortion.get("k3") else PARAMETERS[:4]
         model = "FULL_OPENCV" if len(kept) > 4 else "OPENCV"
         values = (*pixels.focal_length, *pixels.principal_point, *(pixels.distortion.get(each, 0.0) for each in kept))
-        width, height = pixels.image_size
-        yield f"{number} {model} {width:.0f} {height:.0f} {' '.join(map(repr, values))}\n"
+        yield f"{number} {model} {camera.size[0]} {camera.size[1]} {' '.join(repr(float(each)) for each in values)}\n"
 
 
 def _images(block: Adjusted, numbers: list[int], shift: Floats, axes: Floats) -> Iterator[str]:

@@ -13,8 +13,7 @@ import sqlite3
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,8 +47,7 @@ ARC = np.linspace(0.0, 2.0 * np.pi, 37)  # of an ellipse
 SHARE = 1 / 40  # of the block's extent that the largest drawn difference has, at most
 
 
-@dataclass(frozen=True)
-class Layer:
+class Layer(NamedTuple):
     name: str
     kind: int
     places: Sequence[Floats]  # of each record (k, 3): x to the east, y to the north, height
@@ -75,23 +73,43 @@ def _layers(block: Adjusted) -> Iterator[Layer]:
     places, centers = _on_map(block, block.xyz, block.enu), _on_map(block, block.centers, block.enu_centers)
     axes = block.document["frame"]["axes"]
     of_points = [_of_point(each, axes) for each in block.points]
-    yield Layer("points", POINT, list(places[:, None]), of_points, "adjusted points, standard deviations in metres")
+    yield Layer(
+        name="points",
+        kind=POINT,
+        places=list(places[:, None]),
+        records=of_points,
+        description="adjusted points, standard deviations in metres",
+    )
     row_of = {each["id"]: row for row, each in enumerate(block.points)}
     given = [each for each in block.document["control"] if each["id"] in row_of]
     rows = np.array([row_of[each["id"]] for each in given], np.intp)
     for role in ("control", "check"):
         some = [number for number, each in enumerate(given) if each["role"] == role]
         records = [_of_given(given[number], axes) for number in some]
-        yield Layer(role, POINT, list(places[rows[some]][:, None]), records, "differences adjusted minus given, metres")
+        yield Layer(
+            name=role,
+            kind=POINT,
+            places=list(places[rows[some]][:, None]),
+            records=records,
+            description="differences adjusted minus given, metres",
+        )
+    of_photos = [_of_photo(each, axes) for each in block.photos]
     yield Layer(
-        "photos", POINT, list(centers[:, None]), [_of_photo(each, axes) for each in block.photos], "perspective centres"
+        name="photos", kind=POINT, places=list(centers[:, None]), records=of_photos, description="perspective centres"
     )
     prints = [_footprint(block, number) for number in range(len(block.photos))]
     seen = [number for number, each in enumerate(prints) if each is not None]
     records = [{"id": block.photos[number]["id"], "strip": block.photos[number]["strip"]} for number in seen]
     ground = "photos on the planes through their adjusted points"
-    yield Layer("footprints", POLYGON, [each for each in prints if each is not None], records, ground)
-    yield _vectors(block, given, rows)
+    yield Layer(
+        name="footprints",
+        kind=POLYGON,
+        places=[each for each in prints if each is not None],
+        records=records,
+        description=ground,
+    )
+    known = [number for number, each in enumerate(given) if each["plan"] is not None]
+    yield _vectors(block, [given[number] for number in known], rows[known])
     yield _ellipses(block)
 
 
@@ -164,7 +182,13 @@ def _vectors(block: Adjusted, given: Sequence[Document], rows: Numbers) -> Layer
     moved = block.xyz[rows] + factor * np.einsum("nij,ni->nj", level, differences)
     lines = np.stack([_on_map(block, block.xyz[rows], block.enu[rows]), _on_map(block, moved)], axis=1)
     records = [_columns(each, ("id", "role", "plan", "height")) for each in given]
-    return Layer("error_vectors", LINE, list(lines), records, f"adjusted minus given in plan, {factor:g} times as long")
+    return Layer(
+        name="error_vectors",
+        kind=LINE,
+        places=list(lines),
+        records=records,
+        description=f"adjusted minus given in plan, {factor:g} times as long",
+    )
 
 
 def _ellipses(block: Adjusted) -> Layer:
@@ -185,7 +209,13 @@ def _ellipses(block: Adjusted) -> Layer:
     rings += block.xyz[known][:, None]
     places = _on_map(block, rings.reshape(-1, 3)).reshape(len(known), -1, 3)
     records = [_columns(each, ("id", "role", "ellipse_a", "ellipse_b", "ellipse_azimuth_deg")) for each in points]
-    return Layer("error_ellipses", POLYGON, list(places), records, f"standard ellipses, {factor:g} times as large")
+    return Layer(
+        name="error_ellipses",
+        kind=POLYGON,
+        places=list(places),
+        records=records,
+        description=f"standard ellipses, {factor:g} times as large",
+    )
 
 
 def _factor(block: Adjusted, lengths: Floats) -> float:

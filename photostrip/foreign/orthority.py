@@ -82,10 +82,10 @@ def _cameras(block: Adjusted) -> str:
     found = []
     for name, camera in block.cameras.items():
         pixels = camera.pixels
-        (width, height), side = pixels.image_size, max(pixels.image_size)
+        (width, height), side = camera.size, max(camera.size)
         given = {
             "type": "brown" if any(pixels.distortion.values()) else "pinhole",
-            "im_size": [int(width), int(height)],
+            "im_size": [width, height],
             "focal_len": list(pixels.focal_length),
             "sensor_size": [width, height],
             "cx": (pixels.principal_point[0] - width / 2.0) / side,

@@ -78,13 +78,13 @@ class ProjectFile(Section):
     output: Output = key("Frame and angles of the results", Output())
     processing: Processing = key("What is computed and how", Processing())
     tolerances: Tolerances = key("Largest allowed values; where one is exceeded the exit code is 1", Tolerances())
+    accept: list[Accepted] = key(
+        "Findings that were looked at and are accepted: codes, or `code/id` for one photo, point or strip",
+        [],
+    )
     export: list[Exported] = key(
         "Files for other programs that each run with -o writes beside its result, by their ending: "
         + ", ".join(f"`{ending}` {name}" for name, ending in ENDINGS.items()),
-        [],
-    )
-    accept: list[Accepted] = key(
-        "Findings that were looked at and are accepted: codes, or `code/id` for one photo, point or strip",
         [],
     )
 
