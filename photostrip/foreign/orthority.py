@@ -19,6 +19,7 @@ from photostrip.formats.output import json_encoder
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.text.writing import Content
 from photostrip.geodesy.crs import map_entry
+from photostrip.geodesy.ground_frame import plural
 from photostrip.geometry.rotation import angles
 from photostrip.notes import counted
 
@@ -30,12 +31,16 @@ DISTORTION = ("k1", "k2", "p1", "p2", "k3")  # as OpenCV has them
 def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, Content], list[str]]:
     """Return the table with its reference system, and the cameras beside it; GeoJSON holds the system itself.
 
-    Raises InputError for a frame that is neither a map nor local: orthority has no counterpart.
+    Raises InputError for a frame that is neither a map nor local, and for a map in feet with heights in metres.
     """
     block.require_photos("orthority")
     if block.ground.kind not in {"projected", "local"}:
         message = f"orthority takes the coordinates of a map, and these are {block.ground.kind}"
         raise InputError(Fault(message, "export", fix="give output.crs of a map projection, as EPSG:32633"))
+    if block.ground.plan_factor != block.ground.height_factor:
+        message = f"orthority has one unit, and heights in {plural(block.ground.height_unit)} stand beside a plan in "
+        message += plural(block.ground.plan_unit)
+        raise InputError(Fault(message, "export", fix="give output.crs with a map in metres"))
     stem = str(PurePosixPath(target).with_suffix(""))
     turned = angles(block.level, "omega-phi-kappa")
     wkt = "" if block.ground.kind == "local" else map_entry(block.ground.spec).wkt

@@ -314,9 +314,12 @@ def test_orthority_has_every_orientation_and_the_departure_of_its_map_is_told(
         assert CRS.from_wkt((tmp_path / "ori.prj").read_text(encoding="utf-8")) == CRS(UTM)
 
 
-def test_geojson_of_orthority_says_the_same_as_its_table(block: Ran, tmp_path: Path) -> None:
+def test_geojson_of_orthority_says_the_same_as_its_table(
+    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     if block.document["frame"]["crs"] == "local":
-        pytest.skip("a local frame has no projection to name")
+        assert "has none; write CSV (.csv)" in refused(capsys, str(block), str(tmp_path / "ori.geojson"))
+        return
     for name in ("ori.csv", "ori.geojson"):
         assert main(["convert", str(block), str(tmp_path / name), "-q"]) == 0
     found = json.loads((tmp_path / "ori.geojson").read_text(encoding="utf-8"))
@@ -501,6 +504,10 @@ def test_orthority_takes_maps_only_and_colmap_one_place_for_each_point(
     found = ran(tmp_path / "a", "--set", "output.crs=geocentric", ground=GROUNDS["map"])
     said = refused(capsys, str(found), str(tmp_path / "a.csv"))
     assert "these are geocentric; give output.crs of a map projection" in said
+    feet = ["output.crs=EPSG:2225", "output.axes=[east,north,up]"]
+    found = ran(tmp_path / "c", *(word for each in feet for word in ("--set", each)),
+                ground={"crs": "EPSG:6339", "center_deg": [-122.0, 40.5]})  # fmt: skip
+    assert "heights in metres stand beside a plan in US survey feet" in refused(capsys, str(found), f"{tmp_path}/a.csv")
     found = ran(tmp_path / "b", "--set", "processing.adjustment=polynomial", flight={"photos": 6, "strips": 2},
                 control={"layout": "bands", "bands": 3, "check": 4})  # fmt: skip
     assert "processing.adjustment=bundle" in refused(capsys, str(found), f"{tmp_path}/m/")
