@@ -3,7 +3,7 @@
 Its frame is Cartesian: that of the result where it is local, else east, north, up at the middle of the block. Image
 points are the measured ones with all corrections that COLMAP's camera does not know (refraction, film) made.
 
-Source: colmap.github.io/format.html, cameras.html.
+Described by colmap.github.io/format.html, cameras.html.
 """
 
 from __future__ import annotations

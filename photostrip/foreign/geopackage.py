@@ -3,7 +3,7 @@
 Points, control, check points and photos lie where the result has them, footprints where the corners of a photo meet the
 plane through its points; differences in plan and standard error ellipses are drawn larger, as their layers say.
 
-Source: OGC 12-128r19.
+Described by OGC 12-128r19.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Both hold the coordinates of a map and omega, phi, kappa along its axes; who uses them takes the map for Cartesian.
 Cameras are those of OpenSfM: a principal point in parts of the larger side, from the middle.
 
-Source: orthority.readthedocs.io, file formats: CSV, exterior and interior parameter files.
+Described by orthority.readthedocs.io, file formats: CSV, exterior and interior parameter files.
 """
 
 from __future__ import annotations
