@@ -159,7 +159,7 @@ def _footprint(block: Adjusted, number: int) -> Floats | None:
         return None
     middle = points.mean(axis=0)
     center, turned = block.centers[number], block.rotations[number]
-    normal = np.linalg.svd(points - middle)[2][2]
+    normal = np.linalg.svd(points - middle, full_matrices=False)[2][2]
     directions = np.column_stack([corners, -np.ones(len(corners))]) @ turned.T
     with np.errstate(divide="ignore", invalid="ignore"):
         along = (middle - center) @ normal / (directions @ normal)

@@ -482,6 +482,9 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_written(
     assert list(tmp_path.iterdir()) == []
     assert main(["convert", source, model, "-q"]) == 0
     assert "already exists" in refused(capsys, source, model)
+    before = (block.folder / "photos.csv").read_bytes()
+    assert "would replace it" in refused(capsys, source, str(block.folder / "photos.csv"))
+    assert (block.folder / "photos.csv").read_bytes() == before
     assert main(["convert", source, model, "-q", "--force"]) == 0
     assert main(["convert", source, str(tmp_path / "table.txt"), "--to", "orthority", "-q"]) == 0
     assert len(table(tmp_path / "table.txt")) == len(block.document["photos"])
@@ -494,6 +497,9 @@ def test_independent_models_have_points_but_no_orientations(tmp_path: Path, caps
     layers = [name for name, _ in pyogrio.list_layers(tmp_path / "a.gpkg")]
     assert layers[:2] == ["points", "control"]
     assert "photos" not in layers
+    options = ["--set", "export=[points.gpkg,a/]"]
+    assert main(["check", str(tmp_path / "project" / "project.yaml"), *options]) == 2
+    assert "no orientation of photos, which a/ is made of" in capsys.readouterr().out
     for name in ("a.csv", "a/"):
         assert "no orientation of photos" in refused(capsys, str(tmp_path / "run"), f"{tmp_path}/{name}")
 

@@ -15,6 +15,7 @@ from photostrip.formats.output.result_json import read_result
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.writing import write_files
+from photostrip.project.schema.exports import TABLES
 from photostrip.project.template import refuse_existing
 
 RESULT = "result.json"
@@ -70,10 +71,12 @@ def written_for_others(source: Path, target: str, form: str, *, force: bool) -> 
     """Write a result in the form of another program, all of its files or none; say what is in them."""
     file = source / RESULT if source.is_dir() else source
     place = Path(target)
+    if place.name in {"", ".."}:  # `./`, whose own name is needed
+        place = place.resolve()
     found = exported(read_result(str(file)), [place.name + ("/" if target.endswith("/") else "")], form)
     if not force and any("/" in name for name in found.files):
         refuse_existing(place.parent, list(found.files))
-    write_files(place.parent, found.files, [file])
+    write_files(place.parent, found.files, [file, *(file.parent / f"{name}.csv" for name in TABLES)])
     return found.said
 
 

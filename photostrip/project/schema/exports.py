@@ -9,7 +9,8 @@ from photostrip.formats.text.numbers import shown
 from photostrip.project.schema.sections import wrong
 from photostrip.project.schema.values import Text, text
 
-ENDINGS = {"geopackage": ".gpkg", "orthority": ".csv", "orthority-geojson": ".geojson", "colmap": "/"}
+GEOPACKAGE = "geopackage"
+ENDINGS = {GEOPACKAGE: ".gpkg", "orthority": ".csv", "orthority-geojson": ".geojson", "colmap": "/"}
 """What a result is written as, and the ending that asks for it; that of a folder is ``/``."""
 TABLES = ("points", "photos", "residuals", "parallaxes", "rejected", "refined", "reliability", "links")  # of a run
 
