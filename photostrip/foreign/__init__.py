@@ -4,5 +4,5 @@ Comes in: a path, or the content of result.json. ``colmap`` reads models of COLM
 marks beside it. What is handed on is a ``tables.ForeignBlock``; ``project`` writes it as a project and says what was
 understood. A run knows nothing of other programs' files. ``adjusted`` takes out of a result what other programs need,
 ``exports`` makes their files: ``geopackage`` layers on a map, ``orthority`` orientations for orthophotos,
-``colmap_model`` a model of COLMAP.
+``colmap_model`` a model of COLMAP, ``cameras`` a block of a project.
 """

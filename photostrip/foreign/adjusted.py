@@ -42,7 +42,9 @@ class Rays(NamedTuple):
 class FileCamera:
     """A camera as other programs have it."""
 
-    pixels: PixelCamera  # by the convention of COLMAP; its size may end within a pixel
+    own: Camera  # with the calibration that was found
+    nearest: Camera  # whose distortion is one that other programs know
+    pixels: PixelCamera  # the nearest by the convention of COLMAP; its size may end within a pixel
     departure: float  # largest distance in pixels from the camera of the result
 
     @property
@@ -268,7 +270,7 @@ def _in_file(camera: Camera, values: Floats, edge: Floats) -> FileCamera:
     size = width / pixel, height / pixel
     known = lens is None or (lens.direction == "ideal_to_image" and lens.model == "brown" and not any(lens.b))
     if known and not values.any():
-        return FileCamera(in_pixels(camera, "colmap", size), 0.0)
+        return FileCamera(own=camera, nearest=camera, pixels=in_pixels(camera, "colmap", size), departure=0.0)
     x, y = (np.linspace(-each, each, GRID) for each in reach)
     given = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     if lens is not None:
@@ -278,7 +280,8 @@ def _in_file(camera: Camera, values: Floats, edge: Floats) -> FileCamera:
     ideal /= camera.principal_distance + values[PRINCIPAL_DISTANCE]
     image = (given if lens is None else lens_distortion.image_from_ideal(given, lens)) + camera.principal_point
     nearest = _nearest(camera, ideal, image, stretched=bool(values[AFFINE].any() or (lens and any(lens.b))))
-    found = FileCamera(in_pixels(nearest, "colmap", size), 0.0)
+    own, pixels = nearest if values.any() else camera, in_pixels(nearest, "colmap", size)
+    found = FileCamera(own=own, nearest=nearest, pixels=pixels, departure=0.0)
     stretch, shear = camera.pixel_affinity
     u, v = ((1.0 + stretch) * image[:, 0] + shear * image[:, 1]) / pixel, -image[:, 1] / pixel
     true = np.stack([u, v], axis=-1) + np.array(size) / 2.0

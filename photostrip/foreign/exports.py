@@ -7,17 +7,19 @@ from pathlib import PurePath
 from typing import NamedTuple
 
 from photostrip.errors import Fault, InputError
-from photostrip.foreign import colmap_model, geopackage, orthority
+from photostrip.foreign import cameras, colmap_model, geopackage, orthority
 from photostrip.foreign.adjusted import adjusted
 from photostrip.formats.text.writing import Content
 from photostrip.notes import Document
 from photostrip.project.schema.exports import ENDINGS, form_of
+from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS
 
 WRITERS = {
     "geopackage": geopackage.write,
     "orthority": orthority.write,
     "orthority-geojson": orthority.write,
     "colmap": colmap_model.write,
+    **dict.fromkeys(("cameras", *(f"cameras-{each}" for each in CONVENTIONS)), cameras.write),
 }
 
 

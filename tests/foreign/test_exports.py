@@ -391,6 +391,28 @@ def test_a_calibration_that_was_found_is_in_the_cameras(tmp_path: Path, capsys: 
     assert off_the_measured(found, tmp_path / "model") < told + 0.01
 
 
+def test_cameras_go_into_a_project_again_with_their_calibration(tmp_path: Path) -> None:
+    photostrip.simulate(SPEC).write(tmp_path)
+    project = tmp_path / "project.yaml"
+    text = project.read_text(encoding="utf-8")
+    wrong = text.replace("principal_point: [0.024, -0.012]", "principal_point: [0.031, -0.02]").replace("-0.0002", "0")
+    project.write_text(wrong, encoding="utf-8")
+    names = [f"c.{each}.yaml" for each in ("opencv", "colmap", "metashape", "opensfm", "pix4d")] + ["c.yaml"]
+    asked = {"processing": {"self_calibration": ["principal_point", "k1"]}}
+    calibrated = photostrip.run(project, export=names, **asked)
+    calibrated.write(tmp_path / "run")
+    block = re.search(r"cameras:\n(?: .*\n)+", wrong)
+    assert block is not None
+    xyz = np.stack([calibrated.points[axis] for axis in "xyz"], axis=-1)
+    for name in names:
+        cameras = (tmp_path / "run" / name).read_text(encoding="utf-8")
+        assert "# camera fc, k1: +0.0002" in cameras
+        project.write_text(wrong.replace(block[0], cameras), encoding="utf-8")
+        again = photostrip.run(project)
+        assert np.stack([again.points[axis] for axis in "xyz"], axis=-1) == pytest.approx(xyz, abs=1e-3), name
+        assert again.summary["image_rms_um"] == pytest.approx(calibrated.summary["image_rms_um"], abs=0.01)
+
+
 def off_the_measured(found: Ran, model: Path) -> float:
     """Give the largest distance of the rays of a model from what was measured, in pixels."""
     measured, largest = measured_image_points(found.folder.parent), 0.0
@@ -453,10 +475,10 @@ def test_a_run_writes_what_its_project_asks_for_and_a_saved_result_gives_the_sam
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("a.shp", "geopackage (.gpkg), orthority (.csv), orthority-geojson (.geojson), colmap (/)"),
+        ("a.shp", "geopackage (.gpkg), orthority (.csv), orthority-geojson (.geojson), colmap (/), "),
         ("../a.gpkg", "does not lie in the folder of the run"),
         ("/a.gpkg", "does not lie in the folder of the run"),
-        ("photos.csv", "is a table of the result itself; write orthority-photos.csv"),
+        ("photos.csv", "is a file of the result itself; write other-photos.csv"),
     ],
 )
 def test_a_wrong_name_in_a_project_is_refused_before_anything_is_computed(

@@ -19,7 +19,9 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ],
     target: Annotated[
         str | None,
-        typer.Argument(metavar="FILE", help="What to write a result into: .gpkg, .csv, .geojson, or a folder, MODEL/."),
+        typer.Argument(
+            metavar="FILE", help="What to write a result into: .gpkg, .csv, .geojson, .yaml, or a folder, MODEL/."
+        ),
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder to write the project into.")
@@ -62,7 +64,8 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     understood: counts, cameras, one photo, frame, units. What the files do not carry is asked for by the name of an
     option, and never guessed.
 
-    Where SOURCE is a result, it is written into FILE: GeoPackage, tables of orthority (CSV, GeoJSON), a COLMAP model.
+    Where SOURCE is a result, it is written into FILE: GeoPackage, tables of orthority (CSV, GeoJSON), cameras
+    (.yaml; .opencv.yaml and its kin in pixels), a COLMAP model.
     """
     from photostrip.cli.jobs.convert import Options, converted, is_result, written_for_others
 

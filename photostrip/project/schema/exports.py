@@ -8,9 +8,11 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.text.numbers import shown
 from photostrip.project.schema.sections import wrong
 from photostrip.project.schema.values import Text, text
+from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS
 
 GEOPACKAGE = "geopackage"
 ENDINGS = {GEOPACKAGE: ".gpkg", "orthority": ".csv", "orthority-geojson": ".geojson", "colmap": "/"}
+ENDINGS |= {f"cameras-{each}": f".{each}.yaml" for each in CONVENTIONS} | {"cameras": ".yaml"}
 """What a result is written as, and the ending that asks for it; that of a folder is ``/``."""
 TABLES = ("points", "photos", "residuals", "parallaxes", "rejected", "refined", "reliability", "links")  # of a run
 
@@ -40,7 +42,7 @@ def export(value: object) -> Text:
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or name == "/":
         raise wrong(f"`{shown(name)}` does not lie in the folder of the run", code="export", expected="a name")
-    if form == "orthority" and str(path) in {f"{table}.csv" for table in TABLES}:
-        message = f"{name} is a table of the result itself"
-        raise wrong(message, code="export", fix=f"write orthority-{name}")
+    if name == "project.resolved.yaml" or (form == "orthority" and str(path) in {f"{table}.csv" for table in TABLES}):
+        message = f"{name} is a file of the result itself"
+        raise wrong(message, code="export", fix=f"write other-{name}")
     return name
