@@ -11,14 +11,13 @@ from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
 from photostrip.foreign.project import camera_in_pixels
-from photostrip.formats.text.writing import Content
 from photostrip.notes import Document
 from photostrip.project.resolved import lines_of
 from photostrip.project.schema.values import Text
 from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, in_pixels
 
 
-def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, Content], list[str]]:
+def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | bytes], list[str]]:
     """Return the block, for a project or, by the convention in the name of the form, for another program.
 
     Raises InputError for pixels that are no squares, in millimetres, and for what a convention does not know.

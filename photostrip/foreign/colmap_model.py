@@ -17,7 +17,6 @@ from scipy.spatial.transform import Rotation
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
-from photostrip.formats.text.writing import Content
 from photostrip.notes import counted, named
 
 TO_COLMAP = np.diag([1.0, -1.0, -1.0])  # image axes there: x to the right, y down, z ahead
@@ -25,7 +24,7 @@ PARAMETERS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 OWN = re.compile(r"colmap-(\d{1,15})")  # ids that were made from COLMAP's
 
 
-def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, Content], list[str]]:
+def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, str | bytes], list[str]]:
     """Return the files of a model, and what is in them.
 
     Raises InputError where strips were adjusted each by itself: a point on two of them has no one position that its
@@ -41,7 +40,7 @@ def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, Content],
     frame, shift, axes = _frame(block)
     numbers = _numbers([each["id"] for each in block.points])
     comment = f"# {frame}\n"
-    files: dict[str, Content] = {
+    files: dict[str, str | bytes] = {
         f"{target}cameras.txt": comment + "".join(_cameras(block)),
         f"{target}images.txt": comment + "".join(_images(block, numbers, shift, axes)),
         f"{target}points3D.txt": comment + "".join(_points(block, numbers, shift, axes)),

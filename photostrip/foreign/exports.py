@@ -9,7 +9,6 @@ from typing import NamedTuple
 from photostrip.errors import Fault, InputError
 from photostrip.foreign import cameras, colmap_model, geopackage, orthority
 from photostrip.foreign.adjusted import adjusted
-from photostrip.formats.text.writing import Content
 from photostrip.notes import Document
 from photostrip.project.schema.exports import ENDINGS, form_of
 from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS
@@ -26,7 +25,7 @@ WRITERS = {
 class Exported(NamedTuple):
     """Files that are still to be written, by their place in a folder, and what is said about them."""
 
-    files: dict[str, Content]
+    files: dict[str, str | bytes]
     said: list[str]
 
 

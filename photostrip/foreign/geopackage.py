@@ -19,7 +19,6 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.foreign.adjusted import Adjusted, coordinates
-from photostrip.formats.text.writing import Content
 from photostrip.geodesy.crs import map_entry
 from photostrip.notes import Document, counted
 
@@ -55,7 +54,7 @@ class Layer(NamedTuple):
     description: str
 
 
-def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, Content], list[str]]:
+def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, str | bytes], list[str]]:
     """Return a GeoPackage, the same bytes for the same result, and what is in it."""
     layers = [each for each in _layers(block) if each.records]
     with closing(sqlite3.connect(":memory:")) as base:

@@ -17,7 +17,6 @@ from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
 from photostrip.formats.output import json_encoder
 from photostrip.formats.output.csv_text import to_csv
-from photostrip.formats.text.writing import Content
 from photostrip.geodesy.crs import map_entry
 from photostrip.geodesy.ground_frame import plural
 from photostrip.geometry.rotation import angles
@@ -28,7 +27,7 @@ text = json_encoder.UNICODE.value
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")  # as OpenCV has them
 
 
-def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, Content], list[str]]:
+def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | bytes], list[str]]:
     """Return the table with its reference system, and the cameras beside it; GeoJSON holds the system itself.
 
     Raises InputError for a frame that is neither a map nor local, and for a map in feet with heights in metres.
@@ -44,7 +43,7 @@ def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, Content], 
     stem = str(PurePosixPath(target).with_suffix(""))
     turned = angles(block.level, "omega-phi-kappa")
     wkt = "" if block.ground.kind == "local" else map_entry(block.ground.spec).wkt
-    files: dict[str, Content] = {f"{stem}_int_param.yaml": _cameras(block)}
+    files: dict[str, str | bytes] = {f"{stem}_int_param.yaml": _cameras(block)}
     if form == "orthority":
         posed = zip(block.photos, block.enu_centers.tolist(), np.degrees(turned).tolist(), block.camera_of, strict=True)
         rows = ((photo["id"], *center, *opk, camera) for photo, center, opk, camera in posed)

@@ -256,7 +256,7 @@ class Result:
         tables = beside_json(self._document, self._resolved, self.computed)
         return tables | {RESULT: json_pieces(self._document)}
 
-    def _exported(self) -> dict[str, Content]:
+    def _exported(self) -> dict[str, str | bytes]:
         if not self._exports:
             return {}
         from photostrip.foreign.exports import exported

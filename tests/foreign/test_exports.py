@@ -472,6 +472,15 @@ def test_a_run_writes_what_its_project_asks_for_and_a_saved_result_gives_the_sam
     assert "model/" in resolved
 
 
+def test_a_batch_writes_the_same_files(tmp_path: Path) -> None:
+    asked = "export=[a.gpkg,model/]"
+    found = ran(tmp_path, "--set", asked)
+    project = tmp_path / "project" / "project.yaml"
+    assert main(["batch", str(project), "-o", str(tmp_path / "batch"), "-j", "1", "-q", "--set", asked]) == 0
+    for name in ("a.gpkg", "model/cameras.txt", "model/images.txt", "model/points3D.txt", "result.json"):
+        assert (tmp_path / "batch" / "project" / name).read_bytes() == (found.folder / name).read_bytes()
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
