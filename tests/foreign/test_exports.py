@@ -521,6 +521,22 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_written(
     assert len(table(tmp_path / "table.txt")) == len(block.document["photos"])
 
 
+def test_an_edited_result_says_so(block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "result.json"
+    text = (block.folder / "result.json").read_text(encoding="utf-8")
+    z = block.document["points"][0]["z"]
+    file.write_text(text.replace(f'"z": {z}', f'"z": {z + 5}', 1), encoding="utf-8")
+    capsys.readouterr()
+    assert main(["convert", str(file), str(tmp_path / "a.gpkg")]) == 0
+    assert "it was edited after it was written" in capsys.readouterr().out
+    first = f'"rotation": [{block.document["photos"][0]["rotation"][0]}'
+    file.write_text(text.replace(first, f"{first}, 0.5", 1), encoding="utf-8")
+    assert f"{file}: cannot be exported: a value is of another kind" in refused(
+        capsys, str(file), str(tmp_path / "b.gpkg")
+    )
+    assert not (tmp_path / "b.gpkg").exists()
+
+
 def test_independent_models_have_points_but_no_orientations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     photostrip.simulate({"models": {}, "control": {"layout": "bands", "bands": 3}}).write(tmp_path / "project")
     assert main(["run", str(tmp_path / "project" / "project.yaml"), "-o", str(tmp_path / "run"), "-q"]) == 0

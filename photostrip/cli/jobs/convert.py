@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from photostrip.errors import Fault, InputError
@@ -15,8 +15,9 @@ from photostrip.formats.output.result_json import read_result
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.writing import write_files
-from photostrip.project.schema.exports import TABLES
+from photostrip.project.schema.exports import TABLES, form_of
 from photostrip.project.template import refuse_existing
+from photostrip.result.statement.edited import EDITED, FIX, OF_WORDS, faults_of_edited, is_edited
 
 RESULT = "result.json"
 
@@ -73,11 +74,21 @@ def written_for_others(source: Path, target: str, form: str, *, force: bool) -> 
     place = Path(target)
     if place.name in {"", ".."}:  # `./`, whose own name is needed
         place = place.resolve()
-    found = exported(read_result(str(file)), [place.name + ("/" if target.endswith("/") else "")], form)
+    form = form_of(target, form)
+    saved = read_result(str(file))
+    try:
+        with faults_of_edited("exported", (saved, str(file))):
+            found = exported(saved, [place.name + ("/" if target.endswith("/") else "")], form)
+    except InputError as error:
+        raise InputError(replace(each, file=each.file or str(file)) for each in error.faults) from None
+    except OF_WORDS as error:  # orientations are not among the numbers that the certificate vouches for
+        message = f"cannot be exported: a value is of another kind ({error})"
+        fault = Fault(message, "result-incomplete", str(file), expected="a whole result.json", fix=FIX)
+        raise InputError(fault) from error
     if not force and any("/" in name for name in found.files):
         refuse_existing(place.parent, list(found.files))
     write_files(place.parent, found.files, [file, *(file.parent / f"{name}.csv" for name in TABLES)])
-    return found.said
+    return [*([f"{file}: {EDITED}"] if is_edited(saved) else []), *found.said]
 
 
 def _faults(options: Options) -> Iterator[Fault]:
