@@ -54,7 +54,8 @@ def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, str | byt
 def _frame(block: Adjusted) -> tuple[str, Floats, Floats]:
     """Say in which frame the model is; return its origin in the Cartesian frame, and its axes as rows."""
     if block.ground.kind == "local":
-        return "frame: the local one of the result, metres", np.zeros(3), np.eye(3)
+        bent = ", heights above its tangent plane" if block.ground.origin is not None else ""
+        return f"frame: the local one of the result{bent}, metres", np.zeros(3), np.eye(3)
     origin = block.xyz.mean(axis=0).round()
     axes = block.ground.level_axes_at(origin[None])[0]
     east, north, up = block.ground.ground_from_cartesian(origin[None])[0].tolist()

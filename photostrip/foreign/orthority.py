@@ -24,6 +24,7 @@ from photostrip.notes import counted
 
 HEADER = ("filename", "x", "y", "z", "omega", "phi", "kappa", "camera")
 text = json_encoder.UNICODE.value
+SEEN = 0.005  # pixels, from which on two decimals are not zero
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")  # as OpenCV has them
 
 
@@ -55,7 +56,7 @@ def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | byte
         files[target] = _geojson(block, turned, wkt)
     said = [f"{counted(len(block.photos), 'photo')} of {counted(len(block.cameras), 'camera')}"]
     departure, photo = block.bent()
-    if wkt and photo:
+    if departure >= SEEN:
         said.append(
             f"the map taken for Cartesian moves image points by up to {departure:.2f} px (photo {photo}): curvature of "
             "the Earth, scale of the map"

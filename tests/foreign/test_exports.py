@@ -359,6 +359,33 @@ def test_pycolmap_projects_the_points_of_a_model_onto_the_adjusted_image_points(
 
 
 @pytest.mark.parametrize(
+    ("ground", "option"),
+    [
+        ({"crs": "local"}, "processing.earth_curvature=model"),
+        ({"crs": UTM, "height": "orthometric", "geoid_undulation": 4500}, "processing.adjustment=bundle"),
+    ],
+)
+def test_heights_of_a_curved_ground_are_those_of_a_cartesian_frame(
+    ground: Document, option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flight = {"photos": 5, "strips": 1, "flying_height": 3000}
+    found = ran(tmp_path, "--set", option, ground=ground, flight=flight)
+    assert main(["convert", str(found), f"{tmp_path / 'model'}/"]) == 0
+    assert ("above its tangent plane" in capsys.readouterr().out) == (ground["crs"] == "local")
+    assert off_the_measured(found, tmp_path / "model") < 0.01
+    model = pycolmap.Reconstruction(tmp_path / "model")
+    count = 0
+    for each in nonempty(list(model.images.values())):
+        residuals = next(row for row in found.document["residuals"] if row["photo"] == each.name)
+        for ray, vx, vy in zip(each.points2D, residuals["vx_um"], residuals["vy_um"], strict=True):
+            if ray.has_point3D():
+                away = ray.xy - each.project_point(model.points3D[ray.point3D_id].xyz)
+                assert away == pytest.approx((vx / 2.4, -vy / 2.4), abs=0.06)  # without the change of the distortion
+                count += 1
+    assert count == found.document["counts"]["image_points_used"]
+
+
+@pytest.mark.parametrize(
     "changes",
     [
         {"direction": "image_to_ideal", "k": [-2e-4, 1e-7, 0]},
