@@ -13,6 +13,8 @@ import sqlite3
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +26,7 @@ from photostrip.notes import Document, counted
 
 APPLICATION, VERSION = 0x47504B47, 10400  # "GPKG", 1.4
 HEAD = f"""
+PRAGMA synchronous = OFF;
 PRAGMA application_id = {APPLICATION};
 PRAGMA user_version = {VERSION};
 CREATE TABLE gpkg_spatial_ref_sys (srs_name TEXT NOT NULL, srs_id INTEGER PRIMARY KEY, organization TEXT NOT NULL,
@@ -57,13 +60,14 @@ class Layer(NamedTuple):
 def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, str | bytes], list[str]]:
     """Return a GeoPackage, the same bytes for the same result, and what is in it."""
     layers = [each for each in _layers(block) if each.records]
-    with closing(sqlite3.connect(":memory:")) as base:
-        base.executescript(HEAD)
-        srs = _reference_system(base, block)
-        for each in layers:
-            _write(base, each, srs)
-        base.commit()
-        content = base.serialize()
+    with TemporaryDirectory() as folder:  # not every SQLite gives the bytes of a base in memory
+        file = Path(folder) / "layers.gpkg"
+        with closing(sqlite3.connect(file)) as base, base:
+            base.executescript(HEAD)
+            srs = _reference_system(base, block)
+            for each in layers:
+                _write(base, each, srs)
+        content = file.read_bytes()
     said = [f"{each.name}: {counted(len(each.records), 'row')}; {each.description}" for each in layers]
     return {target: content}, said
 

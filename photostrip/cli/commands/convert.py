@@ -55,7 +55,9 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
         float | None,
         typer.Option("--mark-width", metavar="PX", help="Width of the photos that were marked, where it is another."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the files of a project in DIR.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Overwrite the files of a project in DIR, or of a model.")
+    ] = False,
     quiet: Silent = False,
 ) -> None:
     """Write an ordinary project from other programs' files, to be checked, edited and run; or a result for them.
