@@ -77,7 +77,7 @@ def faults_of(edit: Edited, right: Path, folder: Path, command: Sequence[str]) -
     """Run a command on an edited result; ``EDITED`` and ``RIGHT`` in it stand for the files."""
     file = folder / "result.json"
     file.write_text(edit.text, encoding="utf-8")
-    names = {"EDITED": str(file), "RIGHT": str(right), "PAGE": str(folder / "page.html")}
+    names = {"EDITED": str(file), "RIGHT": str(right), "PAGE": str(folder / "page.html"), "OUT": str(folder / "out")}
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -102,4 +102,8 @@ COMMANDS = (
     ("compare", "EDITED", "RIGHT", "--format", "junit"),
     ("compare", "EDITED", "RIGHT", "--format", "json"),
     ("compare", "EDITED", "RIGHT", "--format", "github"),
+    ("convert", "EDITED", "OUT", "--to", "geopackage"),
+    ("convert", "EDITED", "OUT", "--to", "orthority"),
+    ("convert", "EDITED", "OUT", "--to", "colmap", "--force"),
+    ("convert", "EDITED", "OUT", "--to", "cameras"),
 )

@@ -13,6 +13,7 @@ from photostrip.batch.outcomes import BROKEN, FAULTY, WEAK, failure, out_of_memo
 from photostrip.batch.parcel import Parcel, unpack_grids
 from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.foreign.exports import exported
 from photostrip.formats.text.files import LARGEST_FILE, from_disk
 from photostrip.formats.text.source import Source, digest, reading_from
 from photostrip.library.project import loaded_from
@@ -55,7 +56,7 @@ def _computed(task: Task, source: Source) -> Answer:
     with reading_from(source):
         project = loaded_from(Path(task.project), task.overrides)
         result = project.run()
-        files = result.files(html=task.html)
+        files = exported(result.document, project.loaded.completed.export).files | result.files(html=task.html)
     outcome = outcome_of(result.document, result_findings(result.document)) | _place_of(result)
     return Answer(number=task.number, outcome=outcome, files=files, inputs=_inputs(project.loaded, source))
 

@@ -108,7 +108,7 @@ class ResultFolder:
             "project": self._name(chosen),
             "set": self.overrides,
             "inputs": dict(sorted(inputs.items())),
-            "outputs": {name: digest(text.encode()) for name, text in sorted(answer.files.items())},
+            "outputs": {name: digest(_bytes(content)) for name, content in sorted(answer.files.items())},
             "outcome": answer.outcome,
         }
         sweep(place)
@@ -131,6 +131,10 @@ class ResultFolder:
             return parsed_record(from_disk(str(place / RECORD), LARGEST_FILE))
         except InputError:
             return None
+
+
+def _bytes(content: str | bytes) -> bytes:
+    return content if isinstance(content, bytes) else content.encode()
 
 
 @contextmanager

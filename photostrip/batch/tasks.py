@@ -28,7 +28,9 @@ class Answer:
 
     number: int
     outcome: Document  # its line in the summary, see ``outcomes``
-    files: dict[str, str] = field(default_factory=dict)  # content of its result files by name; none after a failure
+    files: dict[str, str | bytes] = field(
+        default_factory=dict
+    )  # content of its result files by name; none after a failure
     # SHA-256 of every file read, by path; None for a file that would have been read if it were there
     inputs: dict[str, str | None] = field(default_factory=dict)
     megabytes: float = 0.0

@@ -25,7 +25,7 @@ _TEXTS = (
     ("init", "Write a commented project file and the headers of its tables.", "photostrip init strip-a"),
     (
         "convert",
-        "Write a project from other programs' files: COLMAP.",
+        "Write a project from COLMAP's files, or a result for others.",
         "photostrip convert sparse/0 -o block --sigma 0.7",
     ),
     ("check", "Check projects without adjusting them, and name all faults.", "photostrip check project.yaml"),

@@ -63,7 +63,7 @@ def _project(name: str, block: ForeignBlock, wanted: Wanted, system: str) -> dic
     return {
         "photostrip": 1,
         "name": Text(name),
-        "cameras": {Text(camera): _camera(given) | size for camera, given in block.cameras.items()},
+        "cameras": {Text(camera): camera_in_pixels(given) | size for camera, given in block.cameras.items()},
         "photos": [{"camera": Text(camera), "photos": photos} for camera, photos in owners.items()],
         "observations": {
             "file": "observations.csv",
@@ -95,7 +95,8 @@ def _control(given: GivenControl) -> str:
     return to_csv(("point", "x", "y", "z", "use", "role", "sx", "sy", "sz"), cells)
 
 
-def _camera(given: PixelCamera) -> dict[str, object]:
+def camera_in_pixels(given: PixelCamera) -> dict[str, object]:
+    """Return a camera as the project file has it, by its own convention."""
     fx, fy = given.focal_length
     return {
         "unit": "px",

@@ -273,3 +273,25 @@ def missing_named_grids(parts: CrsParts) -> str:
     operations = [crs.coordinate_operation for crs in crss if crs.is_bound and crs.coordinate_operation is not None]
     grids = [grid for operation in operations for grid in operation.grids]
     return " and ".join(g.short_name for g in grids if not g.available and g.short_name.removeprefix("@") != "null")
+
+
+class MapEntry(NamedTuple):
+    """A plane or geographic CRS as files of other programs name it."""
+
+    name: str
+    epsg: int | None  # its number where it has one
+    wkt: str  # as GDAL writes it; WKT 2 where that cannot say it
+
+
+def map_entry(spec: FrameSpec) -> MapEntry:
+    """Name the horizontal part of a CRS; that of ``geocentric`` coordinates are longitude and latitude of its datum."""
+    parts = read_crs(spec, None)
+    known = parts.geographic if parts.kind == "geocentric" else parts.core
+    if known is None:
+        raise PhotostripError("a local frame has no reference system")
+    known = known.to_2d()
+    try:
+        wkt = known.to_wkt("WKT1_GDAL")
+    except load_pyproj().exceptions.CRSError:
+        wkt = known.to_wkt()
+    return MapEntry(known.name, known.to_epsg(), wkt)

@@ -75,7 +75,8 @@ class Project:
             document = document_of(computed, self.loaded.remarks)
             document["certificate"] = self._certificate(document, computed)
         read = self.loaded.files_read(computed) if self._source is None else ()
-        return Result(document, computed=computed, resolved=self.loaded.resolved, read=read)
+        exports = self.loaded.completed.export
+        return Result(document, computed=computed, resolved=self.loaded.resolved, read=read, exports=exports)
 
     def _certificate(self, document: dict[str, Any], computed: Computed) -> dict[str, Any]:
         """Say what the result was made from, by hashes that any machine can repeat."""

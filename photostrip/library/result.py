@@ -15,6 +15,7 @@ from photostrip.notes import Document, named
 from photostrip.result.records import as_lists
 
 if TYPE_CHECKING:
+    from photostrip.formats.text.writing import Content
     from photostrip.library.table import Table
     from photostrip.pipeline.results import Result as Computed
 
@@ -36,12 +37,14 @@ class Result:
         computed: Computed | None = None,
         resolved: str = "",
         read: Sequence[str | PathLike[str]] = (),
+        exports: Sequence[str] = (),
     ) -> None:
         self._document = document
         self._read = read
         self.computed = computed
         """Every stage of the run that found it, with numbers that are not rounded; None where it was read."""
         self._resolved = resolved
+        self._exports = exports
 
     @cached_property
     def document(self) -> Document:
@@ -253,6 +256,13 @@ class Result:
         tables = beside_json(self._document, self._resolved, self.computed)
         return tables | {RESULT: json_pieces(self._document)}
 
+    def _exported(self) -> dict[str, str | bytes]:
+        if not self._exports:
+            return {}
+        from photostrip.foreign.exports import exported
+
+        return exported(self.document, self._exports).files
+
     def pictures(self) -> dict[str, str]:
         """Return the pictures of the report as SVG, content by file name."""
         from photostrip.report.pictures.result.pictures import picture_files
@@ -261,6 +271,8 @@ class Result:
 
     def write(self, folder: str | PathLike[str], *, html: bool = False) -> tuple[str, ...]:
         """Write the files of the result into a folder, as ``photostrip run -o`` does: all of them or none.
+
+        Those for other programs are among them that its project asks for by ``export``.
 
         Where the report as a page fails, the others are written, and the error is raised then.
         Returns their names.
@@ -271,12 +283,12 @@ class Result:
         from photostrip.formats.text.writing import sweep, write_files
 
         sweep(Path(folder))
-        page: dict[str, Iterable[str]] = {}
+        page: dict[str, Content] = {}
         try:
             if html:
-                page = {PAGE: [self.report("html")]}
+                page = {PAGE: self.report("html")}
         finally:
-            files = page | self._files()
+            files = page | self._exported() | self._files()
             write_files(Path(folder), files, map(Path, self._read))
             if html and not page:  # that of an earlier result would not be of this one
                 (Path(folder) / PAGE).unlink(missing_ok=True)

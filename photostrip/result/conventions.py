@@ -6,6 +6,7 @@ from dataclasses import asdict, is_dataclass
 
 import numpy as np
 
+from photostrip.camera import Camera
 from photostrip.geodesy.ground_frame import plural
 from photostrip.notes import Document
 from photostrip.pipeline.inputs import BUNDLE, POLYNOMIAL, SIMILARITY
@@ -87,9 +88,27 @@ def cameras_of(result: Result) -> list[Document]:
             "format_mm": None if camera.format is None else list(camera.format),
             "fiducials": len(camera.fiducials),
             "distortion": camera.distortion and f"{camera.distortion.model}, {camera.distortion.direction}",
+            **_image_of(result, camera),
         }
         for name, camera in cameras.items()
     ]
+
+
+def _image_of(result: Result, camera: Camera) -> Document:
+    """Return what makes measured image coordinates of a camera from ideal ones, as far as there is something."""
+    singles = [strip.photos[0] for strip in result.inputs.strips if len(strip.photos) == 1 and strip.camera == camera]
+    found: Document = {
+        "pixel_size_mm": camera.pixel_size,
+        "pixel_affinity": list(camera.pixel_affinity) if any(camera.pixel_affinity) else None,
+        "lens": camera.distortion
+        and {
+            key: list(value) if isinstance(value, tuple) else value
+            for key, value in asdict(camera.distortion).items()
+            if value
+        },
+        "single_photos": singles,
+    }
+    return {key: value for key, value in found.items() if value}
 
 
 def corrections_of(result: Result) -> Document:

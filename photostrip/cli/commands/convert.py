@@ -1,4 +1,4 @@
-"""``photostrip convert``: other programs' files as a project."""
+"""``photostrip convert``: other programs' files as a project, and a result as other programs' files."""
 
 from __future__ import annotations
 
@@ -11,8 +11,24 @@ from photostrip.cli.options import Silent
 
 
 def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="Folder of a COLMAP model, text or binary.")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder to write the project into.")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOURCE", help="Folder of a COLMAP model, text or binary; or a result.json, or its folder."
+        ),
+    ],
+    target: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="FILE", help="What to write a result into: .gpkg, .csv, .geojson, .yaml, or a folder, MODEL/."
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder to write the project into.")
+    ] = None,
+    to: Annotated[
+        str, typer.Option("--to", metavar="NAME", help="Form of FILE, where its ending does not say it.")
+    ] = "",
     sigma: Annotated[
         float | None,
         typer.Option("--sigma", metavar="PX", help="Standard deviation of an image coordinate in pixels; needed."),
@@ -39,17 +55,35 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
         float | None,
         typer.Option("--mark-width", metavar="PX", help="Width of the photos that were marked, where it is another."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the files of a project in DIR.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Overwrite the files of a project in DIR, or of a model.")
+    ] = False,
     quiet: Silent = False,
 ) -> None:
-    """Write an ordinary project from other programs' files, to be checked, edited and run.
+    """Write an ordinary project from other programs' files, to be checked, edited and run; or a result for them.
 
     DIR gets project.yaml, observations.csv, orientations.csv and, with --control, control.csv. Printed is what was
     understood: counts, cameras, one photo, frame, units. What the files do not carry is asked for by the name of an
     option, and never guessed.
-    """
-    from photostrip.cli.jobs.convert import Options, converted
 
+    Where SOURCE is a result, it is written into FILE: GeoPackage, tables of orthority (CSV, GeoJSON), cameras
+    (.yaml; .opencv.yaml and its kin in pixels), a COLMAP model.
+    """
+    from photostrip.cli.jobs.convert import Options, converted, is_result, written_for_others
+
+    given = (sigma, pixel_size, control, crs, control_sigma, mark_sigma, mark_width)
+    if is_result(source):
+        if target is None or output is not None or any(each not in {None, ""} for each in given):
+            message = f"{source} is a result, which is written into a file: no -o, and none of the options of a project"
+            raise typer.BadParameter(f"{message}; write photostrip convert {source} points.gpkg", param_hint="FILE")
+        said = written_for_others(source, target, to, force=force)
+        if not quiet:
+            typer.echo("\n".join(said))
+            typer.echo(f"wrote {target}", err=True)
+        return
+    if output is None or target is not None or to:
+        message = f"{source} is no result, and becomes a project in a folder"
+        raise typer.BadParameter(f"{message}; write photostrip convert {source} -o DIR", param_hint="--output")
     asked = Options(
         sigma=sigma,
         pixel_size=pixel_size,

@@ -1,19 +1,25 @@
-"""Files of another program as a project in a folder."""
+"""Files of another program as a project in a folder, and a result as files for other programs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from photostrip.errors import Fault, InputError
 from photostrip.foreign import colmap
 from photostrip.foreign.control import Asked, with_control
+from photostrip.foreign.exports import exported
 from photostrip.foreign.project import Wanted, project_files, understood
+from photostrip.formats.output.result_json import read_result
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.writing import write_files
+from photostrip.project.schema.exports import TABLES, form_of
 from photostrip.project.template import refuse_existing
+from photostrip.result.statement.edited import EDITED, FIX, OF_WORDS, faults_of_edited, is_edited
+
+RESULT = "result.json"
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,34 @@ def converted(source: Path, output: Path, options: Options, *, force: bool) -> t
     width = max(map(len, said))
     lines = [f"{name:<{width}}  {text}" for name, text in said.items()]
     return lines, f"wrote {', '.join(files)} to {output}; next: photostrip check {output / 'project.yaml'}"
+
+
+def is_result(source: Path) -> bool:
+    """Tell a result, by its file or by the folder of a run, from what is to become a project."""
+    return source.suffix == ".json" or (source / RESULT).is_file()
+
+
+def written_for_others(source: Path, target: str, form: str, *, force: bool) -> list[str]:
+    """Write a result in the form of another program, all of its files or none; say what is in them."""
+    file = source / RESULT if source.is_dir() else source
+    place = Path(target)
+    if place.name in {"", ".."}:  # `./`, whose own name is needed
+        place = place.resolve()
+    form = form_of(target, form)
+    saved = read_result(str(file))
+    try:
+        with faults_of_edited("exported", (saved, str(file))):
+            found = exported(saved, [place.name + ("/" if target.endswith("/") else "")], form)
+    except InputError as error:
+        raise InputError(replace(each, file=each.file or str(file)) for each in error.faults) from None
+    except OF_WORDS as error:  # orientations are not among the numbers that the certificate vouches for
+        message = f"cannot be exported: a value is of another kind ({error})"
+        fault = Fault(message, "result-incomplete", str(file), expected="a whole result.json", fix=FIX)
+        raise InputError(fault) from error
+    if not force and any("/" in name for name in found.files):
+        refuse_existing(place.parent, list(found.files))
+    write_files(place.parent, found.files, [file, *(file.parent / f"{name}.csv" for name in TABLES)])
+    return [*([f"{file}: {EDITED}"] if is_edited(saved) else []), *found.said]
 
 
 def _faults(options: Options) -> Iterator[Fault]:

@@ -30,7 +30,7 @@ def write_text(path: Path, text: str | bytes, read: Iterable[str | Path] = ()) -
 
 
 def write_files(folder: Path, files: Mapping[str, Content], read: Iterable[str | Path] = ()) -> None:
-    """Write the files of one folder, all of them or none; the folder is made when it is missing.
+    """Write the files of one folder and those below it, all of them or none; a folder is made when it is missing.
 
     All contents are written first and renamed then, in the order given: put the file last that make or another program
     looks at.
@@ -42,6 +42,7 @@ def write_files(folder: Path, files: Mapping[str, Content], read: Iterable[str |
     _make(folder)
     kept = {os.path.realpath(each) for each in read}
     for name in files:
+        _make((folder / name).parent)
         if (folder / name).is_dir():
             _refuse(folder / name, "is a folder", "a file")
         if kept and os.path.realpath(folder / name) in kept:

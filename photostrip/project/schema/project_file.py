@@ -6,10 +6,11 @@ from photostrip.formats.text.findings import suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.plausibility import KINDS
 from photostrip.project.schema.cameras import Camera, Photos, PixelCamera, Strip
+from photostrip.project.schema.exports import ENDINGS, GEOPACKAGE, export, form_of
 from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
 from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
 from photostrip.project.schema.processing import Processing
-from photostrip.project.schema.sections import Before, Length, OneOrMany, Read, Section, key, wrong
+from photostrip.project.schema.sections import Before, Length, OneOrMany, Read, Rule, Section, key, wrong
 from photostrip.project.schema.values import Positive, Words, if_empty, schema_number, single, text
 
 SCHEMA_NUMBER = 1
@@ -31,6 +32,9 @@ def _finding(value: object) -> str:
 
 
 Accepted = Annotated[str, Read(_finding, {"type": "string", "pattern": "^P[0-9]{3}(/.+)?$"})]
+
+
+Exported = Annotated[str, Read(export, {"type": "string"})]
 
 
 class Tolerances(Section):
@@ -78,6 +82,18 @@ class ProjectFile(Section):
         "Findings that were looked at and are accepted: codes, or `code/id` for one photo, point or strip",
         [],
     )
+    export: list[Exported] = key(
+        "Files for other programs that each run with -o writes beside its result, by their ending: "
+        + ", ".join(f"`{ending}` {name}" for name, ending in ENDINGS.items()),
+        [],
+    )
+
+    @Rule
+    def _models_have_no_oriented_photos(self) -> None:
+        for name in self.export:
+            if self.models is not None and form_of(name) != GEOPACKAGE:
+                message = f"independent models give no orientation of photos, which {name} is made of"
+                raise wrong(message, code="export", at="export", fix="remove it; a GeoPackage (.gpkg) can be written")
 
     @property
     def camera_of(self) -> dict[str, str | None]:

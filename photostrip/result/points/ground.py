@@ -28,8 +28,10 @@ def coordinates(frame: GroundFrame, enu: Floats) -> Document:
 def frame_of(result: Result) -> Document:
     """Return the block ``frame``: what the coordinates of the result refer to."""
     frame = result.output
+    spec = frame.spec
+    corrected = spec.curvature_radius is not None and frame.origin is not None
     return {
-        "crs": frame.spec.crs,
+        "crs": spec.crs,
         "axes": list(frame.axes),
         "kind": frame.kind,
         "plan_unit": frame.plan_unit,
@@ -37,7 +39,9 @@ def frame_of(result: Result) -> Document:
         "plan_factor": frame.plan_factor,
         "height_factor": frame.height_factor,
         "ellipsoid": None if frame.ellipsoid is None else list(frame.ellipsoid),
-        "heights": frame.spec.height,
+        "heights": spec.height,
+        **({} if spec.geoid_undulation is None else {"geoid_undulation": spec.geoid_undulation}),
+        **({"curvature": {"radius": spec.curvature_radius, "origin": list(frame.origin or ())}} if corrected else {}),
         "description": frame.describe(),
     }
 

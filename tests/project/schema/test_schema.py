@@ -187,4 +187,5 @@ def test_the_model_is_the_contract() -> None:
         "processing",
         "tolerances",
         "accept",
+        "export",
     ]

@@ -1,0 +1,60 @@
+"""The cameras of a result as a block ``cameras`` of a project, with the calibration that was found.
+
+In millimetres, or as a program that counts in pixels has them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from photostrip.camera import Camera
+from photostrip.errors import Fault, InputError
+from photostrip.foreign.adjusted import Adjusted
+from photostrip.foreign.project import camera_in_pixels
+from photostrip.notes import Document
+from photostrip.project.resolved import lines_of
+from photostrip.project.schema.values import Text
+from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS, in_pixels
+
+
+def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | bytes], list[str]]:
+    """Return the block, for a project or, by the convention in the name of the form, for another program.
+
+    Raises InputError for pixels that are no squares, in millimetres, and for what a convention does not know.
+    """
+    block.require_photos("a block of cameras")
+    _, _, convention = form.partition("-")
+    cameras: Document = {}
+    for name, each in block.cameras.items():
+        size = {} if each.own.pixel_size is None else {"pixel_size": each.own.pixel_size}
+        if convention in CONVENTIONS:
+            cameras[Text(name)] = camera_in_pixels(in_pixels(each.nearest, convention, each.pixels.image_size)) | size
+        else:
+            cameras[Text(name)] = _in_millimetres(each.own) | size
+    text = "".join(f"{line}\n" for line in (*_found(block.document), *lines_of({"cameras": cameras})))
+    return {target: text}, block.said_of_cameras()
+
+
+def _found(document: Document) -> Iterator[str]:
+    """Say what the calibration added, with its standard deviations."""
+    for each in document.get("bundle", {}).get("calibration", ()):
+        named = f"camera {each['camera']}, {each['parameter']}: {each['value']:+g} {each['unit']}"
+        yield f"# {named} by the calibration, standard deviation {each['sigma']:g}; it is in these numbers"
+
+
+def _in_millimetres(camera: Camera) -> Document:
+    if any(camera.pixel_affinity):
+        message = f"pixels of camera {camera.name} are no squares, for which a camera in millimetres has no key"
+        raise InputError(Fault(message, "export", fix="write it in pixels (.metashape.yaml)"))
+    lens = camera.distortion
+    found: Document = {
+        "principal_distance": camera.principal_distance,
+        "principal_point": list(camera.principal_point),
+    }
+    if camera.format is not None:
+        found["format"] = list(camera.format)
+    if lens is None:
+        return found
+    names = ("radius", "distortion") if lens.model == "radial-table" else ("k", "p", "b")
+    values = {name: list(getattr(lens, name)) for name in names}
+    return found | {"distortion": {"model": lens.model, "direction": lens.direction, **values}}

@@ -1,0 +1,593 @@
+"""Results as files of other programs, each read by a program that knows the form, or by its documented layout."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import sqlite3
+from contextlib import closing
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pycolmap
+import pyogrio
+import pytest
+import yaml
+from pyproj import CRS, Transformer
+from scipy.spatial.transform import Rotation
+
+import photostrip
+from photostrip.cli.main import main
+from tests.foreign.colmap_models import SPEC, simulated
+from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from photostrip.arrays import Floats
+
+    Document = dict[str, Any]
+
+UTM = "EPSG:32633"
+GROUNDS: dict[str, Document] = {
+    "local": {"crs": "local"},
+    "map": {"crs": UTM, "center_deg": [13.5, 49.2]},
+    "north-first": {"crs": UTM, "axes": ["north", "east", "up"]},
+}
+
+
+class Ran(NamedTuple):
+    """A run in a folder."""
+
+    folder: Path
+    document: Document
+
+    def __str__(self) -> str:
+        return str(self.folder)
+
+
+def ran(folder: Path, *options: str, **changes: Any) -> Ran:  # noqa: ANN401 (values of a specification)
+    """Simulate a block and run it, as a user does."""
+    photostrip.simulate({**SPEC, **changes}).write(folder / "project")
+    out = folder / "run"
+    assert main(["run", str(folder / "project" / "project.yaml"), "-o", str(out), "-q", *options]) == 0
+    return Ran(out, json.loads((out / "result.json").read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module", params=GROUNDS)
+def block(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Ran:
+    return ran(tmp_path_factory.mktemp("block"), ground=GROUNDS[request.param])
+
+
+def east_first(document: Document, records: list[Document], names: str = "x y z") -> Floats:
+    """Give coordinates as east, north, up."""
+    order = [document["frame"]["axes"].index(axis) for axis in ("east", "north", "up")]
+    return np.array([[each[name] for name in names.split()] for each in records], float)[:, order]
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Give what is said of wrong usage."""
+    capsys.readouterr()
+    assert main(["convert", *arguments]) == 2
+    return capsys.readouterr().err
+
+
+def number_in(text: str, pattern: str) -> float:
+    """Give the number that is said in a text."""
+    found = re.search(pattern, text)
+    assert found is not None, text
+    return float(found[1])
+
+
+# ----------------------------------------------------------------------------------- rigorous image points
+
+
+def geocentric(crs: str, enu: Floats) -> Floats:
+    """Give Cartesian coordinates of points of a map."""
+    plane = CRS(crs).to_3d()
+    across = Transformer.from_crs(plane, CRS("EPSG:4978"), always_xy=True)
+    return np.stack(across.transform(*enu.T), axis=-1)
+
+
+def grid_axes(crs: str, enu: Floats) -> Floats:
+    """Give grid east, grid north and the normal at points of a map, as rows, by small steps on the ellipsoid."""
+    ground = enu * (1.0, 1.0, 0.0)
+    found = []
+    for step in ((10.0, 0.0, 0.0), (0.0, 10.0, 0.0)):
+        along = geocentric(crs, ground + step) - geocentric(crs, ground - step)
+        found.append(along / np.linalg.norm(along, axis=1)[:, None])
+    east, north = found
+    return np.stack([east, north, np.cross(east, north)], axis=1)
+
+
+def image(ray: Floats) -> Floats:
+    """Give pixels of rays in image axes (x right, y up), by the camera of SPEC in millimetres."""
+    camera: Document = dict(SPEC["camera"])
+    x, y = (-camera["principal_distance"] * ray[:, :2] / ray[:, 2:]).T
+    (k1, _, _), (p1, p2) = camera["distortion"]["k"], camera["distortion"]["p"]
+    square = x**2 + y**2
+    dx = x * k1 * square + p1 * (square + 2 * x**2) + 2 * p2 * x * y
+    dy = y * k1 * square + p2 * (square + 2 * y**2) + 2 * p1 * x * y
+    (x0, y0), (width, height), size = (camera[each] for each in ("principal_point", "format", "pixel_size"))
+    return np.stack([(x + dx + x0 + width / 2) / size, (height / 2 - y - dy - y0) / size], axis=-1)
+
+
+def adjusted_image_points(document: Document) -> dict[tuple[str, str], Floats]:
+    """Project the points of a result onto its photos, in pixels from the corner, y down: the rigorous way."""
+    points, photos = document["points"], document["photos"]
+    xyz, centers = (east_first(document, each) for each in (points, photos))
+    turned = np.array([each["rotation"] for each in photos]).reshape(-1, 3, 3)
+    if document["frame"]["crs"] != "local":
+        turned = grid_axes(document["frame"]["crs"], centers).transpose(0, 2, 1) @ turned
+        xyz, centers = (geocentric(document["frame"]["crs"], each) for each in (xyz, centers))
+    row_of = {each["id"]: row for row, each in enumerate(points)}
+    found: dict[tuple[str, str], Floats] = {}
+    for photo, center, rotation in zip(photos, centers, turned, strict=True):
+        measured = next(each for each in document["residuals"] if each["photo"] == photo["id"])
+        names = [each for each in measured["points"] if each in row_of]
+        places = image((xyz[[row_of[each] for each in names]] - center) @ rotation)
+        found |= {(photo["id"], name): place for name, place in zip(names, places, strict=True)}
+    return found
+
+
+def measured_image_points(folder: Path) -> dict[tuple[str, str], Floats]:
+    with (folder / "project" / "observations.csv").open(encoding="utf-8") as file:
+        return {(row["photo"], row["point"]): np.array([row["x"], row["y"]], float) for row in csv.DictReader(file)}
+
+
+# ------------------------------------------------------------------------------------------------ GeoPackage
+
+
+def layer(file: Path, name: str) -> tuple[list[Document], list[Any], Document]:
+    """Read a layer by GDAL: attributes, geometries as well-known binary, and what is said of it."""
+    meta, _, geometry, columns = pyogrio.raw.read(file, layer=name)
+    rows = [dict(zip(meta["fields"], row, strict=True)) for row in zip(*columns, strict=True)]
+    return rows, list(geometry), meta | pyogrio.read_info(file, layer=name)
+
+
+def places(geometry: bytes) -> Floats:
+    """Give the coordinates of a geometry in space: they end its well-known binary, behind order, kind and counts."""
+    kind = (int.from_bytes(geometry[1:5], "little") & 0xFFFF) % 1000
+    return np.frombuffer(geometry[{1: 5, 2: 9, 3: 13}[kind] :], "<f8").reshape(-1, 3)
+
+
+def on_map(geometry: list[bytes]) -> list[list[float]]:
+    found: list[list[float]] = np.concatenate([places(each) for each in geometry]).tolist()
+    return found
+
+
+def test_gdal_reads_every_layer_of_a_geopackage(block: Ran, tmp_path: Path) -> None:
+    file, document = tmp_path / "block.gpkg", block.document
+    assert main(["convert", str(block), str(file), "-q"]) == 0
+    control = [each for each in document["control"] if each["measured"]]
+    counts = {
+        "points": len(document["points"]),
+        "control": sum(each["role"] == "control" for each in control),
+        "check": sum(each["role"] == "check" for each in control),
+        "photos": 12,
+        "footprints": 12,
+        "error_vectors": len(control),
+        "error_ellipses": len(document["points"]),
+    }
+    names = [name for name, _ in pyogrio.list_layers(file)]
+    assert {name: pyogrio.read_info(file, layer=name)["features"] for name in names} == counts
+    rows, geometry, meta = layer(file, "points")
+    assert meta["crs"] == UTM if document["frame"]["crs"] == UTM else "undefined cartesian" in meta["crs"].lower()
+    assert on_map(geometry) == east_first(document, document["points"]).tolist()
+    for row, point in nonempty(list(zip(rows, document["points"], strict=True))):
+        assert [row[name] for name in ("id", "role", "rays")] == [point[name] for name in ("id", "role", "rays")]
+        axes = document["frame"]["axes"]
+        assert [row[f"sigma_{axis}"] for axis in axes] == [point[f"sigma_{name}"] for name in "xyz"]
+    rows, _, _ = layer(file, "check")
+    found = {row["id"]: (row[f"d_{document['frame']['axes'][0]}"], row["height"]) for row in rows}
+    assert found == {each["id"]: (each["dx"], each["height"]) for each in control if each["role"] == "check"}
+    rows, geometry, _ = layer(file, "photos")
+    assert [row["kappa_deg"] for row in rows] == [each["angles"]["values"][2] for each in document["photos"]]
+    assert on_map(geometry) == east_first(document, document["photos"]).tolist()
+
+
+def test_footprints_are_the_corners_of_the_photos_on_the_ground(block: Ran, tmp_path: Path) -> None:
+    file, document = tmp_path / "block.gpkg", block.document
+    assert main(["convert", str(block), str(file), "-q"]) == 0
+    _, geometry, meta = layer(file, "footprints")
+    assert meta["geometry_type"] == "Polygon Z"
+    heights = east_first(document, document["points"])[:, 2]
+    for each, photo in nonempty(list(zip(geometry, document["photos"], strict=True))):
+        corners = places(each)
+        assert corners[0].tolist() == corners[-1].tolist()
+        assert heights.min() - 10 < corners[:, 2].min() < corners[:, 2].max() < heights.max() + 10
+        away = corners[:4] - east_first(document, [photo])
+        ray = away @ np.array(photo["rotation"]).reshape(3, 3)
+        xy = -8.8 * ray[:, :2] / ray[:, 2:] + (0.024, -0.012)
+        assert xy == pytest.approx(
+            np.array([[-6.6, -4.4], [6.6, -4.4], [6.6, 4.4], [-6.6, 4.4]]), abs=4e-3
+        )  # scale of the map
+
+
+def test_differences_and_ellipses_are_drawn_as_much_larger_as_their_layers_say(block: Ran, tmp_path: Path) -> None:
+    file, document = tmp_path / "block.gpkg", block.document
+    assert main(["convert", str(block), str(file), "-q"]) == 0
+    rows, geometry, meta = layer(file, "error_vectors")
+    factor = number_in(meta["layer_metadata"]["DESCRIPTION"], r"([\d.e+]+) times")
+    control = {each["id"]: each for each in document["control"]}
+    assert factor > 1
+    for row, each in nonempty(list(zip(rows, geometry, strict=True))):
+        start, end = places(each)
+        expected = east_first(document, [control[row["id"]]], "dx dy dz")[0, :2]
+        assert (end - start)[:2] / factor == pytest.approx(expected, abs=2e-5)
+    rows, geometry, meta = layer(file, "error_ellipses")
+    factor = number_in(meta["layer_metadata"]["DESCRIPTION"], r"([\d.e+]+) times")
+    at = east_first(document, document["points"])
+    for row, each, point in nonempty(list(zip(rows, geometry, at, strict=True))):
+        away = (places(each) - point)[:, :2] / factor
+        farthest = away[np.argmax(np.linalg.norm(away, axis=1))]
+        assert np.linalg.norm(away, axis=1).max() == pytest.approx(row["ellipse_a"], rel=2e-3)
+        assert np.linalg.norm(away, axis=1).min() == pytest.approx(row["ellipse_b"], rel=2e-3)
+        azimuth = np.degrees(np.arctan2(*farthest)) % 180
+        assert row["ellipse_a"] < 1.02 * row["ellipse_b"] or (
+            azimuth - row["ellipse_azimuth_deg"] + 90
+        ) % 180 - 90 == pytest.approx(0, abs=5)
+
+
+@pytest.mark.parametrize(
+    ("output", "crs"),
+    [
+        (["output.crs=geocentric"], "EPSG:4326"),
+        (["output.crs=EPSG:4326", "output.axes=[north,east,up]"], "EPSG:4326"),
+        (["output.crs=+proj=tmerc +lat_0=49 +lon_0=13 +datum=WGS84 +units=m +type=crs"], "Transverse Mercator"),
+    ],
+)
+def test_other_frames_lie_where_they_are(output: list[str], crs: str, tmp_path: Path) -> None:
+    options = [word for each in output for word in ("--set", each)]
+    found = ran(tmp_path, *options, ground=GROUNDS["map"])
+    assert main(["convert", str(found), str(tmp_path / "a.gpkg"), "-q"]) == 0
+    _, geometry, meta = layer(tmp_path / "a.gpkg", "points")
+    place = np.mean(on_map(geometry), axis=0)[:2]
+    known = CRS(meta["crs"])
+    assert crs in {meta["crs"], known.to_json_dict().get("conversion", {}).get("method", {}).get("name")}
+    lonlat = Transformer.from_crs(known, known.geodetic_crs, always_xy=True).transform(*place)
+    assert lonlat == pytest.approx((13.5, 49.2), abs=0.01)
+
+
+def test_a_geopackage_is_one_by_the_standard(block: Ran, tmp_path: Path) -> None:
+    assert main(["convert", str(block), str(tmp_path / "a.gpkg"), "-q"]) == 0
+    with closing(sqlite3.connect(tmp_path / "a.gpkg")) as base:
+        assert base.execute("PRAGMA application_id").fetchone() == (0x47504B47,)
+        assert base.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+        assert base.execute("PRAGMA foreign_key_check").fetchall() == []
+        known = {row[0] for row in base.execute("SELECT srs_id FROM gpkg_spatial_ref_sys")}
+        assert {-1, 0, 4326} <= known
+
+
+# -------------------------------------------------------------------------------------------------- orthority
+
+
+def table(file: Path) -> list[Document]:
+    with file.open(encoding="utf-8") as text:
+        return list(csv.DictReader(text))
+
+
+def by_orthority(camera: Document, xyz: Floats, opk: Floats, points: Floats) -> Floats:
+    """Project points as orthority does: pixels from the centre of the first one, y down.
+
+    With the coordinates of the map taken for Cartesian, and a camera that is scaled by its side as in OpenSfM.
+    """
+    turned = Rotation.from_euler("XYZ", opk).as_matrix() * (1.0, -1.0, -1.0)
+    x, y = ((points - xyz) @ turned)[:, :2].T / ((points - xyz) @ turned)[:, 2]
+    k1, k2, p1, p2, k3 = (camera.get(name, 0.0) for name in ("k1", "k2", "p1", "p2", "k3"))
+    square = x**2 + y**2
+    radial = 1 + square * (k1 + square * (k2 + square * k3))
+    xy = np.stack([x * radial + 2 * p1 * x * y + p2 * (square + 2 * x**2),
+                   y * radial + 2 * p2 * x * y + p1 * (square + 2 * y**2)], axis=-1)  # fmt: skip
+    size = np.array(camera["im_size"])
+    focal = np.array(camera["focal_len"]) * size / camera["sensor_size"]
+    return focal * xy + (size - 1) / 2 + size.max() * np.array([camera["cx"], camera["cy"]])
+
+
+def test_orthority_has_every_orientation_and_the_departure_of_its_map_is_told(
+    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = block.document
+    capsys.readouterr()
+    assert main(["convert", str(block), str(tmp_path / "ori.csv")]) == 0
+    said = capsys.readouterr().out
+    rows, cameras = table(tmp_path / "ori.csv"), yaml.safe_load((tmp_path / "ori_int_param.yaml").read_text())
+    assert list(rows[0]) == ["filename", "x", "y", "z", "omega", "phi", "kappa", "camera"]
+    true, xyz = adjusted_image_points(document), east_first(document, document["points"])
+    row_of = {each["id"]: row for row, each in enumerate(document["points"])}
+    away = []
+    for row, photo in nonempty(list(zip(rows, document["photos"], strict=True))):
+        assert row["filename"] == photo["id"]
+        center, opk = (np.array([float(row[name]) for name in names]) for names in ("xyz", ("omega", "phi", "kappa")))
+        mine = {point: place for (name, point), place in true.items() if name == photo["id"]}
+        points = xyz[[row_of[each] for each in mine]]
+        found = by_orthority(cameras[row["camera"]], center, np.radians(opk), points) + 0.5
+        away.append(np.linalg.norm(found - list(mine.values()), axis=1).max())
+    if document["frame"]["crs"] == "local":
+        assert max(away) < 0.01
+        assert not (tmp_path / "ori.prj").exists()
+        assert "Cartesian" not in said
+    else:
+        told = number_in(said, r"by up to ([\d.]+) px")
+        assert told == pytest.approx(max(away), abs=0.01)
+        assert CRS.from_wkt((tmp_path / "ori.prj").read_text(encoding="utf-8")) == CRS(UTM)
+
+
+def test_geojson_of_orthority_says_the_same_as_its_table(
+    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if block.document["frame"]["crs"] == "local":
+        assert "has none; write CSV (.csv)" in refused(capsys, str(block), str(tmp_path / "ori.geojson"))
+        return
+    for name in ("ori.csv", "ori.geojson"):
+        assert main(["convert", str(block), str(tmp_path / name), "-q"]) == 0
+    found = json.loads((tmp_path / "ori.geojson").read_text(encoding="utf-8"))
+    assert CRS.from_wkt(found["world_crs"]) == CRS(UTM)
+    to_map = Transformer.from_crs("EPSG:4326", UTM, always_xy=True)
+    for row, each in nonempty(list(zip(table(tmp_path / "ori.csv"), found["features"], strict=True))):
+        known = each["properties"]
+        assert (row["filename"], row["camera"]) == (known["filename"], known["camera"])
+        assert [float(row[name]) for name in "xyz"] == known["xyz"]
+        assert np.radians([float(row[name]) for name in ("omega", "phi", "kappa")]) == pytest.approx(known["opk"])
+        lon, lat, height = each["geometry"]["coordinates"]
+        assert (*to_map.transform(lon, lat), height) == pytest.approx(known["xyz"], abs=1e-3)
+    rows, _, meta = (pyogrio.raw.read(tmp_path / "ori.geojson")[place] for place in (3, 2, 0))
+    assert len(rows[0]) == len(block.document["photos"])
+    assert meta["crs"] == "EPSG:4979"
+
+
+# ----------------------------------------------------------------------------------------------------- COLMAP
+
+
+def test_pycolmap_projects_the_points_of_a_model_onto_the_adjusted_image_points(block: Ran, tmp_path: Path) -> None:
+    assert main(["convert", str(block), f"{tmp_path / 'model'}/", "-q"]) == 0
+    model, document = pycolmap.Reconstruction(tmp_path / "model"), block.document
+    true, measured = adjusted_image_points(document), measured_image_points(block.folder.parent)
+    assert [each.name for _, each in sorted(model.images.items())] == [each["id"] for each in document["photos"]]
+    assert model.num_points3D() == len(document["points"])
+    names = {number: each["id"] for number, each in enumerate(document["points"], 1)}
+    count = 0
+    for each in nonempty(list(model.images.values())):
+        for ray in (ray for ray in each.points2D if ray.has_point3D()):
+            place = each.project_point(model.points3D[ray.point3D_id].xyz)
+            key = each.name, names[ray.point3D_id]
+            assert place == pytest.approx(true[key], abs=0.01)
+            assert ray.xy == pytest.approx(measured[key], abs=0.01)
+            count += 1
+    assert count == document["counts"]["image_points_used"]
+
+
+@pytest.mark.parametrize(
+    ("ground", "option"),
+    [
+        ({"crs": "local"}, "processing.earth_curvature=model"),
+        ({"crs": UTM, "height": "orthometric", "geoid_undulation": 4500}, "processing.adjustment=bundle"),
+    ],
+)
+def test_heights_of_a_curved_ground_are_those_of_a_cartesian_frame(
+    ground: Document, option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flight = {"photos": 5, "strips": 1, "flying_height": 3000}
+    found = ran(tmp_path, "--set", option, ground=ground, flight=flight)
+    assert main(["convert", str(found), f"{tmp_path / 'model'}/"]) == 0
+    assert ("above its tangent plane" in capsys.readouterr().out) == (ground["crs"] == "local")
+    assert off_the_measured(found, tmp_path / "model") < 0.01
+    model = pycolmap.Reconstruction(tmp_path / "model")
+    count = 0
+    for each in nonempty(list(model.images.values())):
+        residuals = next(row for row in found.document["residuals"] if row["photo"] == each.name)
+        for ray, vx, vy in zip(each.points2D, residuals["vx_um"], residuals["vy_um"], strict=True):
+            if ray.has_point3D():
+                away = ray.xy - each.project_point(model.points3D[ray.point3D_id].xyz)
+                assert away == pytest.approx((vx / 2.4, -vy / 2.4), abs=0.06)  # without the change of the distortion
+                count += 1
+    assert count == found.document["counts"]["image_points_used"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"direction": "image_to_ideal", "k": [-2e-4, 1e-7, 0]},
+        {"direction": "image_to_ideal", "b": [3e-4, 0]},
+        {"model": "radial-table", "radius": [0, 2, 4, 6, 8, 9], "distortion": [0, -0.001, -0.005, -0.02, -0.05, -0.07]},
+    ],
+)
+def test_a_distortion_that_colmap_does_not_know_is_fitted_and_its_departure_told(
+    changes: Document, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lens = {"model": "brown", "direction": "image_to_ideal", **changes}
+    found = ran(tmp_path, camera={**SPEC["camera"], "distortion": lens})
+    assert main(["convert", str(found), f"{tmp_path / 'model'}/"]) == 0
+    told = number_in(capsys.readouterr().out, r"within ([\d.]+) px")
+    assert told < 1.0
+    assert off_the_measured(found, tmp_path / "model") < told + 0.01
+
+
+def test_a_calibration_that_was_found_is_in_the_cameras(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = "processing.self_calibration=[principal_distance,principal_point,k1]"
+    photostrip.simulate(SPEC).write(tmp_path / "project")
+    project = tmp_path / "project" / "project.yaml"
+    text = project.read_text(encoding="utf-8").replace("principal_distance: 8.8", "principal_distance: 8.83")
+    project.write_text(text.replace("-0.0002", "-0.00015"), encoding="utf-8")
+    out = tmp_path / "run"
+    assert main(["run", str(project), "-o", str(out), "-q", "--set", asked]) == 0
+    assert main(["convert", str(out), f"{tmp_path / 'model'}/"]) == 0
+    told = number_in(capsys.readouterr().out, r"within ([\d.]+) px")
+    found = Ran(out, json.loads((out / "result.json").read_text(encoding="utf-8")))
+    assert off_the_measured(found, tmp_path / "model") < told + 0.01
+
+
+def test_cameras_go_into_a_project_again_with_their_calibration(tmp_path: Path) -> None:
+    photostrip.simulate(SPEC).write(tmp_path)
+    project = tmp_path / "project.yaml"
+    text = project.read_text(encoding="utf-8")
+    wrong = text.replace("principal_point: [0.024, -0.012]", "principal_point: [0.031, -0.02]").replace("-0.0002", "0")
+    project.write_text(wrong, encoding="utf-8")
+    names = [f"c.{each}.yaml" for each in ("opencv", "colmap", "metashape", "opensfm", "pix4d")] + ["c.yaml"]
+    asked = {"processing": {"self_calibration": ["principal_point", "k1"]}}
+    calibrated = photostrip.run(project, export=names, **asked)
+    calibrated.write(tmp_path / "run")
+    block = re.search(r"cameras:\n(?: .*\n)+", wrong)
+    assert block is not None
+    xyz = np.stack([calibrated.points[axis] for axis in "xyz"], axis=-1)
+    for name in names:
+        cameras = (tmp_path / "run" / name).read_text(encoding="utf-8")
+        assert "# camera fc, k1: +0.0002" in cameras
+        project.write_text(wrong.replace(block[0], cameras), encoding="utf-8")
+        again = photostrip.run(project)
+        assert np.stack([again.points[axis] for axis in "xyz"], axis=-1) == pytest.approx(xyz, abs=1e-3), name
+        assert again.summary["image_rms_um"] == pytest.approx(calibrated.summary["image_rms_um"], abs=0.01)
+
+
+def off_the_measured(found: Ran, model: Path) -> float:
+    """Give the largest distance of the rays of a model from what was measured, in pixels."""
+    measured, largest = measured_image_points(found.folder.parent), 0.0
+    names = {number: each["id"] for number, each in enumerate(found.document["points"], 1)}
+    for each in nonempty(list(pycolmap.Reconstruction(model).images.values())):
+        rays = [ray for ray in each.points2D if ray.has_point3D()]
+        away = [ray.xy - measured[each.name, names[ray.point3D_id]] for ray in rays]
+        largest = max(largest, float(np.linalg.norm(away, axis=1).max()))
+    return largest
+
+
+def test_a_model_that_came_from_colmap_goes_back_with_its_names_and_numbers(tmp_path: Path) -> None:
+    given = simulated(tmp_path / "native")
+    given.cameras[7] = given.cameras[4]  # two cameras of the same kind
+    given.images = [each if number % 2 else (*each[:3], 7, *each[4:]) for number, each in enumerate(given.images)]
+    given.images = [(*each[:4], each[4].replace(" ", "_"), *each[5:]) for each in given.images]
+    given.write_text(tmp_path / "model")
+    block = tmp_path / "block"
+    assert main(["convert", str(tmp_path / "model"), "-o", str(block), "--sigma", "0.5", "-q"]) == 0
+    assert main(["run", str(block / "project.yaml"), "-o", str(tmp_path / "run"), "-q"]) == 0
+    assert main(["convert", str(tmp_path / "run"), f"{tmp_path / 'back'}/", "-q"]) == 0
+    after = {each.name: each for each in pycolmap.Reconstruction(tmp_path / "back").images.values()}
+    assert set(after) == {each[4] for each in given.images}
+    cameras: dict[int, set[int]] = {4: set(), 7: set()}
+    for _, _, _, camera, name, xy, points in nonempty(given.images):
+        cameras[camera].add(after[name].camera_id)
+        known = dict(zip(points, xy.tolist(), strict=True))
+        rays = {ray.point3D_id: ray.xy for ray in after[name].points2D if ray.has_point3D()}
+        assert len(rays) > 0.9 * len(known)
+        for point, place in rays.items():
+            assert place == pytest.approx(known[point], abs=0.2)  # a unit is 27 m, written to 0.1 mm
+    assert [len(each) for each in cameras.values()] == [1, 1]
+    assert cameras[4] != cameras[7]
+
+
+# ------------------------------------------------------------------------------------------ both ways, refusals
+
+
+def test_a_run_writes_what_its_project_asks_for_and_a_saved_result_gives_the_same_bytes(tmp_path: Path) -> None:
+    asked = "export=[a.gpkg,maps/ori.csv,maps/ori.geojson,model/]"
+    found = ran(tmp_path, "--set", asked, ground=GROUNDS["map"])
+    written = {
+        path.relative_to(found.folder).as_posix(): path.read_bytes()
+        for path in found.folder.rglob("*")
+        if path.is_file() and (path.parent != found.folder or path.suffix == ".gpkg")
+    }
+    assert {*written} == {
+        "a.gpkg",
+        *(f"maps/ori{ending}" for ending in (".csv", ".prj", ".geojson", "_int_param.yaml")),
+        *(f"model/{name}.txt" for name in ("cameras", "images", "points3D")),
+    }
+    (tmp_path / "again" / "maps").mkdir(parents=True)
+    for name in ("a.gpkg", "maps/ori.csv", "maps/ori.geojson", "model/"):
+        assert main(["convert", str(found), f"{tmp_path / 'again' / name}{'/' if name[-1] == '/' else ''}", "-q"]) == 0
+    assert {name: (tmp_path / "again" / name).read_bytes() for name in written} == written
+    resolved = (found.folder / "project.resolved.yaml").read_text(encoding="utf-8")
+    assert "model/" in resolved
+
+
+def test_a_batch_writes_the_same_files(tmp_path: Path) -> None:
+    asked = "export=[a.gpkg,model/]"
+    found = ran(tmp_path, "--set", asked)
+    project = tmp_path / "project" / "project.yaml"
+    assert main(["batch", str(project), "-o", str(tmp_path / "batch"), "-j", "1", "-q", "--set", asked]) == 0
+    for name in ("a.gpkg", "model/cameras.txt", "model/images.txt", "model/points3D.txt", "result.json"):
+        assert (tmp_path / "batch" / "project" / name).read_bytes() == (found.folder / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("a.shp", "geopackage (.gpkg), orthority (.csv), orthority-geojson (.geojson), colmap (/), "),
+        ("../a.gpkg", "does not lie in the folder of the run"),
+        ("/a.gpkg", "does not lie in the folder of the run"),
+        ("photos.csv", "is a file of the result itself; write other-photos.csv"),
+    ],
+)
+def test_a_wrong_name_in_a_project_is_refused_before_anything_is_computed(
+    name: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    photostrip.simulate(SPEC).write(tmp_path)
+    assert main(["check", str(tmp_path / "project.yaml"), "--set", f"export=[{name}]"]) == 2
+    printed = capsys.readouterr()
+    assert said in printed.out + printed.err
+
+
+def test_what_cannot_be_written_is_refused_and_nothing_is_written(
+    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, model = str(block), f"{tmp_path / 'model'}/"
+    assert "known" not in refused(capsys, source, str(tmp_path / "a.dxf"))
+    assert "geopackage (.gpkg)" in refused(capsys, source, str(tmp_path / "a.dxf"))
+    assert "`dxf`" in refused(capsys, source, str(tmp_path / "a"), "--to", "dxf")
+    assert "points.gpkg" in refused(capsys, source)
+    assert "points.gpkg" in refused(capsys, source, str(tmp_path / "a.gpkg"), "--sigma", "1")
+    assert "-o DIR" in refused(capsys, str(tmp_path), str(tmp_path / "a.gpkg"))
+    assert "-o DIR" in refused(capsys, str(tmp_path))
+    assert list(tmp_path.iterdir()) == []
+    assert main(["convert", source, model, "-q"]) == 0
+    assert "already exists" in refused(capsys, source, model)
+    before = (block.folder / "photos.csv").read_bytes()
+    assert "would replace it" in refused(capsys, source, str(block.folder / "photos.csv"))
+    assert (block.folder / "photos.csv").read_bytes() == before
+    assert main(["convert", source, model, "-q", "--force"]) == 0
+    assert main(["convert", source, str(tmp_path / "table.txt"), "--to", "orthority", "-q"]) == 0
+    assert len(table(tmp_path / "table.txt")) == len(block.document["photos"])
+
+
+def test_an_edited_result_says_so(block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "result.json"
+    text = (block.folder / "result.json").read_text(encoding="utf-8")
+    z = block.document["points"][0]["z"]
+    file.write_text(text.replace(f'"z": {z}', f'"z": {z + 5}', 1), encoding="utf-8")
+    capsys.readouterr()
+    assert main(["convert", str(file), str(tmp_path / "a.gpkg")]) == 0
+    assert "it was edited after it was written" in capsys.readouterr().out
+    first = f'"rotation": [{block.document["photos"][0]["rotation"][0]}'
+    file.write_text(text.replace(first, f"{first}, 0.5", 1), encoding="utf-8")
+    assert f"{file}: cannot be exported: a value is of another kind" in refused(
+        capsys, str(file), str(tmp_path / "b.gpkg")
+    )
+    assert not (tmp_path / "b.gpkg").exists()
+
+
+def test_independent_models_have_points_but_no_orientations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    photostrip.simulate({"models": {}, "control": {"layout": "bands", "bands": 3}}).write(tmp_path / "project")
+    assert main(["run", str(tmp_path / "project" / "project.yaml"), "-o", str(tmp_path / "run"), "-q"]) == 0
+    assert main(["convert", str(tmp_path / "run"), str(tmp_path / "a.gpkg"), "-q"]) == 0
+    layers = [name for name, _ in pyogrio.list_layers(tmp_path / "a.gpkg")]
+    assert layers[:2] == ["points", "control"]
+    assert "photos" not in layers
+    options = ["--set", "export=[points.gpkg,a/]"]
+    assert main(["check", str(tmp_path / "project" / "project.yaml"), *options]) == 2
+    assert "no orientation of photos, which a/ is made of" in capsys.readouterr().out
+    for name in ("a.csv", "a/"):
+        assert "no orientation of photos" in refused(capsys, str(tmp_path / "run"), f"{tmp_path}/{name}")
+
+
+def test_orthority_takes_maps_only_and_colmap_one_place_for_each_point(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = ran(tmp_path / "a", "--set", "output.crs=geocentric", ground=GROUNDS["map"])
+    said = refused(capsys, str(found), str(tmp_path / "a.csv"))
+    assert "these are geocentric; give output.crs of a map projection" in said
+    feet = ["output.crs=EPSG:2225", "output.axes=[east,north,up]"]
+    found = ran(tmp_path / "c", *(word for each in feet for word in ("--set", each)),
+                ground={"crs": "EPSG:6339", "center_deg": [-122.0, 40.5]})  # fmt: skip
+    assert "heights in metres stand beside a plan in US survey feet" in refused(capsys, str(found), f"{tmp_path}/a.csv")
+    found = ran(tmp_path / "b", "--set", "processing.adjustment=polynomial", flight={"photos": 6, "strips": 2},
+                control={"layout": "bands", "bands": 3, "check": 4})  # fmt: skip
+    assert "processing.adjustment=bundle" in refused(capsys, str(found), f"{tmp_path}/m/")
