@@ -104,16 +104,6 @@ def test_planning_prints_predicted_and_actual_deviations() -> None:
 
 
 @pytest.mark.slow
-def test_independent_models_prints_three_tables() -> None:
-    out = printed("independent_models.py", "--strips", "1", "--repetitions", "3")
-    errors = r"^\| (?:6|12|20) \| (?:polynomial|bundle) \|(?: \d+\.\d / \d+\.\d \|){3}"
-    assert len(re.findall(errors, out, re.MULTILINE)) == 6
-    assert len(re.findall(r"^\| [359] \|(?: \d\.\d\d \|){3}$", out, re.MULTILINE)) == 3
-    assert len(re.findall(r"^\| [38] \|(?: \d\.\d+ \(.*?\) \|){2}$", out, re.MULTILINE)) == 2
-    assert re.search(r"^\| 1000 \| 100 % \| 100 % \|", out, re.MULTILINE)
-
-
-@pytest.mark.slow
 def test_gross_errors_prints_two_tables_for_one_project() -> None:
     out = printed("gross_errors.py", "1", "--kind", "models", "--workers", "1", "--first-seed", "2")
     assert len(re.findall(r"^models +(?:without errors|errors, \w+)(?: +\d+\.\d{3}){5} +[01]$", out, re.MULTILINE)) == 4
@@ -174,19 +164,6 @@ def test_a_planted_mistake_counts_where_the_sum_of_squares_grows(low: float, hig
     wrong = film.plant(film.make(43003))
     assert wrong is not None
     assert film.can_be_told(43003, wrong[0]) is told
-
-
-@pytest.mark.slow
-def test_verdict_prints_what_is_seen() -> None:
-    out = printed("verdict.py", "--number", "1", "--photos", "5")
-    rows = re.findall(
-        r"^(.{28})(check points|left out) +(\d) +(\d) +(\d) +(\d) +(\d) +\d\.\d\d +\d\.\d\d", out, re.MULTILINE
-    )
-    assert [row[1] for row in rows] == ["check points", "left out"] * 3
-    assert all(sum(map(int, row[2:6])) == 1 for row in nonempty(rows))
-    assert rows[0][2] == rows[1][2] == "1"  # the sound ones are good
-    assert rows[4][2] == rows[5][2] == "0"  # those with control ten times worse than stated are not
-    assert rows[5][6] == "1"  # seen in each of ten strips; by check points in seven
 
 
 @pytest.mark.slow

@@ -431,7 +431,7 @@ def test_cameras_go_into_a_project_again_with_their_calibration(tmp_path: Path) 
     block = re.search(r"cameras:\n(?: .*\n)+", wrong)
     assert block is not None
     xyz = np.stack([calibrated.points[axis] for axis in "xyz"], axis=-1)
-    for name in names:
+    for name in nonempty(names):
         cameras = (tmp_path / "run" / name).read_text(encoding="utf-8")
         assert "# camera fc, k1: +0.0002" in cameras
         project.write_text(wrong.replace(block[0], cameras), encoding="utf-8")

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import tracemalloc
-from dataclasses import replace
-
-import pytest
 
 from photostrip.formats.output.result_files import beside_json
 from photostrip.formats.output.result_json import json_pieces
@@ -17,11 +14,10 @@ from tests.loops import nonempty
 from tests.simulated import inputs_of, settings_of
 
 FEW, MANY = (1000, 20), (5000, 90)  # check points, and points of each model beside its rows of Gruber points
-# bytes a check point at most, of a run and of its result; 7009 and 1695, 4086 and 4494 when this was written
-MOST = {"polynomial": (7200, 1750), "auto": (4200, 4600)}
+MOST = 4200, 4600  # bytes a check point, of a run and of its result; 4086 and 4494 when this was written
 
 
-def peaks(check: int, extra: int, adjustment: str) -> tuple[int, int]:
+def peaks(check: int, extra: int) -> tuple[int, int]:
     """Bytes at the peak of a run of 60 photos, and of what is made of its result."""
     spec = Spec(
         flight=Flight(photos=60, end_lap_percent=62.0),
@@ -29,7 +25,7 @@ def peaks(check: int, extra: int, adjustment: str) -> tuple[int, int]:
         control=Control(every=12, check=check),
     )
     simulation = simulate(spec)
-    inputs, settings = inputs_of(simulation), replace(settings_of(simulation), adjustment=adjustment)
+    inputs, settings = inputs_of(simulation), settings_of(simulation)
     tracemalloc.start()
     try:
         result = triangulate(inputs, settings)
@@ -49,10 +45,9 @@ def peak_since_last() -> int:
     return peak
 
 
-@pytest.mark.parametrize("adjustment", MOST)
-def test_one_more_check_point_takes_kilobytes(adjustment: str) -> None:
-    peaks(100, 10, adjustment)  # what is loaded and kept once does not count
-    (run_few, result_few), (run_many, result_many) = peaks(*FEW, adjustment), peaks(*MANY, adjustment)
-    more, (run, result) = MANY[0] - FEW[0], MOST[adjustment]
+def test_one_more_check_point_takes_kilobytes() -> None:
+    peaks(100, 10)  # what is loaded and kept once does not count
+    (run_few, result_few), (run_many, result_many) = peaks(*FEW), peaks(*MANY)
+    more, (run, result) = MANY[0] - FEW[0], MOST
     assert (run_many - run_few) / more < run
     assert (result_many - result_few) / more < result
