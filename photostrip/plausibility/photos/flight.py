@@ -21,7 +21,7 @@ TURNED_DEG = 30.0  # of a base against its neighbours
 BESIDE = 3  # bases on either side that say what is usual
 BESIDES = np.array([step for step in range(-BESIDE, BESIDE + 1) if step])
 LEAST_PHOTOS = 4
-LEVEL = 0.01  # of one false name in a flight that scatters
+LEVEL = 1e-3  # of one false name among the heights, lengths or directions of a flight that scatters
 SIGMA_FROM_LINE = 1.5**0.5  # of a height off the line of its neighbours, over that of a height
 
 
