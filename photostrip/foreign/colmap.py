@@ -17,15 +17,13 @@ from typing import Any
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.errors import InputError
-from photostrip.foreign.gathering import Origin, Photo, gathered
+from photostrip.foreign.gathering import Origin, Photo, checked_camera, gathered
 from photostrip.foreign.places import LARGEST, Place, unique
 from photostrip.foreign.tables import ForeignBlock
-from photostrip.formats.text.files import BOM, decode, read_bytes, refuse
-from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
+from photostrip.formats.text.files import BOM, decode, read_bytes
+from photostrip.formats.text.numbers import LARGEST_NUMBER, shown
 from photostrip.notes import counted
-from photostrip.strip.image_coordinates import lens_distortion
-from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera, in_millimetres
+from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
 
 MODELS = {  # names of the parameters
     "SIMPLE_PINHOLE": "f cx cy",
@@ -45,17 +43,16 @@ RAY = np.dtype([("x", "<f8"), ("y", "<f8"), ("point", "<i8")])
 LARGEST_ID = 2.0**53  # of a point in a text: from there on a float is no whole number of its own
 
 
+def is_model(folder: Path) -> bool:
+    return any((folder / f"cameras.{each}").is_file() for each in ("bin", "txt"))
+
+
 def read(folder: Path) -> ForeignBlock:
     """Read a model, the binary one where both stand in a folder, as COLMAP does.
 
     Raises InputError with file and line, or record, for all that is no such model or has no counterpart here.
     """
-    kind = next((each for each in ("bin", "txt") if (folder / f"cameras.{each}").is_file()), "")
-    if not kind:
-        near = [folder.parent] if folder.is_file() else [folder, *folder.glob("*"), *folder.glob("*/*")]
-        inside = next((each for each in sorted(near) if list(each.glob("cameras.[bt][ix][nt]"))), None)
-        fix = f"did you mean `{inside}`?" if inside is not None else ""
-        refuse(str(folder), "foreign", "is no model of COLMAP: it has no cameras.bin or cameras.txt", fix=fix)
+    kind = "bin" if (folder / "cameras.bin").is_file() else "txt"
     files = [str(folder / f"{name}.{kind}") for name in ("cameras", "images")]
     binary = kind == "bin"
     cameras = dict(unique("camera", _binary_cameras(files[0]) if binary else _text_cameras(files[0])))
@@ -242,10 +239,6 @@ def _camera(place: Place, model: str, values: list[float]) -> PixelCamera:
     focal = given.pop("fx", 0.0) or given.pop("f", 0.0)
     focals = focal, given.pop("fy", focal)
     point = given.pop("cx"), given.pop("cy")
-    if not all(SMALLEST_LENGTH < each < LARGEST_NUMBER for each in (width, height, *focals)):
-        raise place.wrong("width, height and focal length are not above 0", "range")
-    if not (np.abs([*point, *given.values()]) < LARGEST_NUMBER).all():
-        raise place.wrong("a parameter is no number", "number")
     found = PixelCamera(
         convention="colmap",
         image_size=(width, height),
@@ -253,10 +246,4 @@ def _camera(place: Place, model: str, values: list[float]) -> PixelCamera:
         principal_point=point,
         distortion=given,
     )
-    try:
-        faults = lens_distortion.faults(in_millimetres(model, found))
-    except InputError as error:
-        faults = list(error.faults)
-    for fault in faults:
-        raise place.wrong(fault.message, fault.code, fix=fault.fix)
-    return found
+    return checked_camera(place, model, found)

@@ -9,12 +9,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from photostrip.arrays import Floats, Numbers
+from photostrip.errors import InputError
 from photostrip.foreign.places import Place, unique
 from photostrip.foreign.tables import ForeignBlock
 from photostrip.formats.text.files import refuse
-from photostrip.formats.text.numbers import shown
+from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
 from photostrip.notes import counted, listed
-from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
+from photostrip.strip.image_coordinates import lens_distortion
+from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera, in_millimetres
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +29,6 @@ class Photo:
     points: Numbers  # (n,): numbers of points; -1 for a keypoint without one
 
 
-FRAME = "the model's own, of any place, direction and scale"
-
-
 @dataclass(frozen=True)
 class Origin:
     """What the photos were read from."""
@@ -38,8 +37,23 @@ class Origin:
     files: tuple[str, ...]
     rays: str  # the file that the rays are from
     label: Callable[[int], str]  # id of a point by its number: one that no control point has
-    frame: str = FRAME
+    frame: str = "the model's own, of any place, direction and scale"
     left_out: tuple[str, ...] = ()
+
+
+def checked_camera(place: Place, name: str, given: PixelCamera) -> PixelCamera:
+    """Return a camera that a project can have, or raise what is wrong with it."""
+    if not all(SMALLEST_LENGTH < each < LARGEST_NUMBER for each in (*given.image_size, *given.focal_length)):
+        raise place.wrong("width, height and focal length are not above 0", "range")
+    if not (np.abs([*given.principal_point, *given.distortion.values()]) < LARGEST_NUMBER).all():
+        raise place.wrong("a parameter is no number", "number")
+    try:
+        faults = lens_distortion.faults(in_millimetres(name, given))
+    except InputError as error:
+        faults = list(error.faults)
+    for fault in faults:
+        raise place.wrong(fault.message, fault.code, fix=fault.fix)
+    return given
 
 
 def gathered(origin: Origin, cameras: Mapping[str, PixelCamera], photos: Sequence[Photo]) -> ForeignBlock:
@@ -88,5 +102,6 @@ def gathered(origin: Origin, cameras: Mapping[str, PixelCamera], photos: Sequenc
         xy=xy[rows],
         centers=-np.einsum("nji,nj->ni", to_camera, poses[:, 4:]),
         rotations=to_camera.transpose(0, 2, 1) * (1.0, -1.0, -1.0),
+        frame=origin.frame,
         left_out=tuple(left_out),
     )

@@ -143,13 +143,15 @@ def understood(block: ForeignBlock, wanted: Wanted) -> Mapping[str, str]:
         f"{counted(rays, 'ray')}; perspective center {x:.5g}, {y:.5g}, {z:.5g}, view along {_vector(along)}, "
         f"its x along {_vector(right)}"
     )
-    said["frame"] = "the model's own, of any place, direction and scale; the orientations are only a start"
+    said["frame"] = f"{block.frame}; the orientations are only a start"
     said["image"] = (
         f"pixels from the corner of the first one, y down; standard deviation {wanted.sigma:g} px; a pixel is "
         + ("taken as 1 µm" if wanted.pixel_size is None else f"{wanted.pixel_size:g} mm")
     )
     if block.control is not None:
         said["control"] = _of_control(block.control)
+    elif block.beside:
+        said["control"] = f"none; to take what lies beside: {' or '.join(f'--control {file}' for file in block.beside)}"
     if block.left_out:
         said["left out"] = "; ".join(block.left_out)
     return said

@@ -29,6 +29,7 @@ class ForeignBlock:
 
     source: str  # what was read, as "COLMAP model (binary)"
     files: tuple[str, ...]
+    frame: str  # where the centres are, in words
     cameras: Mapping[str, PixelCamera]
     photos: tuple[str, ...]  # ids
     camera_of: tuple[str, ...]  # of each photo
@@ -42,4 +43,5 @@ class ForeignBlock:
     rotations: Floats
     sigma: Floats | None = None  # (n,): standard deviation of each ray in pixels; NaN, or None: as for all
     control: GivenControl | None = None
+    beside: tuple[str, ...] = ()  # files of control that lie beside the others
     left_out: tuple[str, ...] = ()  # sentences

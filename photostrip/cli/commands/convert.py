@@ -14,7 +14,7 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     source: Annotated[
         Path,
         typer.Argument(
-            metavar="SOURCE", help="Folder of a COLMAP model, text or binary; or a result.json, or its folder."
+            metavar="SOURCE", help="Folder of a COLMAP model, or of OpenSfM; or a result.json, or its folder."
         ),
     ],
     target: Annotated[
@@ -41,7 +41,11 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = None,
     control: Annotated[
         Path | None,
-        typer.Option("--control", metavar="FILE", help="Control with its marks: CSV, or gcp_list.txt of OpenDroneMap."),
+        typer.Option(
+            "--control",
+            metavar="FILE",
+            help="Control with its marks: CSV, gcp_list.txt, or ground_control_points.json.",
+        ),
     ] = None,
     crs: Annotated[str, typer.Option("--crs", metavar="CRS", help="Frame of the control, as EPSG:32633.")] = "",
     control_sigma: Annotated[
