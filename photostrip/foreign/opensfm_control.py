@@ -15,14 +15,11 @@ from photostrip.foreign.control import Asked, Marks, joined, no_precision
 from photostrip.foreign.nodes import Node, read_nodes
 from photostrip.foreign.opensfm import pixels
 from photostrip.foreign.places import unique
-from photostrip.foreign.tables import ForeignBlock, GivenControl
+from photostrip.foreign.tables import WGS84, ForeignBlock, GivenControl
 from photostrip.formats.text.numbers import shown
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import counted, listed
-
-WGS84 = "EPSG:4979"
-POSITION = ("longitude", "latitude", "altitude")
 
 
 def with_ground_control(block: ForeignBlock, asked: Asked) -> ForeignBlock:

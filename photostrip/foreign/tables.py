@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from photostrip.arrays import Floats, Numbers
 from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
 
+WGS84 = "EPSG:4979"  # longitude, latitude, ellipsoidal height
+
 
 @dataclass(frozen=True, eq=False)
 class GivenControl:
@@ -21,6 +23,15 @@ class GivenControl:
     sigma: Floats  # metres
     check: tuple[bool, ...]
     marks: int  # how many were taken
+
+
+@dataclass(frozen=True, eq=False)
+class GivenPositions:
+    """Measured positions of all photos of a block, WGS 84 with ellipsoidal heights."""
+
+    xyz: Floats  # (m, 3): longitude, latitude in degrees, height in metres
+    sigma: Floats  # (m, 3): east, north, up in metres
+    said: str  # which photo has which, and of what they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,5 +54,6 @@ class ForeignBlock:
     rotations: Floats
     sigma: Floats | None = None  # (n,): standard deviation of each ray in pixels; NaN, or None: as for all
     control: GivenControl | None = None
+    positions: GivenPositions | None = None
     beside: tuple[str, ...] = ()  # files of control that lie beside the others
     left_out: tuple[str, ...] = ()  # sentences

@@ -204,9 +204,9 @@ def test_nothing_is_overwritten_without_force(tmp_path: Path, capsys: pytest.Cap
 def test_a_folder_that_is_no_model_names_one_inside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     simulated(tmp_path / "native").write_text(tmp_path / "colmap" / "sparse" / "0")
     told = refused(capsys, tmp_path / "colmap", tmp_path / "block")
-    assert "is no model of COLMAP: it has no cameras.bin or cameras.txt" in told
+    assert "is nothing that is read here; expected a folder with cameras.bin or cameras.txt (COLMAP)" in told
     assert f"did you mean `{tmp_path / 'colmap' / 'sparse' / '0'}`?" in told
-    assert "is no model of COLMAP" in refused(capsys, tmp_path / "nowhere", tmp_path / "block")
+    assert "is nothing that is read here" in refused(capsys, tmp_path / "nowhere", tmp_path / "block")
 
 
 IMAGE = "1 1 0 0 0 0 0 9 1 a.jpg"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.control import Asked, with_control
+from photostrip.foreign.events import with_events
 from photostrip.foreign.exports import exported
 from photostrip.foreign.opensfm_control import with_ground_control
 from photostrip.foreign.project import Wanted, project_files, understood
@@ -34,6 +35,7 @@ class Options:
     control_sigma: str | None = None  # metres: one number, or three
     mark_sigma: float | None = None  # px
     mark_width: float | None = None  # px
+    positions: Path | None = None
 
 
 def converted(source: Path, output: Path, options: Options, *, force: bool) -> tuple[list[str], str]:
@@ -55,6 +57,8 @@ def converted(source: Path, output: Path, options: Options, *, force: bool) -> t
         )
         json = asked.file.casefold().endswith((".json", ".json.gz"))
         block = (with_ground_control if json else with_control)(block, asked)
+    if options.positions is not None:
+        block = with_events(block, str(options.positions))
     files = project_files(output.resolve().name or "project", block, wanted)
     if not force:
         refuse_existing(output, list(files))
