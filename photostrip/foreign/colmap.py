@@ -10,24 +10,21 @@ COLMAP documents the files in colmap.github.io/format.html, the cameras in camer
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.errors import Fault, InputError
+from photostrip.foreign.gathering import Origin, Photo, checked_camera, gathered
+from photostrip.foreign.places import LARGEST, Place, unique
 from photostrip.foreign.tables import ForeignBlock
-from photostrip.formats.text.files import BOM, MEGABYTE, decode, read_bytes, refuse
-from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, shown
-from photostrip.notes import counted, listed
-from photostrip.strip.image_coordinates import lens_distortion
-from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera, in_millimetres
+from photostrip.formats.text.files import BOM, decode, read_bytes
+from photostrip.formats.text.numbers import LARGEST_NUMBER, shown
+from photostrip.notes import counted
+from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
 
-LARGEST = 4000 * MEGABYTE
 MODELS = {  # names of the parameters
     "SIMPLE_PINHOLE": "f cx cy",
     "PINHOLE": "fx fy cx cy",
@@ -46,27 +43,8 @@ RAY = np.dtype([("x", "<f8"), ("y", "<f8"), ("point", "<i8")])
 LARGEST_ID = 2.0**53  # of a point in a text: from there on a float is no whole number of its own
 
 
-class Place(NamedTuple):
-    """Where something stands: a line of a text, a record of a binary file."""
-
-    file: str
-    line: int = 0
-    record: str = ""
-
-    def wrong(self, message: str, code: str = "colmap", *, expected: str = "", fix: str = "") -> InputError:
-        text = f"{self.record}: {message}" if self.record else message
-        return InputError(Fault(text, code=code, file=self.file, line=self.line, expected=expected, fix=fix))
-
-
-@dataclass(frozen=True, eq=False)
-class Image:
-    place: Place
-    id: int
-    pose: Floats  # (7,): quaternion w, x, y, z and translation, from the world to the camera
-    camera: int
-    name: str
-    xy: Floats  # (n, 2)
-    points: Numbers  # (n,): ids of points; -1 for a keypoint without one
+def is_model(folder: Path) -> bool:
+    return any((folder / f"cameras.{each}").is_file() for each in ("bin", "txt"))
 
 
 def read(folder: Path) -> ForeignBlock:
@@ -74,27 +52,14 @@ def read(folder: Path) -> ForeignBlock:
 
     Raises InputError with file and line, or record, for all that is no such model or has no counterpart here.
     """
-    kind = next((each for each in ("bin", "txt") if (folder / f"cameras.{each}").is_file()), "")
-    if not kind:
-        near = [folder.parent] if folder.is_file() else [folder, *folder.glob("*"), *folder.glob("*/*")]
-        inside = next((each for each in sorted(near) if list(each.glob("cameras.[bt][ix][nt]"))), None)
-        fix = f"did you mean `{inside}`?" if inside is not None else ""
-        refuse(str(folder), "colmap", "is no model of COLMAP: it has no cameras.bin or cameras.txt", fix=fix)
+    kind = "bin" if (folder / "cameras.bin").is_file() else "txt"
     files = [str(folder / f"{name}.{kind}") for name in ("cameras", "images")]
     binary = kind == "bin"
-    cameras = dict(_unique("camera", _binary_cameras(files[0]) if binary else _text_cameras(files[0])))
-    images = dict(_unique("image", ((each.place, each.id, each) for each in (_binary if binary else _text)(files[1]))))
-    return _block(f"COLMAP model ({'binary' if binary else 'text'})", tuple(files), cameras, list(images.values()))
-
-
-def _unique(what: str, entries: Iterator[tuple[Place, Any, Any]]) -> Iterator[tuple[Any, Any]]:
-    """Give ids and what they stand for; refuse one that stands twice."""
-    seen = set()
-    for place, name, entry in entries:
-        if name in seen:
-            raise place.wrong(f"{what} {shown(str(name))} is already given", fix="keep one of the two")
-        seen.add(name)
-        yield name, entry
+    cameras = dict(unique("camera", _binary_cameras(files[0]) if binary else _text_cameras(files[0])))
+    images = dict(unique("image", (_binary if binary else _text)(files[1])))
+    source = f"COLMAP model ({'binary' if binary else 'text'})"
+    origin = Origin(source=source, files=tuple(files), rays=files[1], label=POINT.format)
+    return gathered(origin, {str(each): cameras[each] for each in sorted(cameras)}, list(images.values()))
 
 
 # ------------------------------------------------------------------------------------------------------- text
@@ -148,7 +113,7 @@ def _text_cameras(file: str) -> Iterator[tuple[Place, int, PixelCamera]]:
         yield place, number, _camera(place, model, _numbers(place, words[2:], f"camera {number}").tolist())
 
 
-def _text(file: str) -> Iterator[Image]:
+def _text(file: str) -> Iterator[tuple[Place, int, Photo]]:
     lines = _lines(file)
     for place, line in lines:
         if not line or line.startswith(b"#"):
@@ -172,7 +137,7 @@ def _text(file: str) -> Iterator[Image]:
                 f"an id of a point of image {number} is no id", "number", expected="a whole number, or -1"
             )
         xy = rays.reshape(-1, 3)[:, :2]
-        yield _image(place, (number, pose, camera, name), xy, points.astype(np.int64))
+        yield place, number, _image(place, (pose, camera, name), xy, points.astype(np.int64))
 
 
 # ----------------------------------------------------------------------------------------------------- binary
@@ -231,7 +196,7 @@ def _binary_cameras(file: str) -> Iterator[tuple[Place, int, PixelCamera]]:
         yield records.place, number, _camera(records.place, name, [width, height, *values])
 
 
-def _binary(file: str) -> Iterator[Image]:
+def _binary(file: str) -> Iterator[tuple[Place, int, Photo]]:
     records = _Records(file)
     for _ in records.each("image", 73):
         number, *pose, camera = records.take("<I7dI", "the pose")
@@ -247,17 +212,17 @@ def _binary(file: str) -> Iterator[Image]:
         values = np.array(pose)
         if not (np.abs(values) < LARGEST_NUMBER).all():
             raise records.place.wrong("its pose holds what is no number", "number")
-        yield _image(records.place, (number, values, camera, name), xy, kept["point"])
+        yield records.place, number, _image(records.place, (values, camera, name), xy, kept["point"])
 
 
 # ------------------------------------------------------------------------------------------------------- both
 
 
-def _image(place: Place, head: tuple[int, Floats, int, str], xy: Floats, points: Numbers) -> Image:
-    number, pose, camera, name = head
+def _image(place: Place, head: tuple[Floats, int, str], xy: Floats, points: Numbers) -> Photo:
+    pose, camera, name = head
     if not np.linalg.norm(pose[:4]) > 0.0:
         raise place.wrong("the quaternion of its pose is 0", "range")
-    return Image(place=place, id=number, pose=pose, camera=camera, name=name, xy=xy, points=points)
+    return Photo(place=place, pose=pose, camera=str(camera), name=name, xy=xy, points=points)
 
 
 def _camera(place: Place, model: str, values: list[float]) -> PixelCamera:
@@ -274,10 +239,6 @@ def _camera(place: Place, model: str, values: list[float]) -> PixelCamera:
     focal = given.pop("fx", 0.0) or given.pop("f", 0.0)
     focals = focal, given.pop("fy", focal)
     point = given.pop("cx"), given.pop("cy")
-    if not all(SMALLEST_LENGTH < each < LARGEST_NUMBER for each in (width, height, *focals)):
-        raise place.wrong("width, height and focal length are not above 0", "range")
-    if not (np.abs([*point, *given.values()]) < LARGEST_NUMBER).all():
-        raise place.wrong("a parameter is no number", "number")
     found = PixelCamera(
         convention="colmap",
         image_size=(width, height),
@@ -285,61 +246,4 @@ def _camera(place: Place, model: str, values: list[float]) -> PixelCamera:
         principal_point=point,
         distortion=given,
     )
-    try:
-        faults = lens_distortion.faults(in_millimetres(model, found))
-    except InputError as error:
-        faults = list(error.faults)
-    for fault in faults:
-        raise place.wrong(fault.message, fault.code, fix=fault.fix)
-    return found
-
-
-def _block(
-    source: str, files: tuple[str, ...], cameras: Mapping[int, PixelCamera], images: list[Image]
-) -> ForeignBlock:
-    """Put the images in the order of their names, and leave out what determines nothing."""
-    images = sorted(images, key=lambda each: each.name)
-    named = ((each.place, each.name.strip(), each) for each in images)
-    by_name = dict(_unique("an image called", named))
-    for name, each in by_name.items():
-        if not name or not name.isprintable():
-            raise each.place.wrong(f"`{shown(name)}` is no name of a photo", expected="a text on one line")
-        if each.camera not in cameras:
-            raise each.place.wrong(f"there is no camera {each.camera}", "unknown-camera")
-    kept = [each.points >= 0 for each in images]
-    photo = np.repeat(np.arange(len(images)), [int(each.sum()) for each in kept])
-    ids = np.concatenate([np.zeros(0, np.int64), *(each.points[rows] for each, rows in zip(images, kept, strict=True))])
-    xy = np.concatenate([np.zeros((0, 2)), *(each.xy[rows] for each, rows in zip(images, kept, strict=True))])
-    numbers, point = np.unique(ids, return_inverse=True)
-    left_out = []
-    _, first, times = np.unique(photo * len(numbers) + point, return_index=True, return_counts=True)
-    if twice := int((times > 1).sum()):
-        left_out.append(f"{counted(twice, 'point')} of a photo that stand on it twice: nothing says which is right")
-    rows = first[times == 1]
-    seen = np.bincount(point[rows], minlength=len(numbers))
-    rows = np.sort(rows[seen[point[rows]] > 1])
-    if alone := int((seen == 1).sum()):
-        left_out.append(f"{counted(alone, 'point')} on one photo only")
-    used = np.unique(photo[rows])
-    if len(used) < len(images):
-        names = [each.name for number, each in enumerate(images) if number not in set(used.tolist())]
-        left_out.append(f"{counted(len(names), 'photo')} without points: {listed(names, 4)}")
-    if not len(used):
-        refuse(files[1], "no-points", "no point stands on two photos", fix="write a model with its tracks")
-    poses = np.array([images[number].pose for number in used.tolist()])
-    to_camera = Rotation.from_quat(poses[:, [1, 2, 3, 0]]).as_matrix()
-    points = np.unique(point[rows])
-    return ForeignBlock(
-        source=source,
-        files=files,
-        cameras={str(number): cameras[number] for number in sorted({images[each].camera for each in used.tolist()})},
-        photos=tuple(images[each].name.strip() for each in used.tolist()),
-        camera_of=tuple(str(images[each].camera) for each in used.tolist()),
-        points=tuple(map(POINT.format, numbers[points].tolist())),
-        photo=np.searchsorted(used, photo[rows]),
-        point=np.searchsorted(points, point[rows]),
-        xy=xy[rows],
-        centers=-np.einsum("nji,nj->ni", to_camera, poses[:, 4:]),
-        rotations=to_camera.transpose(0, 2, 1) * (1.0, -1.0, -1.0),
-        left_out=tuple(left_out),
-    )
+    return checked_camera(place, model, found)

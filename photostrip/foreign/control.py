@@ -12,7 +12,7 @@ The layouts are documented in docs.opendronemap.org/gcp and github.com/shippp/hi
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,8 +90,7 @@ def with_control(block: ForeignBlock, asked: Asked) -> ForeignBlock:
     if asked.sigma is not None:
         sigma = np.where(np.isnan(sigma), asked.sigma, sigma)
     elif np.isnan(sigma[first]).any():
-        findings.add(Fault("nothing says how precise the control is", "no-sigma", asked.file, key="--control-sigma",
-                           fix="give --control-sigma M, or EAST,NORTH,UP, in metres"))  # fmt: skip
+        findings.add(no_precision(asked.file))
     rows, photo, strangers = _on_photos(table, block)
     xy = _pixels(table, block, (rows, photo), asked, labels, findings)
     findings.stop()
@@ -104,18 +103,40 @@ def with_control(block: ForeignBlock, asked: Asked) -> ForeignBlock:
         check=tuple(head.odm and name.startswith(CHECK) for name in ids),
         marks=len(rows),
     )
-    own = np.full(len(rows), np.nan if asked.mark_sigma is None else asked.mark_sigma)
+    return joined(block, control, Marks(ids=ids, photo=photo, point=number[rows], xy=xy), asked, strangers)
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Rays of points that are not in a block yet."""
+
+    ids: tuple[str, ...]  # of points
+    photo: Numbers  # (n,): of the block
+    point: Numbers  # (n,): numbers in ids
+    xy: Floats  # (n, 2): pixels from the corner of the first one
+
+
+def joined(
+    block: ForeignBlock, control: GivenControl, marks: Marks, asked: Asked, left_out: Iterable[str]
+) -> ForeignBlock:
+    """Put control and marks into a block."""
+    own = np.full(len(marks.xy), np.nan if asked.mark_sigma is None else asked.mark_sigma)
     return replace(
         block,
         files=(*block.files, asked.file),
-        points=(*block.points, *ids),
-        photo=np.concatenate([block.photo, photo]),
-        point=np.concatenate([block.point, len(block.points) + number[rows]]),
-        xy=np.concatenate([block.xy, xy]),
+        points=(*block.points, *marks.ids),
+        photo=np.concatenate([block.photo, marks.photo]),
+        point=np.concatenate([block.point, len(block.points) + marks.point]),
+        xy=np.concatenate([block.xy, marks.xy]),
         sigma=None if asked.mark_sigma is None else np.concatenate([np.full(len(block.xy), np.nan), own]),
         control=control,
-        left_out=(*block.left_out, *strangers),
+        left_out=(*block.left_out, *left_out),
     )
+
+
+def no_precision(file: str) -> Fault:
+    message, fix = "nothing says how precise the control is", "give --control-sigma M, or EAST,NORTH,UP, in metres"
+    return Fault(message, "no-sigma", file, key="--control-sigma", fix=fix)
 
 
 class _Head:

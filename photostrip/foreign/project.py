@@ -9,7 +9,7 @@ from math import isnan
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.foreign.tables import ForeignBlock, GivenControl
+from photostrip.foreign.tables import WGS84, ForeignBlock, GivenControl, GivenPositions
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.text.writing import Content
 from photostrip.geodesy.frame_spec import GROUND_AXES
@@ -51,6 +51,7 @@ def project_files(name: str, block: ForeignBlock, wanted: Wanted) -> dict[str, C
         else _table("photo,point,x,y,sx,sy", rays, np.column_stack([block.xy, block.sigma, block.sigma])),
         "orientations.csv": orientations,
         **({} if block.control is None else {"control.csv": _control(block.control)}),
+        **({} if block.positions is None else {"positions.csv": _positions(block.photos, block.positions)}),
         "project.yaml": HEADER.format(source=block.source) + "".join(f"{line}\n" for line in lines_of(project)),
     }
 
@@ -73,6 +74,7 @@ def _project(name: str, block: ForeignBlock, wanted: Wanted, system: str) -> dic
             "sigma": wanted.sigma,
         },
         **({} if block.control is None else {"control": [{"file": "control.csv", **_frame(block.control.crs)}]}),
+        **({} if block.positions is None else {"camera_positions": {"file": "positions.csv", **_frame(WGS84)}}),
         "orientations": {
             "file": "orientations.csv",
             **_frame("local"),
@@ -80,6 +82,11 @@ def _project(name: str, block: ForeignBlock, wanted: Wanted, system: str) -> dic
             "role": "approximate",
         },
     }
+
+
+def _positions(photos: Sequence[str], given: GivenPositions) -> Iterator[str]:
+    values = np.hstack([given.xyz, given.sigma])
+    return _table("photo,x,y,z,sx,sy,sz", [(photos, np.arange(len(photos)))], values)
 
 
 def _frame(crs: str) -> dict[str, object]:
@@ -143,13 +150,17 @@ def understood(block: ForeignBlock, wanted: Wanted) -> Mapping[str, str]:
         f"{counted(rays, 'ray')}; perspective center {x:.5g}, {y:.5g}, {z:.5g}, view along {_vector(along)}, "
         f"its x along {_vector(right)}"
     )
-    said["frame"] = "the model's own, of any place, direction and scale; the orientations are only a start"
+    said["frame"] = f"{block.frame}; the orientations are only a start"
     said["image"] = (
         f"pixels from the corner of the first one, y down; standard deviation {wanted.sigma:g} px; a pixel is "
         + ("taken as 1 µm" if wanted.pixel_size is None else f"{wanted.pixel_size:g} mm")
     )
     if block.control is not None:
         said["control"] = _of_control(block.control)
+    elif block.beside:
+        said["control"] = f"none; to take what lies beside: {' or '.join(f'--control {file}' for file in block.beside)}"
+    if block.positions is not None:
+        said["positions"] = block.positions.said
     if block.left_out:
         said["left out"] = "; ".join(block.left_out)
     return said

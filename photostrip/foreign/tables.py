@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from photostrip.arrays import Floats, Numbers
 from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
 
+WGS84 = "EPSG:4979"  # longitude, latitude, ellipsoidal height
+
 
 @dataclass(frozen=True, eq=False)
 class GivenControl:
@@ -24,11 +26,21 @@ class GivenControl:
 
 
 @dataclass(frozen=True, eq=False)
+class GivenPositions:
+    """Measured positions of all photos of a block, WGS 84 with ellipsoidal heights."""
+
+    xyz: Floats  # (m, 3): longitude, latitude in degrees, height in metres
+    sigma: Floats  # (m, 3): east, north, up in metres
+    said: str  # which photo has which, and of what they are
+
+
+@dataclass(frozen=True, eq=False)
 class ForeignBlock:
     """Photos in no order, measured in pixels from the corner of the first one, with rough orientations."""
 
     source: str  # what was read, as "COLMAP model (binary)"
     files: tuple[str, ...]
+    frame: str  # where the centres are, in words
     cameras: Mapping[str, PixelCamera]
     photos: tuple[str, ...]  # ids
     camera_of: tuple[str, ...]  # of each photo
@@ -42,4 +54,6 @@ class ForeignBlock:
     rotations: Floats
     sigma: Floats | None = None  # (n,): standard deviation of each ray in pixels; NaN, or None: as for all
     control: GivenControl | None = None
+    positions: GivenPositions | None = None
+    beside: tuple[str, ...] = ()  # files of control that lie beside the others
     left_out: tuple[str, ...] = ()  # sentences

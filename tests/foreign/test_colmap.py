@@ -13,37 +13,13 @@ import photostrip
 from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
 from tests.foreign.colmap_models import OPENCV, SCALE, SHIFT, SPEC, TO_MODEL, name_of, simulated
+from tests.foreign.converting import convert, refused, with_control
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 KINDS = ("text", "binary")
-
-
-def convert(source: Path, target: Path, *options: str) -> int:
-    return main(["convert", str(source), "-o", str(target), "--sigma", "0.5", *options])
-
-
-def refused(capsys: pytest.CaptureFixture[str], source: Path, target: Path, *options: str) -> str:
-    """Give what is said of a source that is refused; nothing is written then."""
-    assert convert(source, target, *options) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert not target.exists()
-    return captured.err
-
-
-def with_control(native: Path, converted: Path) -> Path:
-    """Give a converted project the control of the native one, and its measurements."""
-    rows = [line.split(",") for line in (native / "observations.csv").read_text(encoding="utf-8").splitlines()[1:]]
-    with (converted / "observations.csv").open("a", encoding="utf-8") as file:
-        file.writelines(",".join([name_of(row[0]), *row[1:]]) + "\n" for row in rows if row[1][0] in "GK")
-    (converted / "control.csv").write_bytes((native / "control.csv").read_bytes())
-    text = (native / "project.yaml").read_text(encoding="utf-8")
-    with (converted / "project.yaml").open("a", encoding="utf-8") as file:
-        file.write(text[text.index("control:") :])
-    return converted / "project.yaml"
 
 
 # ----------------------------------------------------------------------------------------------------- results
@@ -228,9 +204,9 @@ def test_nothing_is_overwritten_without_force(tmp_path: Path, capsys: pytest.Cap
 def test_a_folder_that_is_no_model_names_one_inside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     simulated(tmp_path / "native").write_text(tmp_path / "colmap" / "sparse" / "0")
     told = refused(capsys, tmp_path / "colmap", tmp_path / "block")
-    assert "is no model of COLMAP: it has no cameras.bin or cameras.txt" in told
+    assert "is nothing that is read here; expected a folder with cameras.bin or cameras.txt (COLMAP)" in told
     assert f"did you mean `{tmp_path / 'colmap' / 'sparse' / '0'}`?" in told
-    assert "is no model of COLMAP" in refused(capsys, tmp_path / "nowhere", tmp_path / "block")
+    assert "is nothing that is read here" in refused(capsys, tmp_path / "nowhere", tmp_path / "block")
 
 
 IMAGE = "1 1 0 0 0 0 0 9 1 a.jpg"

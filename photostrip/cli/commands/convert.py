@@ -14,7 +14,7 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     source: Annotated[
         Path,
         typer.Argument(
-            metavar="SOURCE", help="Folder of a COLMAP model, text or binary; or a result.json, or its folder."
+            metavar="SOURCE", help="Folder of a COLMAP model, or of OpenSfM; or a result.json, or its folder."
         ),
     ],
     target: Annotated[
@@ -41,7 +41,11 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = None,
     control: Annotated[
         Path | None,
-        typer.Option("--control", metavar="FILE", help="Control with its marks: CSV, or gcp_list.txt of OpenDroneMap."),
+        typer.Option(
+            "--control",
+            metavar="FILE",
+            help="Control with its marks: CSV, gcp_list.txt, or ground_control_points.json.",
+        ),
     ] = None,
     crs: Annotated[str, typer.Option("--crs", metavar="CRS", help="Frame of the control, as EPSG:32633.")] = "",
     control_sigma: Annotated[
@@ -55,6 +59,10 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
         float | None,
         typer.Option("--mark-width", metavar="PX", help="Width of the photos that were marked, where it is another."),
     ] = None,
+    positions: Annotated[
+        Path | None,
+        typer.Option("--positions", metavar="FILE", help="GNSS events: Timestamp.MRK of DJI, events.pos of RTKLIB."),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Overwrite the files of a project in DIR, or of a model.")
     ] = False,
@@ -62,16 +70,16 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
 ) -> None:
     """Write an ordinary project from other programs' files, to be checked, edited and run; or a result for them.
 
-    DIR gets project.yaml, observations.csv, orientations.csv and, with --control, control.csv. Printed is what was
-    understood: counts, cameras, one photo, frame, units. What the files do not carry is asked for by the name of an
-    option, and never guessed.
+    DIR gets project.yaml, observations.csv, orientations.csv and, where they are given, control.csv and positions.csv.
+    Printed is what was understood: counts, cameras, one photo, frame, units. What the files do not carry is asked for
+    by the name of an option, and never guessed.
 
     Where SOURCE is a result, it is written into FILE: GeoPackage, tables of orthority (CSV, GeoJSON), cameras
     (.yaml; .opencv.yaml and its kin in pixels), a COLMAP model.
     """
     from photostrip.cli.jobs.convert import Options, converted, is_result, written_for_others
 
-    given = (sigma, pixel_size, control, crs, control_sigma, mark_sigma, mark_width)
+    given = (sigma, pixel_size, control, crs, control_sigma, mark_sigma, mark_width, positions)
     if is_result(source):
         if target is None or output is not None or any(each not in {None, ""} for each in given):
             message = f"{source} is a result, which is written into a file: no -o, and none of the options of a project"
@@ -92,6 +100,7 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
         control_sigma=control_sigma,
         mark_sigma=mark_sigma,
         mark_width=mark_width,
+        positions=positions,
     )
     lines, written = converted(source, output, asked, force=force)
     if not quiet:

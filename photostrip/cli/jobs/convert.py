@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from photostrip.errors import Fault, InputError
-from photostrip.foreign import colmap
 from photostrip.foreign.control import Asked, with_control
+from photostrip.foreign.events import with_events
 from photostrip.foreign.exports import exported
+from photostrip.foreign.opensfm_control import with_ground_control
 from photostrip.foreign.project import Wanted, project_files, understood
+from photostrip.foreign.sources import read_source
 from photostrip.formats.output.result_json import read_result
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
 from photostrip.formats.text.numbers import number as read_number
@@ -33,6 +35,7 @@ class Options:
     control_sigma: str | None = None  # metres: one number, or three
     mark_sigma: float | None = None  # px
     mark_width: float | None = None  # px
+    positions: Path | None = None
 
 
 def converted(source: Path, output: Path, options: Options, *, force: bool) -> tuple[list[str], str]:
@@ -43,7 +46,7 @@ def converted(source: Path, output: Path, options: Options, *, force: bool) -> t
     faults = list(_faults(options))
     if faults or options.sigma is None:
         raise InputError(faults)
-    block, wanted = colmap.read(source), Wanted(options.sigma, options.pixel_size)
+    block, wanted = read_source(source), Wanted(options.sigma, options.pixel_size)
     if options.control is not None:
         asked = Asked(
             file=str(options.control),
@@ -52,7 +55,10 @@ def converted(source: Path, output: Path, options: Options, *, force: bool) -> t
             mark_sigma=options.mark_sigma,
             width=options.mark_width,
         )
-        block = with_control(block, asked)
+        json = asked.file.casefold().endswith((".json", ".json.gz"))
+        block = (with_ground_control if json else with_control)(block, asked)
+    if options.positions is not None:
+        block = with_events(block, str(options.positions))
     files = project_files(output.resolve().name or "project", block, wanted)
     if not force:
         refuse_existing(output, list(files))

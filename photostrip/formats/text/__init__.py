@@ -2,5 +2,6 @@
 
 - ``source``, ``files``: where bytes come from, and everything that can go wrong before the first line;
 - ``table_text``, ``rows``, ``table_reader``, ``tables``: a CSV table as text, its fields, reading it, what it holds;
-- ``numbers``: numbers as users write them; ``findings``: faults and notes, collected; ``writing``: files, whole or not.
+- ``json_text``: JSON of other programs; ``numbers``: numbers as users write them;
+  ``findings``: faults and notes, collected; ``writing``: files, whole or not.
 """

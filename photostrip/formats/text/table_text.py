@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO, TextIOWrapper
 from itertools import islice
+from pathlib import Path
 
 from photostrip.errors import Fault
 from photostrip.formats.text.files import BOM, GZIP, MEGABYTE, decode, read_bytes, refuse
@@ -82,15 +83,21 @@ class TableText:
 
 def content(file: str) -> tuple[bytes, bool]:
     """Read and unpack a file, refuse it when it is no text, and take a byte order mark off."""
+    data = unpacked(file)
+    _countable(file, data)
+    _, marked = decode(file, data)
+    return data[len(BOM) :] if marked else data, marked
+
+
+def unpacked(file: str) -> bytes:
+    """Read a file, and unpack it where its name ends in .gz; refuse one whose name says another thing."""
     data = read_bytes(file, LARGEST_TABLE)
     packed = file.casefold().endswith(".gz")
     if packed != data.startswith(GZIP):
         what = "is compressed (gzip), but its name does not say so" if not packed else "is not compressed (gzip)"
-        refuse(file, "gzip", what, fix="name it .csv.gz" if not packed else "name it .csv")
-    data = _unpack(file, data) if packed else data
-    _countable(file, data)
-    _, marked = decode(file, data)
-    return data[len(BOM) :] if marked else data, marked
+        name = Path(file).name
+        refuse(file, "gzip", what, fix=f"name it {name}.gz" if not packed else f"name it {name[:-3]}")
+    return _unpack(file, data) if packed else data
 
 
 def _unpack(file: str, data: bytes) -> bytes:

@@ -1,0 +1,262 @@
+"""``photostrip convert`` of reconstructions of OpenSfM, as a user calls it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import re
+from random import Random
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from pyproj import Transformer
+
+import photostrip
+from photostrip.cli.main import main
+from photostrip.project.checks.check import check_project
+from tests.foreign.colmap_models import simulated
+from tests.foreign.converting import convert, refused, with_control
+from tests.foreign.opensfm_models import BROWN, ground_control, reconstruction, tracks, write
+from tests.foreign.test_damaged import DAMAGED, WORDS, damaged, model
+from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+def small() -> tuple[dict[str, Any], str]:
+    return reconstruction(model()), tracks(model())
+
+
+# ----------------------------------------------------------------------------------------------------- results
+
+
+@pytest.mark.parametrize(("version", "packed"), [(0, False), (1, True), (2, False)])
+def test_a_block_comes_back_to_the_result_of_the_native_project(tmp_path: Path, version: int, packed: bool) -> None:
+    given = simulated(tmp_path / "native")
+    source = write(tmp_path / "opensfm", [reconstruction(given)], tracks(given, version), packed=packed)
+    assert convert(source, tmp_path / "block", "-q") == 0
+    project = with_control(tmp_path / "native", tmp_path / "block")
+    assert check_project(project).faults == ()
+    found, known = photostrip.run(project), photostrip.run(tmp_path / "native" / "project.yaml")
+    at, expected = ({each["id"]: each for each in result.document["points"]} for result in (found, known))
+    for name in ("x", "y", "z", "sigma_x", "sigma_z"):
+        ids = [each for each in expected if each[0] in "GK"]
+        assert [at[each][name] for each in ids] == pytest.approx([expected[each][name] for each in ids], abs=3e-4)
+
+
+def test_ground_control_points_come_in_with_their_marks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    native = tmp_path / "native"
+    given = simulated(native, ground={"crs": "EPSG:32633"})
+    source = write(tmp_path / "opensfm", [reconstruction(given)], tracks(given))
+    control = source / "ground_control_points.json"
+    control.write_text(json.dumps(ground_control(native)), encoding="utf-8")
+    assert convert(source, tmp_path / "without") == 0
+    assert f"none; to take what lies beside: --control {control}" in capsys.readouterr().out
+    options = ("--control", str(control), "--control-sigma", "0.01,0.01,0.015")
+    assert convert(source, tmp_path / "block", *options) == 0
+    assert ", 6 of them check points, 99 marks; EPSG:4979" in capsys.readouterr().out
+    found = photostrip.run(tmp_path / "block" / "project.yaml")
+    known = photostrip.run(native / "project.yaml")
+    to_utm = Transformer.from_crs("EPSG:4326", "EPSG:32633", always_xy=True)
+    at, expected = ({each["id"]: each for each in result.document["points"]} for result in (found, known))
+    for point in nonempty([each for each in expected if each[0] in "GK"]):
+        x, y = to_utm.transform(at[point]["x"], at[point]["y"])
+        assert (x, y, at[point]["z"]) == pytest.approx([expected[point][name] for name in "xyz"], abs=3e-4)
+
+
+def test_points_without_position_are_tie_points(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write(tmp_path / "opensfm", [small()[0]], small()[1])
+    rays = [{"shot_id": f"DJI {n}.JPG", "projection": [0.01 * n, 0.02]} for n in range(3)]
+    place = {"latitude": 49.2, "longitude": 15.3}
+    points = [{"id": "T", "observations": rays}, {"id": "G", "position": place, "observations": rays}]
+    control = tmp_path / "gcp.json"
+    control.write_text(json.dumps({"points": points}), encoding="utf-8")
+    assert convert(source, tmp_path / "block", "--control", str(control), "--control-sigma", "0.1") == 0
+    assert "13 points, 51 rays" in capsys.readouterr().out
+    assert (tmp_path / "block/control.csv").read_text().splitlines()[1:] == ["G,15.3,49.2,,xy,control,0.1,0.1,0.1"]
+    rows = (tmp_path / "block/observations.csv").read_text().splitlines()
+    assert rows[-6:-3] == ["DJI 0.JPG,T,2750.0,1943.5", "DJI 1.JPG,T,2805.0,1943.5", "DJI 2.JPG,T,2860.0,1943.5"]
+
+
+def test_of_several_reconstructions_the_largest_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole, rays = small()
+    part = {**whole, "shots": {"DJI 3.JPG": whole["shots"].pop("DJI 3.JPG")}}
+    assert convert(write(tmp_path / "opensfm", [part, whole], rays), tmp_path / "block") == 0
+    said = capsys.readouterr().out
+    assert "3 photos of 1 camera" in said
+    assert "1 smaller reconstruction of 1 photo; 1 photo of the tracks without a pose: DJI 3.JPG" in said
+
+
+@pytest.mark.parametrize("kind", ["perspective", "simple_radial", "radial"])
+def test_other_cameras_keep_their_numbers(tmp_path: Path, kind: str) -> None:
+    whole, rays = small()
+    focal = {"focal": 0.7} if kind == "perspective" else {"focal_x": 0.7, "focal_y": 0.71, "c_x": 0.01, "c_y": -0.02}
+    k = {"k1": 0.01} if kind == "simple_radial" else {"k1": 0.01, "k2": -0.002}
+    whole["cameras"]["v2 fc"] = {"projection_type": kind, "width": 5500, "height": 3667, **focal, **k}
+    assert convert(write(tmp_path / "opensfm", [whole], rays), tmp_path / "block", "-q") == 0
+    assert check_project(tmp_path / "block" / "project.yaml").faults == ()
+    text = (tmp_path / "block" / "project.yaml").read_text(encoding="utf-8")
+    assert "convention: opensfm" in text
+    assert ("focal_length: 0.7\n" if kind == "perspective" else "focal_length: [0.7, 0.71]") in text
+    assert ("k2: -0.002" in text) == (kind != "simple_radial")
+
+
+# ---------------------------------------------------------------------------------------------------- refusals
+
+WRONG: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "fisheye": (
+        lambda whole: whole["cameras"].update({"v2 fc": {**BROWN, "projection_type": "fisheye"}}),
+        "camera v2 fc: the camera type fisheye has no counterpart; expected one of perspective",
+    ),
+    "no width": (lambda whole: whole["cameras"]["v2 fc"].pop("width"), "camera v2 fc width: is missing, or no number"),
+    "flat": (
+        lambda whole: whole["cameras"].update({"v2 fc": {**BROWN, "focal_x": 0}}),
+        "camera v2 fc: width, height and focal length are not above 0",
+    ),
+    "camera": (
+        lambda whole: whole["shots"]["DJI 0.JPG"].update(camera="other"),
+        "shot DJI 0.JPG: there is no camera other",
+    ),
+    "rotation": (
+        lambda whole: whole["shots"]["DJI 0.JPG"].update(rotation=[1, 2]),
+        "shot DJI 0.JPG rotation: is missing, or no list of 3 numbers",
+    ),
+    "nan": (
+        lambda whole: whole["shots"]["DJI 0.JPG"].update(translation=[0, float("nan"), 0]),
+        "NaN in it is no number",
+    ),
+    "points": (lambda whole: whole.pop("points"), "points: is missing, or no block of names"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_reconstruction_is_refused_with_its_record(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    whole, rays = small()
+    change, expected = WRONG[name]
+    change(whole)
+    told = refused(capsys, write(tmp_path / "opensfm", [whole], rays), tmp_path / "block")
+    assert (
+        f"reconstruction.json: {expected}" in told or f"reconstruction.json: reconstruction 1 of 1 {expected}" in told
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "expected"),
+    [
+        ("reconstruction.json", b"", "reconstruction.json: is empty"),
+        ("reconstruction.json", b"[]", "reconstruction.json: has no reconstruction in it"),
+        ("reconstruction.json", b'[\n{"a": 1, "a": 2}]', "reconstruction.json: `a` stands twice in a block"),
+        ("reconstruction.json", b"[\n{]", "reconstruction.json:2:2: is not JSON"),
+        ("reconstruction.json", b"\x89PNG\x00", "reconstruction.json: is not text"),
+        ("reconstruction.json", b"[" * 100_000, "reconstruction.json: is nested too deeply"),
+        ("tracks.csv", b"OPENSFM_TRACKS_VERSION_v9\n", "tracks.csv:1: version 9 of the tracks is not known"),
+        ("tracks.csv", b"a.jpg\t1\t2\t0.1\n", "tracks.csv:1: 4 values in the line; expected 8 with tabs"),
+        ("tracks.csv", b"\na.jpg\t1\t2\tnan\t0\t1\t1\t1\n", "tracks.csv:2: `nan` is no image coordinate"),
+        ("tracks.csv", b"\n\n", "tracks.csv: no point stands on two photos"),
+    ],
+)
+def test_what_is_no_such_file_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, data: bytes, expected: str
+) -> None:
+    whole, rays = small()
+    source = write(tmp_path / "opensfm", [whole], rays)
+    (source / name).write_bytes(data)
+    assert expected in refused(capsys, source, tmp_path / "block")
+
+
+def test_a_folder_must_have_each_file_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write(tmp_path / "opensfm", [small()[0]], small()[1])
+    (source / "tracks.csv").rename(source / "tracks_old.csv")
+    (source / "tracks_new.csv").write_bytes((source / "tracks_old.csv").read_bytes())
+    assert "has tracks_new.csv, tracks_old.csv: one tracks.csv is read" in refused(capsys, source, tmp_path / "block")
+    for file in source.glob("tracks*"):
+        file.unlink()
+    assert "has no tracks.csv, which a reconstruction of OpenSfM needs" in refused(capsys, source, tmp_path / "block")
+
+
+def test_what_is_no_source_is_refused_with_what_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path / "site" / "opensfm", [small()[0]], small()[1])
+    told = refused(capsys, tmp_path / "site", tmp_path / "block")
+    assert "is nothing that is read here; expected a folder with cameras.bin or cameras.txt (COLMAP)" in told
+    assert f"did you mean `{tmp_path / 'site' / 'opensfm'}`?" in told
+
+
+CONTROL: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "twice": (lambda given: given["points"].append(given["points"][0]), "point G is already given"),
+    "outside": (
+        lambda given: given["points"][0]["observations"][0].update(projection=[0.6, 0]),
+        "point 1 of 1 observation 1 of 2 projection: the mark lies outside the photo",
+    ),
+    "two marks": (
+        lambda given: given["points"][0]["observations"][1].update(shot_id="DJI 0.JPG"),
+        "photo DJI 0.JPG is already given",
+    ),
+    "strangers": (
+        lambda given: [each.update(shot_id=f"{n}.jpg") for n, each in enumerate(given["points"][0]["observations"])],
+        "none of its photos is in the block: 0.jpg, 1.jpg",
+    ),
+    "no place": (lambda given: given["points"][0].pop("position"), "no point has a position"),
+    "no id": (lambda given: given["points"][0].pop("id"), "point 1 of 1 id: is missing, or no text"),
+    "no latitude": (
+        lambda given: given["points"][0]["position"].pop("latitude"),
+        "point 1 of 1 position latitude: is missing, or no number",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CONTROL)
+def test_wrong_control_is_refused_with_its_record(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    source = write(tmp_path / "opensfm", [small()[0]], small()[1])
+    rays = [{"shot_id": f"DJI {n}.JPG", "projection": [0.01 * n, 0.02]} for n in range(2)]
+    place = {"latitude": 49.2, "longitude": 15.3, "altitude": 200.0}
+    given = {"points": [{"id": "G", "position": place, "observations": rays}]}
+    change, expected = CONTROL[name]
+    change(given)
+    control = tmp_path / "gcp.json"
+    control.write_text(json.dumps(given), encoding="utf-8")
+    told = refused(capsys, source, tmp_path / "block", "--control", str(control), "--control-sigma", "0.1")
+    assert "gcp.json: " in told
+    assert expected in told
+
+
+def test_control_asks_for_its_precision_and_for_no_width(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write(tmp_path / "opensfm", [small()[0]], small()[1])
+    control = tmp_path / "gcp.json"
+    point = {"id": "G", "position": {"latitude": 1, "longitude": 2, "altitude": 3}, "observations": []}
+    control.write_text(json.dumps({"points": [point]}), encoding="utf-8")
+    told = refused(capsys, source, tmp_path / "block", "--control", str(control))
+    assert "nothing says how precise the control is" in told
+    given = ("--control", str(control), "--control-sigma", "0.1", "--mark-width", "100")
+    assert "the marks are parts of the photo" in refused(capsys, source, tmp_path / "block", *given)
+
+
+# ----------------------------------------------------------------------------------------------------- damage
+
+
+@pytest.mark.slow
+def test_a_damaged_reconstruction_is_refused_or_written_whole(tmp_path: Path) -> None:
+    random, written = Random("opensfm"), 0
+    folder = write(tmp_path / "opensfm", [small()[0]], small()[1])
+    whole = {name: (folder / name).read_bytes() for name in ("reconstruction.json", "tracks.csv")}
+    for number in nonempty(range(DAMAGED)):
+        for name, data in whole.items():
+            (folder / name).write_bytes(data)
+        name = random.choice(list(whole))
+        (folder / name).write_bytes(damaged(whole[name], random, WORDS))
+        target, said = tmp_path / str(number), io.StringIO()
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+            code = main(["convert", str(folder), "-o", str(target), "--sigma", "0.5"])
+        assert code in {0, 2}, said.getvalue()
+        assert target.exists() == (code == 0)
+        if code == 2:
+            assert re.search(r"(reconstruction\.json|tracks\.csv)(:\d+)*: ", said.getvalue()), said.getvalue()
+        elif (written := written + 1) % 10 == 0:
+            assert check_project(target / "project.yaml").faults == (), (folder / name).read_bytes()
+    assert 0.05 * DAMAGED < written < 0.9 * DAMAGED
