@@ -192,7 +192,7 @@ def test_angles_in_another_system() -> None:
 
 
 def test_angles_against_another_north() -> None:
-    """In a grid 3.2 degrees from true north, or by a compass."""
+    """All photos are turned alike about the vertical."""
     values, matrices = attitudes()
     names = [f"{number}" for number in range(len(values))]
     north = Rotation.from_euler("z", -3.2, degrees=True) * Rotation.from_matrix(matrices)

@@ -27,6 +27,7 @@ from photostrip.pipeline.plausibility.shared_control import FIX, other_distance,
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import found
 from photostrip.plausibility.control.shared_by_control import ShiftedList, StretchedHeights, find_shared
+from photostrip.plausibility.control.slips import LIMIT
 from photostrip.plausibility.control.wrong_place import FOOT, KINDS_OF_FEET
 from photostrip.plausibility.finding import Evidence
 from photostrip.points import ControlPoints, PhotoPoints
@@ -166,6 +167,8 @@ def find_reading(
         aside = reading.beside(control, number)
         if reading.without and not aside[held.given].any():
             continue
+        if reading.code == "P405" and as_given is not None and not _tells(as_given, reading.factor[HEIGHT]):
+            continue
         if reading is DISTANCE and (best is not None or not (distance or as_given is None or not as_given.fits)):
             continue
         way, unknowns = reading, int(aside[held.given].any(axis=0).sum())
@@ -224,6 +227,14 @@ def _stretched(as_given: OnControl | None) -> bool:
     if as_given is None or as_given.fits:
         return False
     return isinstance(find_shared(as_given.counted), StretchedHeights)
+
+
+def _tells(laid: OnControl, factor: float) -> bool:
+    """Whether heights in another unit would differ by more than they are known: those of level ground do not."""
+    place, points = laid.place.coordinates, laid.points
+    heights, of_heights = points.enu[points.use[:, HEIGHT], HEIGHT], place.axis == HEIGHT
+    known = np.sqrt(laid.place.joint_covariance.diagonal()[of_heights])
+    return bool(len(heights) and abs(factor - 1.0) * np.ptp(heights) > LIMIT * np.median(known))
 
 
 def _excess(laid: OnControl) -> float:
@@ -336,7 +347,9 @@ def of_heights(held: HeldStrip, as_given: OnControl | None) -> list[Finding]:
     strip, points = held.stage.strip.id, as_given.counted.control
     heights = points.enu[points.use[:, HEIGHT], HEIGHT]
     taken_out = as_given.counted.coordinates.axis[list(as_given.found.coordinates)]
-    if (as_given.fits and HEIGHT not in taken_out) or len(heights) <= LEAST_HEIGHTS or np.ptp(heights) > 0.0:
+    # on level ground all heights are one number, and one of them is taken out for a wrong image of its point
+    contradicted = not as_given.fits or np.count_nonzero(taken_out == HEIGHT) > 1
+    if not contradicted or len(heights) <= LEAST_HEIGHTS or np.ptp(heights) > 0.0:
         return []
     message = (
         f"strip {strip}: all {len(heights)} heights of the control are {heights[0]:g} m, and the photos show another "
