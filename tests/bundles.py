@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 # Steps of the differences by parameter.
-STEPS = {"c": 1e-2, "x0": 1e-2, "y0": 1e-2, "k1": 1e-7, "k2": 1e-11, "k3": 1e-15, "p1": 1e-6, "p2": 1e-6}
+STEPS = {"c": 1e-2, "x0": 1e-2, "y0": 1e-2, "k1": 1e-9, "k2": 1e-13, "k3": 1e-17, "p1": 1e-7, "p2": 1e-7}
 STEPS |= {"b1": 1e-5, "b2": 1e-5}
+SUBSTITUTIONS = 12  # each leaves a hundredth of what was left, or less
 METRES, RADIANS = 0.1, 1e-5
 
 
@@ -44,8 +45,11 @@ def misfits(problem: BundleProblem, centers: Floats, rotations: Floats, points: 
     names = problem.common_names()
     camera = problem.cameras.of_photo[images.photo]
     ray = np.einsum("mi,mij->mj", points[images.point] - centers[images.photo], rotations[images.photo])
-    focal, bend = _bent(problem, common, camera)
-    image = (images.xy + bend + focal[:, None] * ray[:, :2] / ray[:, 2:]) / images.sigma
+    found = images.xy
+    for _ in range(SUBSTITUTIONS if common.any() else 1):  # the image point whose corrected one is computed
+        focal, bend = _bent(problem, found, common, camera)
+        found = -focal[:, None] * ray[:, :2] / ray[:, 2:] - bend
+    image = (images.xy - found) / images.sigma
     ground = np.einsum("nij,nj->ni", control.axes, points[control.point] - control.xyz) / control.sigma
     places = _place_misfits(problem.positions, centers, rotations, common[_calibrated(names) :])
     turn = Rotation.from_matrix(np.swapaxes(attitudes.rotations, 1, 2) @ rotations[attitudes.photo]).as_rotvec()
@@ -66,14 +70,14 @@ def _calibrated(names: Sequence[str]) -> int:
     return sum(name.startswith("camera") for name in names)
 
 
-def _bent(problem: BundleProblem, common: Floats, camera: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Principal distances of the rays and corrections of their coordinates; distortion is about the principal point."""
+def _bent(problem: BundleProblem, xy: Floats, common: Floats, camera: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Principal distances of the rays and corrections of image points; distortion is about the principal point."""
     center = np.zeros((len(camera), 2))
     for name, value in zip(problem.common_names(), common, strict=True):
         title, _, kind = name.partition(": ")
         if kind in {"x0", "y0"}:
             center[camera == int(title.rpartition(" ")[2]), "xy".index(kind[0])] = value
-    x, y = (problem.images.xy - center).T
+    x, y = (xy - center).T
     r2 = x**2 + y**2
     zero = np.zeros_like(x)
     focal = problem.cameras.focal[camera].astype(float)

@@ -11,6 +11,7 @@ from photostrip.network.settings import CALIBRATION
 from photostrip.strip.image_coordinates import lens_distortion
 
 PRINCIPAL_DISTANCE = list(CALIBRATION).index("c")
+STEPS_TO_IMAGE = 2  # a misfit is small, and each step leaves the square of what was left
 POINT, K, P, AFFINE = [1, 2], [3, 4, 5], [6, 7], [8, 9]  # columns of parameters that belong together
 
 
@@ -44,6 +45,39 @@ def corrected(cameras: BundleCameras, values: Floats, xy: Floats, camera: Number
     return found
 
 
+def uncorrected(
+    cameras: BundleCameras, values: Floats, ideal: Floats, xy: Floats, camera: Numbers
+) -> tuple[Floats, Floats]:
+    """Find the image points that ``corrected`` takes to computed ones (n, 2), and their derivatives by these (n, 2, 2).
+
+    xy: (n, 2), measured: where the step to each of them starts.
+
+    The corrections have to be those at the computed points. At the measured ones they hold measuring errors, which the
+    misfits hold as well: the products of both do not vanish in the mean, and thousands of rays make a distortion of
+    them that is not there.
+    """
+    found = xy
+    for _ in range(STEPS_TO_IMAGE):
+        off = ideal - corrected(cameras, values, found, camera)
+        found = found + np.einsum("nij,nj->ni", _by_ideal(values, found, camera), off)
+    return found, _by_ideal(values, found, camera)
+
+
+def _by_ideal(values: Floats, xy: Floats, camera: Numbers) -> Floats:
+    """Differentiate image coordinates (n, 2) by corrected ones: (n, 2, 2)."""
+    found = np.broadcast_to(np.eye(2), (len(xy), 2, 2)).copy()
+    for number in np.flatnonzero((values != 0.0).any(axis=1)).tolist():
+        some = camera == number
+        found[some] = np.linalg.inv(_slope(values[number], xy[some]))
+    return found
+
+
+def _slope(own: Floats, xy: Floats) -> Floats:
+    """Differentiate the image coordinates that values (10,) of parameters correct by what is corrected: (n, 2, 2)."""
+    estimated = Distortion("brown", "image_to_ideal", k=tuple(own[K]), p=tuple(own[P]), b=tuple(own[AFFINE]))
+    return lens_distortion.jacobian(xy - own[POINT], estimated)
+
+
 def by_image(cameras: BundleCameras, camera: int, xy: Floats, center: Floats) -> Floats:
     """Differentiate ideal image coordinates (n, 2) by measured ones: (n, 2, 2), the given distortion's part.
 
@@ -68,8 +102,7 @@ def partials(cameras: BundleCameras, values: Floats, camera: int, xy: Floats, ra
     own, center = values[camera], values[camera, POINT]
     found = -corrections((xy - center).T)
     found[PRINCIPAL_DISTANCE] = ratio.T
-    estimated = Distortion("brown", "image_to_ideal", k=tuple(own[K]), p=tuple(own[P]), b=tuple(own[AFFINE]))
-    slope = lens_distortion.jacobian(xy - center, estimated) - np.eye(2)
+    slope = _slope(own, xy) - np.eye(2)
     found[POINT] = (by_image(cameras, camera, xy, center) + slope).transpose(2, 1, 0)
     return found
 

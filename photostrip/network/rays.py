@@ -21,11 +21,11 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.network.calibration import (
     PRINCIPAL_DISTANCE,
-    corrected,
     partials,
+    uncorrected,
     values_of,
 )
-from photostrip.network.problem import BundleProblem, ImageObservations, ModelObservations, Parameters
+from photostrip.network.problem import BundleCameras, BundleProblem, ImageObservations, ModelObservations, Parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ def view(problem: BundleProblem, state: Parameters) -> Rays:
     photo, weight, unknown = images.photo, 1.0 / images.sigma, cameras.unknown
     values = values_of(cameras, state.common)
     focal = cameras.focal + values[:, PRINCIPAL_DISTANCE]
-    pull = focal[cameras.of_photo[photo]][:, None] * weight
+    camera = cameras.of_photo[photo]
     back = np.ascontiguousarray(np.swapaxes(state.rotations, 1, 2))[photo]
     arm = np.einsum("nij,nj->ni", back, state.points[images.point] - state.centers[photo])
     depth = 1.0 / arm[:, 2:]
@@ -62,13 +62,17 @@ def view(problem: BundleProblem, state: Parameters) -> Rays:
     by_photo[:, :, 2] = ratio * depth
     by_photo[:, 0, 3], by_photo[:, 0, 4], by_photo[:, 0, 5] = -u * v, 1.0 + u * u, v
     by_photo[:, 1, 3], by_photo[:, 1, 4], by_photo[:, 1, 5] = -1.0 - v * v, u * v, -u
-    by_photo *= pull[:, :, None]
-    measured = images.xy if (unknown < 0).all() else corrected(cameras, values, images.xy, cameras.of_photo[photo])
+    by_photo *= focal[camera][:, None, None]
+    computed = ratio * focal[camera][:, None]
+    if (unknown >= 0).any():
+        computed, by_ideal = uncorrected(cameras, values, computed, images.xy, camera)
+        by_photo = by_ideal @ by_photo
+    by_photo *= weight[:, :, None]
     return Rays(
-        misfit=measured * weight - ratio * pull,
+        misfit=(images.xy - computed) * weight,
         by_photo=by_photo,
         by_point=-by_photo[:, :, :3] @ back,
-        by_common=_by_calibration(problem, unknown, values, ratio, weight),
+        by_common=_by_calibration(problem, values, ratio),
     )
 
 
@@ -115,7 +119,7 @@ def whitening(measured: ImageObservations | ModelObservations) -> Floats:
 
 
 def by_calibration(problem: BundleProblem, camera: int, rays: Flags, kinds: Sequence[int], state: Parameters) -> Floats:
-    """Differentiate computed minus corrected image coordinates of some rays (n,) of a camera by calibration parameters.
+    """Differentiate computed image coordinates of some rays (n,) of a camera by calibration parameters.
 
     kinds: (k,): their columns in ``CALIBRATION``. Returns (r, 2, k), in units of sigma.
     """
@@ -123,24 +127,33 @@ def by_calibration(problem: BundleProblem, camera: int, rays: Flags, kinds: Sequ
     back = np.swapaxes(state.rotations, 1, 2)[images.photo]
     arm = np.einsum("nij,nj->ni", back, state.points[images.point] - state.centers[images.photo])
     values = values_of(problem.cameras, state.common)
-    table = partials(problem.cameras, values, camera, images.xy, -arm[:, :2] / arm[:, 2:])
-    return np.asarray(table[list(kinds)].transpose(2, 1, 0) / images.sigma[:, :, None])
+    return _by_parameters(problem.cameras, values, camera, images, -arm[:, :2] / arm[:, 2:])[:, :, list(kinds)]
 
 
-def _by_calibration(
-    problem: BundleProblem, unknown: Numbers, values: Floats, ratio: Floats, weight: Floats
-) -> csr_array:
-    """Differentiate computed minus corrected image coordinates by the calibration parameters: (2 n, c), in sigmas."""
+def _by_parameters(
+    cameras: BundleCameras, values: Floats, camera: int, images: ImageObservations, ratio: Floats
+) -> Floats:
+    """Differentiate computed image coordinates of rays of a camera by all its parameters: (n, 2, 10), in sigmas."""
+    computed = ratio * (cameras.focal[camera] + values[camera, PRINCIPAL_DISTANCE])
+    image, by_ideal = uncorrected(cameras, values, computed, images.xy, np.full(len(ratio), camera))
+    table = partials(cameras, values, camera, image, ratio).transpose(2, 1, 0)
+    return np.asarray(by_ideal @ table / images.sigma[:, :, None])
+
+
+def _by_calibration(problem: BundleProblem, values: Floats, ratio: Floats) -> csr_array:
+    """Differentiate computed image coordinates by the calibration parameters: (2 n, c), in sigmas."""
+    unknown = problem.cameras.unknown
     shape = (2 * len(ratio), int(unknown.max(initial=-1)) + 1)
     if not shape[1]:
         return csr_array(shape)
     camera = problem.cameras.of_photo[problem.images.photo]
     entries, rows, columns = [], [], []
     for number in np.flatnonzero((unknown >= 0).any(axis=1)).tolist():
-        ray, kind = np.flatnonzero(camera == number), np.flatnonzero(unknown[number] >= 0)
-        table = partials(problem.cameras, values, number, problem.images.xy[ray], ratio[ray])
-        entries.append((table[kind] * weight[ray].T).ravel())
-        places = np.broadcast_arrays(unknown[number, kind][:, None, None], 2 * ray + np.arange(2)[:, None])
+        of_camera = camera == number
+        ray, kind = np.flatnonzero(of_camera), np.flatnonzero(unknown[number] >= 0)
+        table = _by_parameters(problem.cameras, values, number, problem.images.take(of_camera), ratio[ray])
+        entries.append(table[:, :, kind].ravel())
+        places = np.broadcast_arrays(unknown[number, kind], 2 * ray[:, None, None] + np.arange(2)[:, None])
         columns.append(places[0].ravel())
         rows.append(places[1].ravel())
     place = (np.concatenate(rows), np.concatenate(columns))
