@@ -56,20 +56,15 @@ def uncorrected(
     misfits hold as well: the products of both do not vanish in the mean, and thousands of rays make a distortion of
     them that is not there.
     """
-    found = xy
-    for _ in range(STEPS_TO_IMAGE):
-        off = ideal - corrected(cameras, values, found, camera)
-        found = found + np.einsum("nij,nj->ni", _by_ideal(values, found, camera), off)
-    return found, _by_ideal(values, found, camera)
-
-
-def _by_ideal(values: Floats, xy: Floats, camera: Numbers) -> Floats:
-    """Differentiate image coordinates (n, 2) by corrected ones: (n, 2, 2)."""
-    found = np.broadcast_to(np.eye(2), (len(xy), 2, 2)).copy()
+    found, by_ideal = ideal.copy(), np.broadcast_to(np.eye(2), (len(xy), 2, 2)).copy()
     for number in np.flatnonzero((values != 0.0).any(axis=1)).tolist():
         some = camera == number
-        found[some] = np.linalg.inv(_slope(values[number], xy[some]))
-    return found
+        own, at = camera[some], xy[some]
+        for _ in range(STEPS_TO_IMAGE):
+            off = ideal[some] - corrected(cameras, values, at, own)
+            at = at + np.linalg.solve(_slope(values[number], at), off[..., None])[..., 0]
+        found[some], by_ideal[some] = at, np.linalg.inv(_slope(values[number], at))
+    return found, by_ideal
 
 
 def _slope(own: Floats, xy: Floats) -> Floats:
