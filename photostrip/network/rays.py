@@ -131,7 +131,11 @@ def by_calibration(problem: BundleProblem, camera: int, rays: Flags, kinds: Sequ
 
 
 def _by_parameters(
-    cameras: BundleCameras, values: Floats, camera: int, images: ImageObservations, ratio: Floats
+    cameras: BundleCameras,
+    values: Floats,
+    camera: int,
+    images: ImageObservations | ModelObservations,
+    ratio: Floats,
 ) -> Floats:
     """Differentiate computed image coordinates of rays of a camera by all its parameters: (n, 2, 10), in sigmas."""
     computed = ratio * (cameras.focal[camera] + values[camera, PRINCIPAL_DISTANCE])
