@@ -66,7 +66,7 @@ def _slopes(pairs: Pairs) -> NDArray[np.complex128]:
 
 
 def solve(start: Floats, pairs: Pairs, sigma: Floats) -> RobustElements:
-    """Orient pairs with weights that fall with the residual.
+    """Orient pairs with weights that fall with the residual, the points in front of the cameras.
 
     start: (p, 5), elements to start from, radians.
     sigma: (p,), a-priori standard deviation of a y parallax of weight one, mm; the scale is not smaller.
@@ -84,7 +84,7 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats) -> RobustElements:
             solution.Linearised(q, jacobian), replace(pairs, weight=weight), solution.RIDGE, solution.LARGEST_STEP
         )
         elements = elements + change
-    return RobustElements(solution.reduced_angles(elements), scale)
+    return RobustElements(solution.facing(solution.reduced_angles(elements), pairs)[0], scale)
 
 
 def orient_robustly(pairs: Pairs, sigma: Floats, few: int) -> RobustElements:

@@ -197,7 +197,7 @@ def solve_elements(pairs: Pairs) -> Solved:
     """
     start = start_values(pairs)
     best, converged, steps = iterate_elements(start, pairs)
-    best, rays = _facing(best, pairs)
+    best, rays = facing(best, pairs)
     share, squares = _score(rays, converged, pairs)
     tolerable = (RETRY_RMS * pairs.focal) ** 2 * pairs.sums(pairs.weight)
     for turn in RETRY_AZIMUTHS:
@@ -208,7 +208,7 @@ def solve_elements(pairs: Pairs) -> Solved:
         turned = start[todo]
         turned[:, [1, 4]] += turn
         elements, success, count = iterate_elements(turned, part)
-        elements, rays = _facing(elements, part)
+        elements, rays = facing(elements, part)
         new_share, new_squares = _score(rays, success, part)
         more = new_share > share[todo] + 1e-9
         as_many = new_share > share[todo] - 1e-9
@@ -219,7 +219,7 @@ def solve_elements(pairs: Pairs) -> Solved:
     return Solved(best, converged, steps)
 
 
-def _facing(elements: Floats, pairs: Pairs) -> tuple[Floats, tuple[Floats, Floats]]:
+def facing(elements: Floats, pairs: Pairs) -> tuple[Floats, tuple[Floats, Floats]]:
     """Turn the base of pairs round whose points lie behind both cameras: the same planes, the other side; and rays."""
     rays = base_rays(elements, pairs)
     to_left, to_right = _distances(*rays)

@@ -329,6 +329,16 @@ def test_robust_elements_are_those_of_the_good_points(share: int, found_in: int)
     assert (found.scale[right] < 1.01 * np.sqrt(2) * SIGMA).all()
 
 
+def test_robust_elements_have_the_points_in_front_of_the_cameras() -> None:
+    """A base turned round leaves the same parallaxes, with all points behind both cameras."""
+    flown = level(17, 4, (5,) * 6)
+    turned = np.array([-1.0, 1.0, -1.0, -1.0, 1.0]) * flown.orient().elements + np.array([0.0, np.pi, 0.0, 0.0, np.pi])
+    found = robust.solve(turned, flown.pairs, np.full(4, np.sqrt(2) * SIGMA))
+    assert not solution.in_front_of_cameras(turned, flown.pairs).any()
+    assert solution.in_front_of_cameras(found.elements, flown.pairs).all()
+    assert flown.errors(found.elements) == pytest.approx(0.0, abs=1e-3)
+
+
 @pytest.mark.parametrize(("each", "share", "found_in"), [(2, 3, 52), (2, 4, 43), (3, 6, 50)])
 def test_a_wrong_point_that_half_of_a_pair_agrees_with_does_not_win(each: int, share: int, found_in: int) -> None:
     # with the median in place of the sum: 46, 40 and 48 of 60
