@@ -376,6 +376,21 @@ def bent(case: Case, xy: Floats) -> Floats:
     return xy * (1.0 + k1 * (xy**2).sum(axis=1)[:, None])
 
 
+def bent_at_the_edge(case: Case, xy: Floats) -> Floats:
+    """Bend the images by k1 of 30 to 100 µm at the edge, and by a k2 that takes most of it back there."""
+    radius = 0.75 * float(np.hypot(*xy.T).max())
+    k1, turned = either(case.rng, 0.03, 0.1) / radius**3, float(case.rng.uniform(0.5, 1.0))
+    r2 = (xy**2).sum(axis=1)[:, None]
+    return xy * (1.0 + k1 * r2 - turned * k1 * r2**2 / radius**2)
+
+
+def decentred(case: Case, xy: Floats) -> Floats:
+    """Decentre the lens: p1 and p2 of 10 to 40 µm at three quarters of half the diagonal."""
+    radius = 0.75 * float(np.hypot(*xy.T).max())
+    p = either(case.rng, 0.01, 0.04, 2) / radius**2
+    return xy + p * (xy**2).sum(axis=1)[:, None] + 2.0 * xy * (xy @ p)[:, None]
+
+
 def shrunk(low: float, high: float, axes: int = 2) -> Plant:
     """Let the film shrink or grow along one of the first image axes, by a share between two."""
 
@@ -1038,6 +1053,8 @@ MISTAKES = (
     Mistake("angles with another sense of kappa", of_angles(lambda _, values: values * [1, 1, -1], tilt=1.0),
             ("P602",)),
     Mistake("angles against true north in a grid", against_true_north, ("P602",), 1, at_the_edge),
+    Mistake("k1 and k2 not stated", of_all_images(bent_at_the_edge), ("P110",), 2),
+    Mistake("decentred lens not stated", of_all_images(decentred), ("P110",), 2),
 )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.special import fdtrc, gammaincc, gammaln
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, values_of
+from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, K, P, values_of
 from photostrip.network.calibration import POINT as PRINCIPAL_POINT
 from photostrip.network.normal_equations import Columns, Explained
 from photostrip.network.problem import BundleProblem, ControlObservations, PositionObservations
@@ -31,15 +31,19 @@ from photostrip.network.settings import CALIBRATION
 from photostrip.network.solution import BundleSolution, Cofactors
 
 ORDER, OFFSET, DRIFT, LIST = "order of positions", "offset", "drift", "control list"
-LENS, FILM, POINT, DISTANCE = "lens distortion", "film", "principal point", "principal distance"
+LENS, EDGE, DECENTRED = "lens distortion", "lens distortion at the edge", "decentred lens"
+FILM, POINT, DISTANCE = "film", "principal point", "principal distance"
 SHIFT, SCALE = "shift of a photo", "scale of a photo"
 OF_CAMERAS = {
-    LENS: [list(CALIBRATION).index("k1")],
+    LENS: K[:1],
+    EDGE: K[1:2],
+    DECENTRED: P,
     FILM: AFFINE,
     POINT: PRINCIPAL_POINT,
     DISTANCE: [PRINCIPAL_DISTANCE],
 }
 """What may be wrong with a camera, with the columns of its parameters."""
+OF_LENSES = LENS, EDGE, DECENTRED
 OF_PHOTOS = {SHIFT: PRINCIPAL_POINT, SCALE: [PRINCIPAL_DISTANCE]}
 """What may be wrong with one photo: it has a principal point, or a principal distance, of its own."""
 OF_IMAGE_COORDINATES = OF_CAMERAS | OF_PHOTOS
@@ -119,7 +123,8 @@ def _cameras(solution: BundleSolution) -> Iterator[Hypothesis]:
     used = np.flatnonzero(np.bincount(cameras.of_photo) > min(1, problem.photos - 1))  # of one photo see `_photos`
     for kind, columns in OF_CAMERAS.items():
         for camera in used.tolist():
-            if (cameras.unknown[camera, columns] < 0).all() and (given or kind != DISTANCE):
+            lower = kind != EDGE or (cameras.unknown[camera, OF_CAMERAS[LENS]] >= 0).all()  # powers come in their order
+            if (cameras.unknown[camera, columns] < 0).all() and (given or kind != DISTANCE) and lower:
                 yield Hypothesis(kind, camera)
 
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from photostrip.network.hypotheses import (
+    DECENTRED,
     DISTANCE,
     DRIFT,
+    EDGE,
     FILM,
     LENS,
     LIST,
@@ -32,6 +34,7 @@ class Cause(NamedTuple):
 
 
 _POSITIONS = "look at datum, kind of height and lever arm of the positions, and at the crs of the control"
+_LENS = "look at the lens in the calibration certificate of the camera"
 CAUSES: dict[str, Cause] = {
     IMAGE: Cause(
         title="ray",
@@ -86,8 +89,22 @@ CAUSES: dict[str, Cause] = {
         title="lens distortion",
         shows="residuals outwards or inwards, by the third power of the radius",
         told=("P110",),
-        cure="look at the lens in the calibration certificate of the camera",
+        cure=_LENS,
         example="a drone camera, given as free of distortion",
+    ),
+    EDGE: Cause(
+        title="lens distortion at the edge",
+        shows="what is left then, by the fifth power",
+        told=("P110",),
+        cure=_LENS,
+        example="k2 left out",
+    ),
+    DECENTRED: Cause(
+        title="decentred lens",
+        shows="residuals by the square of the radius, to one side",
+        told=("P110",),
+        cure=_LENS,
+        example="p1 and p2 exchanged",
     ),
     FILM: Cause(
         title="film",

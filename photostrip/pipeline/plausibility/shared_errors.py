@@ -18,6 +18,8 @@ from photostrip.network.hypotheses import (
     FORWARDS,
     LENS,
     LIST,
+    OF_CAMERAS,
+    OF_LENSES,
     OF_PHOTOS,
     OFFSET,
     ORDER,
@@ -29,6 +31,7 @@ from photostrip.network.hypotheses import (
 )
 from photostrip.network.reliability import CONTROL
 from photostrip.network.self_calibration import Parameter
+from photostrip.network.settings import CALIBRATION
 from photostrip.notes import Finding, listed
 from photostrip.pipeline.inputs import Inputs
 from photostrip.pipeline.plausibility.shared_control import other_distance, shifted_list
@@ -50,7 +53,7 @@ def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
         cameras = {strip.camera.name for strip in inputs.strips}
         of_cameras = (each for each in bundle.parameters if each.camera in cameras)
         yield from (_distance(each, inputs) for each in of_cameras if _is_distance(each))
-    yield from (_lens(each, bundle, inputs) for each in shared if each.kind == LENS)
+    yield from _lens([each for each in shared if each.kind in OF_LENSES], bundle, inputs)
     yield from (_point(each, bundle, inputs) for each in shared if each.kind == POINT)
     yield from (_film(each, bundle, inputs) for each in shared if each.kind == FILM)
     of_photos = [each for each in shared if each.kind in OF_PHOTOS]
@@ -120,19 +123,30 @@ def _order(error: Hypothesis, bundle: Bundle) -> Finding:
     return found("P208", message, CAUSES[ORDER].cure, {"order": error.of}, photos=photos, key="camera_positions")
 
 
-def _lens(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:
-    (k1,) = _parameters(error, bundle, "k1")
+def _lens(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
+    """Name the distortion of each camera by everything that was found of it."""
     images = bundle.screened.problem.images
-    radius = float(np.hypot(*images.xy.T).max())
-    um, sigma_um = (each * radius**3 * 1000 for each in (k1.value, k1.sigma))
-    message = (
-        f"photos of camera {k1.camera} agree with each other and with what is given at a radial distortion that is not "
-        f"stated: k1 = {k1.value:.3g} mm^-2, {um:+.1f} µm at {radius:.0f} mm from the principal point (standard "
-        f"deviation {sigma_um:.1f} µm). {CONTINUED}"
-    )
-    fix = f"{CAUSES[LENS].cure}; {_decision(['k1'])}"
-    numbers: Evidence = {"k1": k1.value, "standard_deviation": k1.sigma, "radius_mm": radius, "distortion_um": um}
-    return found("P110", message, fix, numbers, strips=_strips_of(k1.camera, inputs), key="processing.self_calibration")
+    radius, names = float(np.hypot(*images.xy.T).max()), list(CALIBRATION)
+    for camera in dict.fromkeys(each.number for each in errors):
+        kinds = [names[n] for each in errors if each.number == camera for n in OF_CAMERAS[each.kind]]
+        name = bundle.screened.problem.camera_ids[camera]
+        parameters = [each for each in bundle.parameters if each.camera == name and each.name in kinds]
+        edge = [radius ** CALIBRATION[each.name].power * 1000.0 for each in parameters]
+        parts = [
+            f"{each.name} = {each.value:.3g} {each.unit}, {each.value * um:+.1f} µm (standard deviation "
+            f"{each.sigma * um:.1f} µm)"
+            for each, um in zip(parameters, edge, strict=True)
+        ]
+        message = (
+            f"photos of camera {name} agree with each other and with what is given at a lens distortion that is not "
+            f"stated; {radius:.0f} mm from the principal point, {', '.join(parts)}. {CONTINUED}"
+        )
+        fix = f"{CAUSES[LENS].cure}; {_decision(kinds)}"
+        numbers: Evidence = {"radius_mm": radius}
+        for each, um in zip(parameters, edge, strict=True):
+            numbers |= {each.name: each.value, f"{each.name}_standard_deviation": each.sigma}
+            numbers[f"{each.name}_um"] = each.value * um
+        yield found("P110", message, fix, numbers, strips=_strips_of(name, inputs), key="processing.self_calibration")
 
 
 def _point(error: Hypothesis, bundle: Bundle, inputs: Inputs) -> Finding:

@@ -67,7 +67,7 @@ def test_an_unstated_lens_is_named_and_costs_nothing() -> None:
     assert finding.code == "P110"
     assert finding.key == "processing.self_calibration"
     assert "[k1]" in finding.fix
-    assert finding.evidence["k1"] == pytest.approx(K1, abs=4 * float(finding.evidence["standard_deviation"]))
+    assert finding.evidence["k1"] == pytest.approx(K1, abs=4 * float(finding.evidence["k1_standard_deviation"]))
     assert control_lost(result) == 0
     assert up(bent, result) < 1.1 * up(sound, adjusted(sound))
     left = adjusted(bent, search_cameras=False)
