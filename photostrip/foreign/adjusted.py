@@ -27,6 +27,7 @@ from photostrip.strip.image_coordinates import lens_distortion
 from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera, in_pixels
 
 WHOLE = 1e-6  # of a pixel, up to which rounding may make a photo larger
+SEEN = 0.005  # pixels, from which on two decimals are not zero
 GRID = 21  # lines of points in which the nearest camera of another program is sought
 
 
@@ -149,6 +150,24 @@ class Adjusted:
         """Return the adjusted image points of a photo, from the principal point over the principal distance, y up."""
         return seen(self.xyz[self.rays[number].points], self.centers[number], self.rotations[number])
 
+    def on_map(self, xyz: Floats, enu: Floats | None = None) -> Floats:
+        """Coordinates as maps have them: those of the result; longitude and latitude in place of geocentric.
+
+        enu: those of the same points in the frame, where they are known.
+        """
+        if self.ground.kind == "geocentric":
+            geodetic = self.ground.geodetic(xyz)
+            return np.column_stack([np.degrees(geodetic[:, :2]), geodetic[:, 2]])
+        return self.ground.ground_from_cartesian(xyz) if enu is None else enu.copy()
+
+    def said_of_map(self) -> list[str]:
+        """Say by how much who takes the coordinates of a map for Cartesian ones is wrong."""
+        departure, photo = self.bent() if self.ground.kind == "projected" else (0.0, "")
+        if departure < SEEN:
+            return []
+        moved = f"the map taken for Cartesian moves image points by up to {departure:.2f} px (photo {photo})"
+        return [f"{moved}: curvature of the Earth, scale of the map"]
+
     def said_of_cameras(self) -> list[str]:
         """Say which cameras are not exactly those of the result, and whose pixels are not those of the photos."""
         said = [
@@ -204,6 +223,13 @@ def adjusted(document: Document) -> Adjusted:
         points=points,
         enu=coordinates(points)[:, columns],
     )
+
+
+def require_squares(camera: Camera, form: str) -> None:
+    """Refuse pixels that are no squares."""
+    if any(camera.pixel_affinity):
+        message = f"pixels of camera {camera.name} are no squares, for which {form} has no key"
+        raise InputError(Fault(message, "export", fix="write it in pixels (.metashape.yaml)"))
 
 
 def coordinates(records: tuple[Document, ...], names: tuple[str, ...] = ("x", "y", "z")) -> Floats:

@@ -24,7 +24,6 @@ from photostrip.notes import counted
 
 HEADER = ("filename", "x", "y", "z", "omega", "phi", "kappa", "camera")
 text = json_encoder.UNICODE.value
-SEEN = 0.005  # pixels, from which on two decimals are not zero
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")  # as OpenCV has them
 
 
@@ -55,13 +54,7 @@ def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | byte
     else:
         files[target] = _geojson(block, turned, wkt)
     said = [f"{counted(len(block.photos), 'photo')} of {counted(len(block.cameras), 'camera')}"]
-    departure, photo = block.bent()
-    if departure >= SEEN:
-        said.append(
-            f"the map taken for Cartesian moves image points by up to {departure:.2f} px (photo {photo}): curvature of "
-            "the Earth, scale of the map"
-        )
-    return files, said + block.said_of_cameras()
+    return files, said + block.said_of_map() + block.said_of_cameras()
 
 
 def _geojson(block: Adjusted, turned: Floats, wkt: str) -> str:

@@ -512,7 +512,7 @@ def test_a_batch_writes_the_same_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("a.shp", "geopackage (.gpkg), orthority (.csv), orthority-geojson (.geojson), colmap (/), "),
+        ("a.shp", "geopackage (.gpkg), historix (extrinsics.csv), orthority (.csv), orthority-geojson (.geojson), "),
         ("../a.gpkg", "does not lie in the folder of the run"),
         ("/a.gpkg", "does not lie in the folder of the run"),
         ("photos.csv", "is a file of the result itself; write other-photos.csv"),
