@@ -18,6 +18,7 @@ WRITERS = {
     "historix": historix_submission.write,
     "orthority": orthority.write,
     "orthority-geojson": orthority.write,
+    "omega-phi-kappa": orthority.write,
     "colmap": colmap_model.write,
     **dict.fromkeys(("cameras", *(f"cameras-{each}" for each in CONVENTIONS)), cameras.write),
 }

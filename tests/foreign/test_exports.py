@@ -337,6 +337,24 @@ def test_geojson_of_orthority_says_the_same_as_its_table(
     assert meta["crs"] == "EPSG:4979"
 
 
+def test_the_table_with_tabs_says_the_same_as_that_of_orthority(
+    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = []
+    for name in ("ori.csv", "table.txt"):
+        capsys.readouterr()
+        assert main(["convert", str(block), str(tmp_path / name)]) == 0
+        said.append(re.findall(r"by up to .* px", capsys.readouterr().out))
+    assert said[0] == said[1]
+    names, *rows = (line.split("\t") for line in (tmp_path / "table.txt").read_text(encoding="utf-8").splitlines())
+    assert names == ["label", "X", "Y", "Z", "omega", "phi", "kappa"]
+    assert rows == [list(row.values())[:7] for row in nonempty(table(tmp_path / "ori.csv"))]
+    assert not list(tmp_path.glob("table_*"))
+    local = block.document["frame"]["crs"] == "local"
+    assert (tmp_path / "table.prj").exists() != local
+    assert local or CRS.from_wkt((tmp_path / "table.prj").read_text(encoding="utf-8")) == CRS(UTM)
+
+
 # ----------------------------------------------------------------------------------------------------- COLMAP
 
 

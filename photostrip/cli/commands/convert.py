@@ -84,8 +84,9 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     Printed is what was understood: counts, cameras, one photo, frame, units. What the files do not carry is asked for
     by the name of an option, and never guessed.
 
-    Where SOURCE is a result, it is written into FILE: GeoPackage, tables of orthority (CSV, GeoJSON), a submission to
-    HISTORIX (NAME_extrinsics.csv), cameras (.yaml; .opencv.yaml and its kin in pixels), a COLMAP model.
+    Where SOURCE is a result, it is written into FILE: GeoPackage, tables of orthority (CSV, GeoJSON), of omega, phi,
+    kappa (.txt), a submission to HISTORIX (NAME_extrinsics.csv), cameras (.yaml; .opencv.yaml and its kin in pixels),
+    a COLMAP model.
     """
     from photostrip.cli.jobs.convert import Options, converted, is_result, written_for_others
 

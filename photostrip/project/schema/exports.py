@@ -17,6 +17,7 @@ ENDINGS = {
     "historix": "extrinsics.csv",
     "orthority": ".csv",
     "orthority-geojson": ".geojson",
+    "omega-phi-kappa": ".txt",
     "colmap": "/",
 }
 ENDINGS |= {f"cameras-{each}": f".{each}.yaml" for each in CONVENTIONS} | {"cameras": ".yaml"}
