@@ -7,5 +7,5 @@ say where something stands in them. ``control`` and ``opensfm_control`` put poin
 and says what was understood. A run knows nothing of other programs' files. ``adjusted`` takes out of a result what
 other programs need, ``exports`` makes their files: ``geopackage`` layers on a map, ``orthority`` orientations for
 orthophotos, ``historix_submission`` orientations and points for HISTORIX, ``colmap_model`` a model of COLMAP,
-``cameras`` a block of a project.
+``opensfm_model`` one of OpenSfM, ``cameras`` a block of a project.
 """

@@ -27,6 +27,7 @@ from photostrip.strip.image_coordinates import lens_distortion
 from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera, in_pixels
 
 WHOLE = 1e-6  # of a pixel, up to which rounding may make a photo larger
+TO_CAMERA = np.diag([1.0, -1.0, -1.0])  # from image axes to x to the right, y down, z ahead
 SEEN = 0.005  # pixels, from which on two decimals are not zero
 GRID = 21  # lines of points in which the nearest camera of another program is sought
 
@@ -188,6 +189,20 @@ class Adjusted:
         if not self.photos:
             message = f"independent models give no orientation of photos, which {form} is made of"
             raise InputError(Fault(message, "export", fix="write a GeoPackage (.gpkg)"))
+
+    def require_one_place(self, form: str) -> None:
+        """Refuse strips that were adjusted each by itself: a point on two of them has no one place."""
+        if self.document["adjustment"] != "bundle" and len(self.document["strips"]) > 1:
+            message = f"strips adjusted each by itself have points of their own, where {form} has one for all"
+            raise InputError(Fault(message, "export", fix="run with --set processing.adjustment=bundle"))
+
+    def into_cameras(self, origin: Floats, axes: Floats) -> tuple[Floats, Floats]:
+        """Rotations (m, 3, 3) and shifts (m, 3) from a frame to the cameras: x to the right, y down, z ahead.
+
+        origin, axes: of the frame, in the Cartesian one; its axes as rows.
+        """
+        rotations = TO_CAMERA @ self.rotations.transpose(0, 2, 1) @ axes.T
+        return rotations, -np.einsum("nij,nj->ni", rotations, (self.centers - origin) @ axes.T)
 
     def bent(self) -> tuple[float, str]:
         """Largest distance in pixels of image points by the coordinates of the frame from the true ones, and its photo.

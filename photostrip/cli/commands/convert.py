@@ -86,7 +86,7 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
 
     Where SOURCE is a result, it is written into FILE: GeoPackage, tables of orthority (CSV, GeoJSON), of omega, phi,
     kappa (.txt), a submission to HISTORIX (NAME_extrinsics.csv), cameras (.yaml; .opencv.yaml and its kin in pixels),
-    a COLMAP model.
+    a COLMAP model, reconstruction.json of OpenSfM.
     """
     from photostrip.cli.jobs.convert import Options, converted, is_result, written_for_others
 

@@ -104,7 +104,7 @@ def written_for_others(source: Path, target: str, form: str, *, force: bool) -> 
         message = f"cannot be exported: a value is of another kind ({error})"
         fault = Fault(message, "result-incomplete", str(file), expected="a whole result.json", fix=FIX)
         raise InputError(fault) from error
-    if not force and any("/" in name for name in found.files):
+    if not force and (form == "opensfm" or any("/" in name for name in found.files)):  # measurements may stand there
         refuse_existing(place.parent, list(found.files))
     write_files(place.parent, found.files, [file, *(file.parent / f"{name}.csv" for name in TABLES)])
     return [*([f"{file}: {EDITED}"] if is_edited(saved) else []), *found.said]

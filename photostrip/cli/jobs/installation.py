@@ -30,7 +30,7 @@ FORMATS = {
         "accuracy report (text, Markdown, JSON, annotations; HTML with pictures): photostrip run, report",
         "comparison (text, Markdown, JSON, JUnit, annotations), baseline.json: photostrip compare",
         "project with tables and truth.json: photostrip simulate -o",
-        "GeoPackage, orthority (CSV, GeoJSON), HISTORIX, COLMAP: photostrip convert RESULT FILE, `export` of a project",
+        "GeoPackage, orthority (CSV, GeoJSON), HISTORIX, COLMAP, OpenSfM: photostrip convert RESULT FILE, `export`",
         "trace of every iteration (text, Markdown, JSON): photostrip run --trace",
         "rule for make: photostrip run --depfile",
         "JSON Schema: photostrip schema",

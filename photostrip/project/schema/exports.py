@@ -19,6 +19,7 @@ ENDINGS = {
     "orthority-geojson": ".geojson",
     "omega-phi-kappa": ".txt",
     "colmap": "/",
+    "opensfm": "reconstruction.json",
 }
 ENDINGS |= {f"cameras-{each}": f".{each}.yaml" for each in CONVENTIONS} | {"cameras": ".yaml"}
 """What a result is written as, and the ending that asks for it; that of a folder is ``/``."""
