@@ -27,7 +27,7 @@ OF_MODEL = """\
 # Place, direction and scale of its orientations are arbitrary. They are a start: with control the photos are laid on
 # it, without any the result is a free network in the frame of the model.
 """
-WITHOUT_RAYS = "# Tie points are missing: put their rows, photo,point,x,y, into observations.csv.\n"
+WITHOUT_RAYS = "# Tie points are missing: put their rows into observations.csv, with the columns of its header.\n"
 
 
 def project_files(name: str, block: ForeignBlock, wanted: Wanted) -> dict[str, Content]:

@@ -13,8 +13,9 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.arrays import Flags, Floats, Numbers
+from tests.source_tree import ROOT
 
-CASA_GRANDE = Path(__file__).parents[1] / "data" / "historix-casa-grande"
+CASA_GRANDE = ROOT / "sample_data" / "casa-grande"
 FILES = ("camera_model_intrinsics.csv", "camera_model_extrinsics.csv", "gcp.csv")
 SIZE = 10_000  # pixels: the files do not say it; the marks have their middle at about 5000
 ROUGH = (300.0, 300.0, 500.0)  # metres
