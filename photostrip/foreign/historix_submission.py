@@ -19,6 +19,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted, require_squares
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.geodesy.crs import map_entry
+from photostrip.geodesy.ground_frame import plural
 from photostrip.geometry.rotation import angles
 from photostrip.notes import counted, listed
 from photostrip.project.schema.exports import ENDINGS
@@ -32,12 +33,15 @@ DATED = date(1970, 1, 1)  # the same bytes for the same result
 def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, str | bytes], list[str]]:
     """Return the three files.
 
-    Raises InputError for a local frame, for more than one camera, and for pixels that are no squares.
+    Raises InputError for a local frame, a map in feet, more than one camera, and pixels that are no squares.
     """
     block.require_photos("HISTORIX")
     if block.ground.kind == "local":
         message = "HISTORIX asks for longitude and latitude, which a local frame does not have"
         raise InputError(Fault(message, "export", fix="give control in a reference system"))
+    if block.ground.kind == "projected" and {block.ground.plan_factor, block.ground.height_factor} != {1.0}:
+        message = f"HISTORIX counts in metres, and the plan is in {plural(block.ground.plan_unit)}"
+        raise InputError(Fault(message, "export", fix="give output.crs with a map in metres"))
     if len(block.cameras) > 1:
         message = f"HISTORIX takes one camera, and the photos have {listed(list(block.cameras), 4)}"
         raise InputError(Fault(message, "export", fix="run the photos of each camera alone"))

@@ -677,6 +677,7 @@ def test_orthority_takes_maps_only_and_colmap_one_place_for_each_point(
     found = ran(tmp_path / "c", *(word for each in feet for word in ("--set", each)),
                 ground={"crs": "EPSG:6339", "center_deg": [-122.0, 40.5]})  # fmt: skip
     assert "heights in metres stand beside a plan in US survey feet" in refused(capsys, str(found), f"{tmp_path}/a.csv")
+    assert "HISTORIX counts in metres" in refused(capsys, str(found), f"{tmp_path}/extrinsics.csv")
     found = ran(tmp_path / "b", "--set", "processing.adjustment=polynomial", flight={"photos": 6, "strips": 2},
                 control={"layout": "bands", "bands": 3, "check": 4})  # fmt: skip
     assert "processing.adjustment=bundle" in refused(capsys, str(found), f"{tmp_path}/m/")

@@ -117,7 +117,7 @@ WRONG: dict[str, tuple[str, str, str, str]] = {
         "corner_top_left_x_mm: corner_top_left has no place on its side of the",
     ),
     "small photos": (FILES[0], "0.025,", "0.015,", "midside_left lies outside photos of 10000 x 10000 px of 0.015 mm"),
-    "distortion": (FILES[0], "principal_point_y_mm", "k1", f"{FILES[0]}:1: principal_point_y_mm: there is no column"),
+    "no column": (FILES[0], "principal_point_y_mm", "k1", f"{FILES[0]}:1: principal_point_y_mm: there is no column"),
     "latitude": (FILES[1], "32.894945", "132.894945", f"{FILES[1]}:3:33: lat: 132.895 is no angle in degrees"),
     "twice": (
         FILES[1],
