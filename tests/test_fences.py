@@ -22,6 +22,7 @@ FENCES = {
     "gzip": FILES,
     "jinja2": ("report/*",),
     "json": FILES,
+    "laspy": ("foreign/historix_submission.py",),
     "matplotlib": ("report/*",),
     "pyproj": ("geodesy/crs.py", "geodesy/proj_operation.py"),
     "rich": ("report/page/console.py", "report/page/progress.py"),

@@ -27,6 +27,8 @@ from photostrip.strip.image_coordinates import lens_distortion
 from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera, in_pixels
 
 WHOLE = 1e-6  # of a pixel, up to which rounding may make a photo larger
+TO_CAMERA = np.diag([1.0, -1.0, -1.0])  # from image axes to x to the right, y down, z ahead
+SEEN = 0.005  # pixels, from which on two decimals are not zero
 GRID = 21  # lines of points in which the nearest camera of another program is sought
 
 
@@ -149,6 +151,24 @@ class Adjusted:
         """Return the adjusted image points of a photo, from the principal point over the principal distance, y up."""
         return seen(self.xyz[self.rays[number].points], self.centers[number], self.rotations[number])
 
+    def on_map(self, xyz: Floats, enu: Floats | None = None) -> Floats:
+        """Coordinates as maps have them: those of the result; longitude and latitude in place of geocentric.
+
+        enu: those of the same points in the frame, where they are known.
+        """
+        if self.ground.kind == "geocentric":
+            geodetic = self.ground.geodetic(xyz)
+            return np.column_stack([np.degrees(geodetic[:, :2]), geodetic[:, 2]])
+        return self.ground.ground_from_cartesian(xyz) if enu is None else enu.copy()
+
+    def said_of_map(self) -> list[str]:
+        """Say by how much who takes the coordinates of a map for Cartesian ones is wrong."""
+        departure, photo = self.bent() if self.ground.kind == "projected" else (0.0, "")
+        if departure < SEEN:
+            return []
+        moved = f"the map taken for Cartesian moves image points by up to {departure:.2f} px (photo {photo})"
+        return [f"{moved}: curvature of the Earth, scale of the map"]
+
     def said_of_cameras(self) -> list[str]:
         """Say which cameras are not exactly those of the result, and whose pixels are not those of the photos."""
         said = [
@@ -169,6 +189,20 @@ class Adjusted:
         if not self.photos:
             message = f"independent models give no orientation of photos, which {form} is made of"
             raise InputError(Fault(message, "export", fix="write a GeoPackage (.gpkg)"))
+
+    def require_one_place(self, form: str) -> None:
+        """Refuse strips that were adjusted each by itself: a point on two of them has no one place."""
+        if self.document["adjustment"] != "bundle" and len(self.document["strips"]) > 1:
+            message = f"strips adjusted each by itself have points of their own, where {form} has one for all"
+            raise InputError(Fault(message, "export", fix="run with --set processing.adjustment=bundle"))
+
+    def into_cameras(self, origin: Floats, axes: Floats) -> tuple[Floats, Floats]:
+        """Rotations (m, 3, 3) and shifts (m, 3) from a frame to the cameras: x to the right, y down, z ahead.
+
+        origin, axes: of the frame, in the Cartesian one; its axes as rows.
+        """
+        rotations = TO_CAMERA @ self.rotations.transpose(0, 2, 1) @ axes.T
+        return rotations, -np.einsum("nij,nj->ni", rotations, (self.centers - origin) @ axes.T)
 
     def bent(self) -> tuple[float, str]:
         """Largest distance in pixels of image points by the coordinates of the frame from the true ones, and its photo.
@@ -204,6 +238,13 @@ def adjusted(document: Document) -> Adjusted:
         points=points,
         enu=coordinates(points)[:, columns],
     )
+
+
+def require_squares(camera: Camera, form: str) -> None:
+    """Refuse pixels that are no squares."""
+    if any(camera.pixel_affinity):
+        message = f"pixels of camera {camera.name} are no squares, for which {form} has no key"
+        raise InputError(Fault(message, "export", fix="write it in pixels (.metashape.yaml)"))
 
 
 def coordinates(records: tuple[Document, ...], names: tuple[str, ...] = ("x", "y", "z")) -> Floats:

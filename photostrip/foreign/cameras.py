@@ -7,10 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from photostrip.camera import Camera
-from photostrip.errors import Fault, InputError
-from photostrip.foreign.adjusted import Adjusted
-from photostrip.foreign.project import camera_in_pixels
+from photostrip.foreign.adjusted import Adjusted, require_squares
+from photostrip.foreign.project import camera_in_pixels, in_project
 from photostrip.notes import Document
 from photostrip.project.resolved import lines_of
 from photostrip.project.schema.values import Text
@@ -30,7 +28,8 @@ def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | byte
         if convention in CONVENTIONS:
             cameras[Text(name)] = camera_in_pixels(in_pixels(each.nearest, convention, each.pixels.image_size)) | size
         else:
-            cameras[Text(name)] = _in_millimetres(each.own) | size
+            require_squares(each.own, "a camera in millimetres")
+            cameras[Text(name)] = in_project(each.own)
     text = "".join(f"{line}\n" for line in (*_found(block.document), *lines_of({"cameras": cameras})))
     return {target: text}, block.said_of_cameras()
 
@@ -40,21 +39,3 @@ def _found(document: Document) -> Iterator[str]:
     for each in document.get("bundle", {}).get("calibration", ()):
         named = f"camera {each['camera']}, {each['parameter']}: {each['value']:+g} {each['unit']}"
         yield f"# {named} by the calibration, standard deviation {each['sigma']:g}; it is in these numbers"
-
-
-def _in_millimetres(camera: Camera) -> Document:
-    if any(camera.pixel_affinity):
-        message = f"pixels of camera {camera.name} are no squares, for which a camera in millimetres has no key"
-        raise InputError(Fault(message, "export", fix="write it in pixels (.metashape.yaml)"))
-    lens = camera.distortion
-    found: Document = {
-        "principal_distance": camera.principal_distance,
-        "principal_point": list(camera.principal_point),
-    }
-    if camera.format is not None:
-        found["format"] = list(camera.format)
-    if lens is None:
-        return found
-    names = ("radius", "distortion") if lens.model == "radial-table" else ("k", "p", "b")
-    values = {name: list(getattr(lens, name)) for name in names}
-    return found | {"distortion": {"model": lens.model, "direction": lens.direction, **values}}

@@ -19,7 +19,6 @@ from photostrip.errors import Fault, InputError
 from photostrip.foreign.adjusted import Adjusted
 from photostrip.notes import counted, named
 
-TO_COLMAP = np.diag([1.0, -1.0, -1.0])  # image axes there: x to the right, y down, z ahead
 PARAMETERS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 OWN = re.compile(r"colmap-(\d{1,15})")  # ids that were made from COLMAP's
 
@@ -31,9 +30,7 @@ def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, str | byt
     image points belong to.
     """
     block.require_photos("COLMAP")
-    if block.document["adjustment"] != "bundle" and len(block.document["strips"]) > 1:
-        message = "strips adjusted each by itself have points of their own, where COLMAP has one for all"
-        raise InputError(Fault(message, "export", fix="run with --set processing.adjustment=bundle"))
+    block.require_one_place("COLMAP")
     if blank := [each["id"] for each in block.photos if len(each["id"].split()) > 1]:
         message = f"COLMAP ends the name of a photo at its first blank: {named('photo', blank)}"
         raise InputError(Fault(message, "export", fix="call the photos otherwise"))
@@ -89,8 +86,7 @@ def _cameras(block: Adjusted) -> Iterator[str]:
 
 def _images(block: Adjusted, numbers: list[int], shift: Floats, axes: Floats) -> Iterator[str]:
     yield "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n# POINTS2D[] as (X, Y, POINT3D_ID)\n"
-    of_world = TO_COLMAP @ block.rotations.transpose(0, 2, 1) @ axes.T
-    moved = -np.einsum("nij,nj->ni", of_world, (block.centers - shift) @ axes.T)
+    of_world, moved = block.into_cameras(shift, axes)
     turned = Rotation.from_matrix(of_world).as_quat(canonical=True)[:, [3, 0, 1, 2]]
     order = {name: number for number, name in enumerate(block.cameras, 1)}
     for row, photo in enumerate(block.photos):

@@ -216,7 +216,7 @@ def _pixels(
 ) -> Floats:
     """Give the marks in pixels of the block's photos; refuse those that lie outside, or stand on a photo twice."""
     rows, photo = on
-    sizes = np.array([block.cameras[name].image_size for name in block.camera_of])[photo]
+    sizes = np.array([block.image_size(each) for each in range(len(block.photos))])[photo]
     xy = table.columns("x", "y")[rows] * (1.0 if asked.width is None else sizes[:, :1] / asked.width)
     seen: dict[tuple[str, int], int] = {}
     for place, (row, each) in enumerate(zip(rows.tolist(), photo.tolist(), strict=True)):

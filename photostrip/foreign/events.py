@@ -19,7 +19,7 @@ import numpy as np
 from photostrip.arrays import Floats
 from photostrip.errors import Fault, InputError
 from photostrip.foreign.places import Place, unique
-from photostrip.foreign.tables import ForeignBlock, GivenPositions
+from photostrip.foreign.tables import NORTHERNMOST, ROUND, ForeignBlock, GivenPositions
 from photostrip.formats.text.numbers import NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.formats.text.table_text import content
@@ -32,7 +32,6 @@ MRK = re.compile(
     rf"{NUMBER},Ellh\s+{NUMBER},\s*{NUMBER},\s*{NUMBER}\s+(\d+),Q\s*"
 )
 COLUMNS = ("latitude(deg)", "longitude(deg)", "height(m)", "sdn(m)", "sde(m)", "sdu(m)", "Q")
-NORTHERNMOST, ROUND = 90.0, 360.0  # degrees
 LAST_NUMBER = re.compile(r"(\d{1,9})\D*$")
 
 

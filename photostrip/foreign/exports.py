@@ -7,7 +7,7 @@ from pathlib import PurePath
 from typing import NamedTuple
 
 from photostrip.errors import Fault, InputError
-from photostrip.foreign import cameras, colmap_model, geopackage, orthority
+from photostrip.foreign import cameras, colmap_model, geopackage, historix_submission, opensfm_model, orthority
 from photostrip.foreign.adjusted import adjusted
 from photostrip.notes import Document
 from photostrip.project.schema.exports import ENDINGS, form_of
@@ -15,9 +15,12 @@ from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS
 
 WRITERS = {
     "geopackage": geopackage.write,
+    "historix": historix_submission.write,
     "orthority": orthority.write,
     "orthority-geojson": orthority.write,
+    "omega-phi-kappa": orthority.write,
     "colmap": colmap_model.write,
+    "opensfm": opensfm_model.write,
     **dict.fromkeys(("cameras", *(f"cameras-{each}" for each in CONVENTIONS)), cameras.write),
 }
 

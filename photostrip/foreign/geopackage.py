@@ -73,7 +73,7 @@ def write(block: Adjusted, target: str, _form: str) -> tuple[dict[str, str | byt
 
 
 def _layers(block: Adjusted) -> Iterator[Layer]:
-    places, centers = _on_map(block, block.xyz, block.enu), _on_map(block, block.centers, block.enu_centers)
+    places, centers = block.on_map(block.xyz, block.enu), block.on_map(block.centers, block.enu_centers)
     axes = block.document["frame"]["axes"]
     of_points = [_of_point(each, axes) for each in block.points]
     yield Layer(
@@ -168,7 +168,7 @@ def _footprint(block: Adjusted, number: int) -> Floats | None:
         along = (middle - center) @ normal / (directions @ normal)
     if not ((along > 0.0) & (along < 10.0 * np.median(np.linalg.norm(points - center, axis=1)))).all():
         return None  # the horizon is on it, or its points lie in a line
-    return _on_map(block, center + along[:, None] * directions)
+    return block.on_map(center + along[:, None] * directions)
 
 
 def _vectors(block: Adjusted, given: Sequence[Document], rows: Numbers) -> Layer:
@@ -183,7 +183,7 @@ def _vectors(block: Adjusted, given: Sequence[Document], rows: Numbers) -> Layer
         level = np.broadcast_to(np.eye(3), (len(rows), 3, 3))
     factor = _factor(block, np.linalg.norm(differences, axis=1))
     moved = block.xyz[rows] + factor * np.einsum("nij,ni->nj", level, differences)
-    lines = np.stack([_on_map(block, block.xyz[rows], block.enu[rows]), _on_map(block, moved)], axis=1)
+    lines = np.stack([block.on_map(block.xyz[rows], block.enu[rows]), block.on_map(moved)], axis=1)
     records = [_columns(each, ("id", "role", "plan", "height")) for each in given]
     return Layer(
         name="error_vectors",
@@ -210,7 +210,7 @@ def _ellipses(block: Adjusted) -> Layer:
         + np.sin(ARC)[:, None] * (short[:, None] * across[..., 0])[:, None]
     )
     rings += block.xyz[known][:, None]
-    places = _on_map(block, rings.reshape(-1, 3)).reshape(len(known), -1, 3)
+    places = block.on_map(rings.reshape(-1, 3)).reshape(len(known), -1, 3)
     records = [_columns(each, ("id", "role", "ellipse_a", "ellipse_b", "ellipse_azimuth_deg")) for each in points]
     return Layer(
         name="error_ellipses",
@@ -228,14 +228,6 @@ def _factor(block: Adjusted, lengths: Floats) -> float:
         return 1.0
     power = 10.0 ** math.floor(math.log10(SHARE * extent / largest))
     return max(1.0, next(each * power for each in (5.0, 2.0, 1.0) if each * power * largest <= SHARE * extent))
-
-
-def _on_map(block: Adjusted, xyz: Floats, enu: Floats | None = None) -> Floats:
-    """Return coordinates as the file has them: those of the result; longitude and latitude in place of geocentric."""
-    if block.ground.kind == "geocentric":
-        geodetic = block.ground.geodetic(xyz)
-        return np.column_stack([np.degrees(geodetic[:, :2]), geodetic[:, 2]])
-    return block.ground.ground_from_cartesian(xyz) if enu is None else enu
 
 
 def _reference_system(base: sqlite3.Connection, block: Adjusted) -> int:

@@ -131,12 +131,14 @@ def _photo(
     rotation, translation = given.at("rotation").numbers(3), given.at("translation").numbers(3)
     pose = np.concatenate([Rotation.from_rotvec(rotation).as_quat()[[3, 0, 1, 2]], translation])
     xy, points = rays.get(name, (np.zeros((0, 2)), np.zeros(0, np.int64)))
-    return Photo(place=given.place, pose=pose, camera=camera, name=name, xy=pixels(xy, cameras[camera]), points=points)
+    return Photo(
+        place=given.place, pose=pose, camera=camera, name=name, xy=pixels(xy, cameras[camera].image_size), points=points
+    )
 
 
-def pixels(xy: Floats, camera: PixelCamera) -> Floats:
+def pixels(xy: Floats, image_size: tuple[float, float]) -> Floats:
     """Turn parts of the larger side about the middle into pixels from the corner of the first one."""
-    size = np.array(camera.image_size)
+    size = np.array(image_size)
     return xy * size.max() + size / 2.0
 
 

@@ -47,9 +47,9 @@ def with_ground_control(block: ForeignBlock, asked: Asked) -> ForeignBlock:
             if shot not in photos:
                 strange.append(shot)
                 continue
-            camera = block.cameras[block.camera_of[photos[shot]]]
-            place = pixels(where.numbers(2), camera)
-            if (place < 0.0).any() or (place > camera.image_size).any():
+            size = block.image_size(photos[shot])
+            place = pixels(where.numbers(2), size)
+            if (place < 0.0).any() or (place > size).any():
                 raise where.wrong("the mark lies outside the photo", "range", expected="parts of its larger side")
             photo.append(photos[shot])
             point.append(number)

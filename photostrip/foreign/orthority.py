@@ -1,5 +1,7 @@
 """Orientations and cameras as orthority reads them, to make orthophotos: CSV or GeoJSON, and cameras beside them.
 
+The table alone, with tabs, is what Metashape and Pix4D import.
+
 Both hold the coordinates of a map and omega, phi, kappa along its axes; who uses them takes the map for Cartesian.
 Cameras are those of OpenSfM: a principal point in parts of the larger side, from the middle.
 
@@ -23,8 +25,8 @@ from photostrip.geometry.rotation import angles
 from photostrip.notes import counted
 
 HEADER = ("filename", "x", "y", "z", "omega", "phi", "kappa", "camera")
+WITH_TABS = ("label", "X", "Y", "Z", "omega", "phi", "kappa")
 text = json_encoder.UNICODE.value
-SEEN = 0.005  # pixels, from which on two decimals are not zero
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")  # as OpenCV has them
 
 
@@ -33,34 +35,33 @@ def write(block: Adjusted, target: str, form: str) -> tuple[dict[str, str | byte
 
     Raises InputError for a frame that is neither a map nor local, and for a map in feet with heights in metres.
     """
-    block.require_photos("orthority")
+    name = "the table" if form == "omega-phi-kappa" else "orthority"
+    block.require_photos(name)
     if block.ground.kind not in {"projected", "local"}:
-        message = f"orthority takes the coordinates of a map, and these are {block.ground.kind}"
+        message = f"{name} takes the coordinates of a map, and these are {block.ground.kind}"
         raise InputError(Fault(message, "export", fix="give output.crs of a map projection, as EPSG:32633"))
     if block.ground.plan_factor != block.ground.height_factor:
-        message = f"orthority has one unit, and heights in {plural(block.ground.height_unit)} stand beside a plan in "
+        message = f"{name} has one unit, and heights in {plural(block.ground.height_unit)} stand beside a plan in "
         message += plural(block.ground.plan_unit)
         raise InputError(Fault(message, "export", fix="give output.crs with a map in metres"))
     stem = str(PurePosixPath(target).with_suffix(""))
     turned = angles(block.level, "omega-phi-kappa")
     wkt = "" if block.ground.kind == "local" else map_entry(block.ground.spec).wkt
+    said = [f"{counted(len(block.photos), 'photo')} of {counted(len(block.cameras), 'camera')}", *block.said_of_map()]
+    posed = zip(block.photos, block.enu_centers.tolist(), np.degrees(turned).tolist(), block.camera_of, strict=True)
+    rows = [(photo["id"], *center, *opk, camera) for photo, center, opk, camera in posed]
+    beside: dict[str, str | bytes] = {f"{stem}.prj": wkt} if wkt else {}
+    if form == "omega-phi-kappa":
+        lines = (WITH_TABS, *(row[:-1] for row in rows))
+        return {target: "".join("\t".join(map(str, line)) + "\n" for line in lines), **beside}, said
     files: dict[str, str | bytes] = {f"{stem}_int_param.yaml": _cameras(block)}
     if form == "orthority":
-        posed = zip(block.photos, block.enu_centers.tolist(), np.degrees(turned).tolist(), block.camera_of, strict=True)
-        rows = ((photo["id"], *center, *opk, camera) for photo, center, opk, camera in posed)
-        files |= {target: to_csv(HEADER, rows), **({f"{stem}.prj": wkt} if wkt else {})}
+        files |= {target: to_csv(HEADER, rows), **beside}
     elif not wkt:
         message = "GeoJSON of orthority names the projection of its map, and a local frame has none"
         raise InputError(Fault(message, "export", fix="write CSV (.csv)"))
     else:
         files[target] = _geojson(block, turned, wkt)
-    said = [f"{counted(len(block.photos), 'photo')} of {counted(len(block.cameras), 'camera')}"]
-    departure, photo = block.bent()
-    if departure >= SEEN:
-        said.append(
-            f"the map taken for Cartesian moves image points by up to {departure:.2f} px (photo {photo}): curvature of "
-            "the Earth, scale of the map"
-        )
     return files, said + block.said_of_cameras()
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from math import isnan
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.foreign.tables import WGS84, ForeignBlock, GivenControl, GivenPositions
+from photostrip.camera import Camera
+from photostrip.foreign.tables import WGS84, ForeignBlock, GivenControl, GivenPositions, Wanted
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.text.writing import Content
 from photostrip.geodesy.frame_spec import GROUND_AXES
@@ -22,38 +22,39 @@ from photostrip.strip.image_coordinates.lens_distortion import shift
 from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera, in_millimetres
 
 PIECE = 100_000  # rows that are written at a time
-HEADER = """\
-# Written by photostrip convert from a {source}, for you to edit; every key: docs/files/project.md.
+HEADER = "# Written by photostrip convert from a {source}, for you to edit; every key: docs/files/project.md.\n"
+OF_MODEL = """\
 # Place, direction and scale of its orientations are arbitrary. They are a start: with control the photos are laid on
 # it, without any the result is a free network in the frame of the model.
 """
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What the files do not carry."""
-
-    sigma: float  # standard deviation of an image coordinate in pixels
-    pixel_size: float | None = None  # mm
+WITHOUT_RAYS = "# Tie points are missing: put their rows into observations.csv, with the columns of its header.\n"
 
 
 def project_files(name: str, block: ForeignBlock, wanted: Wanted) -> dict[str, Content]:
     """Return the files of a project, ``project.yaml`` last; the same for the same block to the byte."""
-    system, turned = separable_angles(block.rotations)
-    header = f"photo,x,y,z,{system.replace('-', ',')}"
-    posed = np.hstack([block.centers, np.degrees(turned)])
-    orientations = _table(header, [(block.photos, np.arange(len(block.photos)))], posed)
+    posed, system = _orientations(block)
     rays = [(block.photos, block.photo), (block.points, block.point)]
     project = _project(name, block, wanted, system)
+    header = HEADER.format(source=block.source) + (OF_MODEL if system else WITHOUT_RAYS)
     return {
         "observations.csv": _table("photo,point,x,y", rays, block.xy)
         if block.sigma is None
         else _table("photo,point,x,y,sx,sy", rays, np.column_stack([block.xy, block.sigma, block.sigma])),
-        "orientations.csv": orientations,
+        **posed,
         **({} if block.control is None else {"control.csv": _control(block.control)}),
         **({} if block.positions is None else {"positions.csv": _positions(block.photos, block.positions)}),
-        "project.yaml": HEADER.format(source=block.source) + "".join(f"{line}\n" for line in lines_of(project)),
+        "project.yaml": header + "".join(f"{line}\n" for line in lines_of(project)),
     }
+
+
+def _orientations(block: ForeignBlock) -> tuple[dict[str, Content], str]:
+    """Return the table of orientations and the system of its angles; nothing where there are none."""
+    if block.centers is None or block.rotations is None:
+        return {}, ""
+    system, turned = separable_angles(block.rotations)
+    posed = np.hstack([block.centers, np.degrees(turned)])
+    header = f"photo,x,y,z,{system.replace('-', ',')}"
+    return {"orientations.csv": _table(header, [(block.photos, np.arange(len(block.photos)))], posed)}, system
 
 
 def _project(name: str, block: ForeignBlock, wanted: Wanted, system: str) -> dict[str, object]:
@@ -64,8 +65,14 @@ def _project(name: str, block: ForeignBlock, wanted: Wanted, system: str) -> dic
     return {
         "photostrip": 1,
         "name": Text(name),
-        "cameras": {Text(camera): camera_in_pixels(given) | size for camera, given in block.cameras.items()},
-        "photos": [{"camera": Text(camera), "photos": photos} for camera, photos in owners.items()],
+        "cameras": {
+            Text(camera): camera_in_pixels(given) | size if isinstance(given, PixelCamera) else in_project(given)
+            for camera, given in block.cameras.items()
+        },
+        # photos that have no rays yet are not listed: those that get some are taken, of the one camera
+        "photos": [
+            {"camera": Text(camera), **({"photos": photos} if system else {})} for camera, photos in owners.items()
+        ],
         "observations": {
             "file": "observations.csv",
             "unit": "px",
@@ -75,13 +82,13 @@ def _project(name: str, block: ForeignBlock, wanted: Wanted, system: str) -> dic
         },
         **({} if block.control is None else {"control": [{"file": "control.csv", **_frame(block.control.crs)}]}),
         **({} if block.positions is None else {"camera_positions": {"file": "positions.csv", **_frame(WGS84)}}),
-        "orientations": {
-            "file": "orientations.csv",
-            **_frame("local"),
-            "angles": {"system": system, "unit": "deg"},
-            "role": "approximate",
-        },
+        **({"orientations": _approximate(system)} if system else {}),
     }
+
+
+def _approximate(system: str) -> dict[str, object]:
+    angles = {"system": system, "unit": "deg"}
+    return {"file": "orientations.csv", **_frame("local"), "angles": angles, "role": "approximate"}
 
 
 def _positions(photos: Sequence[str], given: GivenPositions) -> Iterator[str]:
@@ -115,6 +122,26 @@ def camera_in_pixels(given: PixelCamera) -> dict[str, object]:
     }
 
 
+def in_project(camera: Camera) -> dict[str, object]:
+    """Return a camera in millimetres as the project file has it."""
+    found: dict[str, object] = {
+        "principal_distance": camera.principal_distance,
+        "principal_point": list(camera.principal_point),
+    }
+    if camera.format is not None:
+        found["format"] = list(camera.format)
+    if camera.pixel_size is not None:
+        found["pixel_size"] = camera.pixel_size
+    if camera.fiducials:
+        found["fiducials"] = {Text(mark): list(place) for mark, place in camera.fiducials.items()}
+    lens = camera.distortion
+    if lens is None:
+        return found
+    names = ("radius", "distortion") if lens.model == "radial-table" else ("k", "p", "b")
+    values = {name: list(getattr(lens, name)) for name in names}
+    return found | {"distortion": {"model": lens.model, "direction": lens.direction, **values}}
+
+
 def _table(header: str, ids: Sequence[tuple[Sequence[str], Numbers]], values: Floats) -> Iterator[str]:
     """Write a table in pieces: columns of ids by their numbers, then columns of numbers."""
     yield f"{header}\n"
@@ -143,17 +170,12 @@ def understood(block: ForeignBlock, wanted: Wanted) -> Mapping[str, str]:
     said |= {f"camera {name}": _of_camera(name, given) for name, given in list(block.cameras.items())[:5]}
     if len(block.cameras) > 5:
         said["more"] = counted(len(block.cameras) - 5, "camera")
-    rays = int(np.count_nonzero(block.photo == 0))
-    x, y, z = block.centers[0] + 0.0
-    along, right = -block.rotations[0][:, 2], block.rotations[0][:, 0]
-    said[f"photo {block.photos[0]}"] = (
-        f"{counted(rays, 'ray')}; perspective center {x:.5g}, {y:.5g}, {z:.5g}, view along {_vector(along)}, "
-        f"its x along {_vector(right)}"
-    )
-    said["frame"] = f"{block.frame}; the orientations are only a start"
+    said |= _of_photo(block)
+    pixel = f"{wanted.pixel_size:g} mm" if wanted.pixel_size is not None else "taken as 1 µm"
+    if sizes := [each.pixel_size for each in block.cameras.values() if isinstance(each, Camera)]:
+        pixel = f"{sizes[0]:g} mm"
     said["image"] = (
-        f"pixels from the corner of the first one, y down; standard deviation {wanted.sigma:g} px; a pixel is "
-        + ("taken as 1 µm" if wanted.pixel_size is None else f"{wanted.pixel_size:g} mm")
+        f"pixels from the corner of the first one, y down; standard deviation {wanted.sigma:g} px; a pixel is {pixel}"
     )
     if block.control is not None:
         said["control"] = _of_control(block.control)
@@ -166,6 +188,19 @@ def understood(block: ForeignBlock, wanted: Wanted) -> Mapping[str, str]:
     return said
 
 
+def _of_photo(block: ForeignBlock) -> dict[str, str]:
+    """Say where the first photo is, and in what frame."""
+    rays = counted(int(np.count_nonzero(block.photo == 0)), "ray")
+    name = f"photo {block.photos[0]}"
+    if block.centers is None or block.rotations is None:
+        at = "" if block.positions is None else "; about {:.6f}, {:.6f}, {:.0f}".format(*block.positions.xyz[0])
+        return {name: rays + at, "frame": block.frame}
+    x, y, z = block.centers[0] + 0.0
+    along, right = -block.rotations[0][:, 2], block.rotations[0][:, 0]
+    at = f"perspective center {x:.5g}, {y:.5g}, {z:.5g}, view along {_vector(along)}, its x along {_vector(right)}"
+    return {name: f"{rays}; {at}", "frame": f"{block.frame}; the orientations are only a start"}
+
+
 def _of_control(given: GivenControl) -> str:
     x, y, z = given.xyz[0].tolist()
     height = "not known" if isnan(z) else f"{z:.3f}"
@@ -176,7 +211,13 @@ def _of_control(given: GivenControl) -> str:
     )
 
 
-def _of_camera(name: str, given: PixelCamera) -> str:
+def _of_camera(name: str, given: PixelCamera | Camera) -> str:
+    if isinstance(given, Camera):
+        (width, height), (x0, y0) = given.format or (0.0, 0.0), given.principal_point
+        said = (
+            f"{width:g} x {height:g} mm, f {given.principal_distance:g} mm, principal point {x0:+g}, {y0:+g} mm, y up"
+        )
+        return f"{said}, {counted(len(given.fiducials), 'fiducial mark')}, no distortion"
     camera = in_millimetres(name, given)
     (width, height), size = given.image_size, PIXEL_SIZE
     x0, y0 = (each / size for each in camera.principal_point)

@@ -6,9 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.strip.image_coordinates.pixel_cameras import PixelCamera
+from photostrip.camera import Camera
+from photostrip.strip.image_coordinates.pixel_cameras import PIXEL_SIZE, PixelCamera
 
 WGS84 = "EPSG:4979"  # longitude, latitude, ellipsoidal height
+NORTHERNMOST, ROUND = 90.0, 360.0  # degrees of latitude and longitude
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the files do not carry."""
+
+    sigma: float  # standard deviation of an image coordinate in pixels
+    pixel_size: float | None = None  # mm
+    image_size: tuple[float, float] | None = None  # width and height in pixels
+    positions_sigma: tuple[float, float, float] | None = None  # east, north, up in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +48,12 @@ class GivenPositions:
 
 @dataclass(frozen=True, eq=False)
 class ForeignBlock:
-    """Photos in no order, measured in pixels from the corner of the first one, with rough orientations."""
+    """Photos in no order, measured in pixels from the corner of the first one, with rough orientations or without."""
 
     source: str  # what was read, as "COLMAP model (binary)"
     files: tuple[str, ...]
     frame: str  # where the centres are, in words
-    cameras: Mapping[str, PixelCamera]
+    cameras: Mapping[str, PixelCamera | Camera]  # in pixels, or in millimetres with format and size of a pixel
     photos: tuple[str, ...]  # ids
     camera_of: tuple[str, ...]  # of each photo
     points: tuple[str, ...]  # ids
@@ -50,10 +62,19 @@ class ForeignBlock:
     point: Numbers
     xy: Floats
     # (m, 3), (m, 3, 3): perspective centres, and rotations from image axes (x right, y up, z towards the viewer)
-    centers: Floats
-    rotations: Floats
+    centers: Floats | None = None
+    rotations: Floats | None = None
     sigma: Floats | None = None  # (n,): standard deviation of each ray in pixels; NaN, or None: as for all
     control: GivenControl | None = None
     positions: GivenPositions | None = None
     beside: tuple[str, ...] = ()  # files of control that lie beside the others
     left_out: tuple[str, ...] = ()  # sentences
+
+    def image_size(self, photo: int) -> tuple[float, float]:
+        """Width and height of a photo in pixels."""
+        camera = self.cameras[self.camera_of[photo]]
+        if isinstance(camera, PixelCamera):
+            return camera.image_size
+        size = camera.pixel_size or PIXEL_SIZE
+        width, height = camera.format or (0.0, 0.0)
+        return width / size, height / size

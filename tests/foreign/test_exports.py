@@ -131,8 +131,8 @@ def adjusted_image_points(document: Document) -> dict[tuple[str, str], Floats]:
     return found
 
 
-def measured_image_points(folder: Path) -> dict[tuple[str, str], Floats]:
-    with (folder / "project" / "observations.csv").open(encoding="utf-8") as file:
+def measured_image_points(folder: Path, project: str = "project") -> dict[tuple[str, str], Floats]:
+    with (folder / project / "observations.csv").open(encoding="utf-8") as file:
         return {(row["photo"], row["point"]): np.array([row["x"], row["y"]], float) for row in csv.DictReader(file)}
 
 
@@ -337,6 +337,24 @@ def test_geojson_of_orthority_says_the_same_as_its_table(
     assert meta["crs"] == "EPSG:4979"
 
 
+def test_the_table_with_tabs_says_the_same_as_that_of_orthority(
+    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = []
+    for name in ("ori.csv", "table.txt"):
+        capsys.readouterr()
+        assert main(["convert", str(block), str(tmp_path / name)]) == 0
+        said.append(re.findall(r"by up to .* px", capsys.readouterr().out))
+    assert said[0] == said[1]
+    names, *rows = (line.split("\t") for line in (tmp_path / "table.txt").read_text(encoding="utf-8").splitlines())
+    assert names == ["label", "X", "Y", "Z", "omega", "phi", "kappa"]
+    assert rows == [list(row.values())[:7] for row in nonempty(table(tmp_path / "ori.csv"))]
+    assert not list(tmp_path.glob("table_*"))
+    local = block.document["frame"]["crs"] == "local"
+    assert (tmp_path / "table.prj").exists() != local
+    assert local or CRS.from_wkt((tmp_path / "table.prj").read_text(encoding="utf-8")) == CRS(UTM)
+
+
 # ----------------------------------------------------------------------------------------------------- COLMAP
 
 
@@ -476,6 +494,76 @@ def test_a_model_that_came_from_colmap_goes_back_with_its_names_and_numbers(tmp_
     assert cameras[4] != cameras[7]
 
 
+# ----------------------------------------------------------------------------------------------------- OpenSfM
+
+
+def by_opensfm(camera: Document, shot: Document, points: Floats) -> Floats:
+    """Project points as OpenSfM documents its brown camera, in pixels from the corner of the first one."""
+    x, y, z = (Rotation.from_rotvec(shot["rotation"]).apply(points) + shot["translation"]).T
+    x, y = x / z, y / z
+    square = x**2 + y**2
+    radial = 1 + camera["k1"] * square + camera["k2"] * square**2 + camera["k3"] * square**3
+    p1, p2 = camera["p1"], camera["p2"]
+    u = camera["focal_x"] * (radial * x + 2 * p1 * x * y + p2 * (square + 2 * x**2)) + camera["c_x"]
+    v = camera["focal_y"] * (radial * y + 2 * p2 * x * y + p1 * (square + 2 * y**2)) + camera["c_y"]
+    width, height = camera["width"], camera["height"]
+    return np.stack([u, v], axis=-1) * max(width, height) + [width / 2, height / 2]
+
+
+def test_opensfm_projects_the_points_of_a_reconstruction_onto_the_adjusted_image_points(
+    block: Ran, tmp_path: Path
+) -> None:
+    document = block.document
+    (tmp_path / "sfm").mkdir()
+    assert main(["convert", str(block), str(tmp_path / "sfm" / "reconstruction.json"), "-q"]) == 0
+    (found,) = json.loads((tmp_path / "sfm" / "reconstruction.json").read_text(encoding="utf-8"))
+    true = adjusted_image_points(document)
+    assert list(found["shots"]) == [each["id"] for each in document["photos"]]
+    assert list(found["points"]) == [each["id"] for each in document["points"]]
+    for name, shot in nonempty(found["shots"].items()):
+        camera = found["cameras"][shot["camera"]]
+        mine = {point: place for (photo, point), place in true.items() if photo == name}
+        points = np.array([found["points"][each]["coordinates"] for each in mine])
+        assert by_opensfm(camera, shot, points) == pytest.approx(np.array(list(mine.values())), abs=0.01)
+    xyz = east_first(document, document["points"])
+    if document["frame"]["crs"] == "local":
+        assert "reference_lla" not in found
+    else:
+        place = found["reference_lla"]
+        at = f"+lat_0={place['latitude']} +lon_0={place['longitude']} +h_0={place['altitude']}"
+        topocentric = Transformer.from_pipeline(f"+proj=topocentric +ellps=WGS84 {at}")
+        xyz = np.stack(topocentric.transform(*geocentric(UTM, xyz).T), axis=-1)
+    assert np.array([each["coordinates"] for each in found["points"].values()]) == pytest.approx(xyz, abs=1e-4)
+
+
+def test_a_reconstruction_is_read_again_with_its_rays_and_poses(block: Ran, tmp_path: Path) -> None:
+    (tmp_path / "sfm").mkdir()
+    assert main(["convert", str(block), str(tmp_path / "sfm" / "reconstruction.json"), "-q"]) == 0
+    assert main(["convert", str(tmp_path / "sfm"), "-o", str(tmp_path / "again"), "--sigma", "0.5", "-q"]) == 0
+    again = measured_image_points(tmp_path, "again")
+    measured = measured_image_points(block.folder.parent)
+    assert len(again) == block.document["counts"]["image_points_used"]
+    for (photo, point), place in nonempty(again.items()):
+        assert place == pytest.approx(measured[photo, point.removeprefix("opensfm-")], abs=0.01)
+    assert main(["run", str(tmp_path / "again" / "project.yaml"), "-o", str(tmp_path / "run"), "-q"]) == 0
+    assert main(["convert", str(tmp_path / "run"), str(tmp_path / "reconstruction.json"), "-q"]) == 0
+    (before,) = json.loads((tmp_path / "sfm" / "reconstruction.json").read_text(encoding="utf-8"))
+    (after,) = json.loads((tmp_path / "reconstruction.json").read_text(encoding="utf-8"))
+    assert set(after["points"]) == set(before["points"])
+
+
+def test_a_reconstruction_overwrites_no_measurements(
+    block: Ran, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "reconstruction.json"
+    (tmp_path / "tracks.csv").write_text("measured", encoding="utf-8")
+    assert "tracks.csv: already exists and is not overwritten" in refused(capsys, str(block), str(target))
+    assert (tmp_path / "tracks.csv").read_text(encoding="utf-8") == "measured"
+    assert not target.exists()
+    assert "write FOLDER/reconstruction.json" in refused(capsys, str(block), f"{tmp_path}/a.json", "--to", "opensfm")
+    assert main(["convert", str(block), str(target), "-q", "--force"]) == 0
+
+
 # ------------------------------------------------------------------------------------------ both ways, refusals
 
 
@@ -512,7 +600,7 @@ def test_a_batch_writes_the_same_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("a.shp", "geopackage (.gpkg), orthority (.csv), orthority-geojson (.geojson), colmap (/), "),
+        ("a.shp", "geopackage (.gpkg), historix (extrinsics.csv), orthority (.csv), orthority-geojson (.geojson), "),
         ("../a.gpkg", "does not lie in the folder of the run"),
         ("/a.gpkg", "does not lie in the folder of the run"),
         ("photos.csv", "is a file of the result itself; write other-photos.csv"),
@@ -589,6 +677,7 @@ def test_orthority_takes_maps_only_and_colmap_one_place_for_each_point(
     found = ran(tmp_path / "c", *(word for each in feet for word in ("--set", each)),
                 ground={"crs": "EPSG:6339", "center_deg": [-122.0, 40.5]})  # fmt: skip
     assert "heights in metres stand beside a plan in US survey feet" in refused(capsys, str(found), f"{tmp_path}/a.csv")
+    assert "HISTORIX counts in metres" in refused(capsys, str(found), f"{tmp_path}/extrinsics.csv")
     found = ran(tmp_path / "b", "--set", "processing.adjustment=polynomial", flight={"photos": 6, "strips": 2},
                 control={"layout": "bands", "bands": 3, "check": 4})  # fmt: skip
     assert "processing.adjustment=bundle" in refused(capsys, str(found), f"{tmp_path}/m/")

@@ -14,7 +14,7 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     source: Annotated[
         Path,
         typer.Argument(
-            metavar="SOURCE", help="Folder of a COLMAP model, or of OpenSfM; or a result.json, or its folder."
+            metavar="SOURCE", help="Folder of a COLMAP model, of OpenSfM, of HISTORIX; or a result.json, or its folder."
         ),
     ],
     target: Annotated[
@@ -38,6 +38,10 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
         typer.Option(
             "--pixel-size", metavar="MM", help="Size of a pixel; else micrometres in reports stand for pixels."
         ),
+    ] = None,
+    image_size: Annotated[
+        str | None,
+        typer.Option("--image-size", metavar="W,H", help="Size of the photos in pixels; HISTORIX does not have it."),
     ] = None,
     control: Annotated[
         Path | None,
@@ -63,6 +67,12 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
         Path | None,
         typer.Option("--positions", metavar="FILE", help="GNSS events: Timestamp.MRK of DJI, events.pos of RTKLIB."),
     ] = None,
+    positions_sigma: Annotated[
+        str | None,
+        typer.Option(
+            "--positions-sigma", metavar="M", help="Standard deviation of HISTORIX's positions: one, or EAST,NORTH,UP."
+        ),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Overwrite the files of a project in DIR, or of a model.")
     ] = False,
@@ -74,12 +84,16 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     Printed is what was understood: counts, cameras, one photo, frame, units. What the files do not carry is asked for
     by the name of an option, and never guessed.
 
-    Where SOURCE is a result, it is written into FILE: GeoPackage, tables of orthority (CSV, GeoJSON), cameras
-    (.yaml; .opencv.yaml and its kin in pixels), a COLMAP model.
+    Where SOURCE is a result, it is written into FILE: GeoPackage, tables of orthority (CSV, GeoJSON), of omega, phi,
+    kappa (.txt), a submission to HISTORIX (NAME_extrinsics.csv), cameras (.yaml; .opencv.yaml and its kin in pixels),
+    a COLMAP model, reconstruction.json of OpenSfM.
     """
     from photostrip.cli.jobs.convert import Options, converted, is_result, written_for_others
 
-    given = (sigma, pixel_size, control, crs, control_sigma, mark_sigma, mark_width, positions)
+    given = (
+        *(sigma, pixel_size, image_size, control, crs, control_sigma, mark_sigma, mark_width),
+        *(positions, positions_sigma),
+    )
     if is_result(source):
         if target is None or output is not None or any(each not in {None, ""} for each in given):
             message = f"{source} is a result, which is written into a file: no -o, and none of the options of a project"
@@ -95,12 +109,14 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     asked = Options(
         sigma=sigma,
         pixel_size=pixel_size,
+        image_size=image_size,
         control=control,
         crs=crs,
         control_sigma=control_sigma,
         mark_sigma=mark_sigma,
         mark_width=mark_width,
         positions=positions,
+        positions_sigma=positions_sigma,
     )
     lines, written = converted(source, output, asked, force=force)
     if not quiet:

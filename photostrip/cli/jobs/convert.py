@@ -11,8 +11,9 @@ from photostrip.foreign.control import Asked, with_control
 from photostrip.foreign.events import with_events
 from photostrip.foreign.exports import exported
 from photostrip.foreign.opensfm_control import with_ground_control
-from photostrip.foreign.project import Wanted, project_files, understood
-from photostrip.foreign.sources import read_source
+from photostrip.foreign.project import project_files, understood
+from photostrip.foreign.sources import own_control, read_source
+from photostrip.foreign.tables import Wanted
 from photostrip.formats.output.result_json import read_result
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
 from photostrip.formats.text.numbers import number as read_number
@@ -30,12 +31,14 @@ class Options:
 
     sigma: float | None = None  # px
     pixel_size: float | None = None  # mm
+    image_size: str | None = None  # px: width,height
     control: Path | None = None
     crs: str = ""
     control_sigma: str | None = None  # metres: one number, or three
     mark_sigma: float | None = None  # px
     mark_width: float | None = None  # px
     positions: Path | None = None
+    positions_sigma: str | None = None  # metres: one number, or three
 
 
 def converted(source: Path, output: Path, options: Options, *, force: bool) -> tuple[list[str], str]:
@@ -43,13 +46,20 @@ def converted(source: Path, output: Path, options: Options, *, force: bool) -> t
 
     Raises InputError with everything that is wrong with the options, or with the files.
     """
-    faults = list(_faults(options))
+    control = options.control or own_control(source)
+    faults = list(_faults(options, control))
     if faults or options.sigma is None:
         raise InputError(faults)
-    block, wanted = read_source(source), Wanted(options.sigma, options.pixel_size)
-    if options.control is not None:
+    wanted = Wanted(
+        sigma=options.sigma,
+        pixel_size=options.pixel_size,
+        image_size=_two(options.image_size),
+        positions_sigma=_three(options.positions_sigma),
+    )
+    block = read_source(source, wanted)
+    if control is not None:
         asked = Asked(
-            file=str(options.control),
+            file=str(control),
             crs=options.crs,
             sigma=_three(options.control_sigma),
             mark_sigma=options.mark_sigma,
@@ -59,6 +69,9 @@ def converted(source: Path, output: Path, options: Options, *, force: bool) -> t
         block = (with_ground_control if json else with_control)(block, asked)
     if options.positions is not None:
         block = with_events(block, str(options.positions))
+    if not len(block.xy):
+        message, fix = "nothing is measured on these photos", "give --control FILE, a table with its marks"
+        raise InputError(Fault(message, "no-points", str(source), key="--control", fix=fix))
     files = project_files(output.resolve().name or "project", block, wanted)
     if not force:
         refuse_existing(output, list(files))
@@ -91,13 +104,13 @@ def written_for_others(source: Path, target: str, form: str, *, force: bool) -> 
         message = f"cannot be exported: a value is of another kind ({error})"
         fault = Fault(message, "result-incomplete", str(file), expected="a whole result.json", fix=FIX)
         raise InputError(fault) from error
-    if not force and any("/" in name for name in found.files):
+    if not force and (form == "opensfm" or any("/" in name for name in found.files)):  # measurements may stand there
         refuse_existing(place.parent, list(found.files))
     write_files(place.parent, found.files, [file, *(file.parent / f"{name}.csv" for name in TABLES)])
     return [*([f"{file}: {EDITED}"] if is_edited(saved) else []), *found.said]
 
 
-def _faults(options: Options) -> Iterator[Fault]:
+def _faults(options: Options, control: Path | None) -> Iterator[Fault]:
     if options.sigma is None:
         message = "the files do not say how precise an image coordinate is"
         fix = "give --sigma PX: features of SIFT scatter by 0.5 to 1 px"
@@ -111,9 +124,16 @@ def _faults(options: Options) -> Iterator[Fault]:
     for option, (value, unit) in lengths.items():
         if value is not None and not SMALLEST_LENGTH < value < LARGEST_NUMBER:
             yield Fault(f"{value:g} {unit} is no length", "option", key=option, expected="a number larger than 0")
-    if options.control_sigma is not None and _three(options.control_sigma) is None:
-        expected = "one number in metres, or three with commas between them"
-        yield Fault(f"`{options.control_sigma}` is no precision", "option", key="--control-sigma", expected=expected)
+    for option, text in {
+        "--control-sigma": options.control_sigma,
+        "--positions-sigma": options.positions_sigma,
+    }.items():
+        if text is not None and _three(text) is None:
+            expected = "one number in metres, or three with commas between them"
+            yield Fault(f"`{text}` is no precision", "option", key=option, expected=expected)
+    if options.image_size is not None and _two(options.image_size) is None:
+        expected = "width and height in pixels with a comma between them, as 9000,9200"
+        yield Fault(f"`{options.image_size}` is no size", "option", key="--image-size", expected=expected)
     given: dict[str, object] = {
         "--crs": options.crs,
         "--control-sigma": options.control_sigma,
@@ -121,8 +141,17 @@ def _faults(options: Options) -> Iterator[Fault]:
         "--mark-width": options.mark_width,
     }
     for option, about in given.items():
-        if options.control is None and about:
+        if control is None and about:
             yield Fault("there is no control that it is about", "option", key=option, fix="give --control FILE, too")
+
+
+def _two(text: str | None) -> tuple[float, float] | None:
+    """Read a width and a height; None for anything else."""
+    try:
+        width, height = map(read_number, (text or "").split(","))
+    except (NotANumber, ValueError):
+        return None
+    return (width, height) if SMALLEST_LENGTH < min(width, height) <= max(width, height) < LARGEST_NUMBER else None
 
 
 def _three(text: str | None) -> tuple[float, float, float] | None:

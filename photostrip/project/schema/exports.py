@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import PurePosixPath
 
 from photostrip.errors import Fault, InputError
@@ -11,7 +12,15 @@ from photostrip.project.schema.values import Text, text
 from photostrip.strip.image_coordinates.pixel_cameras import CONVENTIONS
 
 GEOPACKAGE = "geopackage"
-ENDINGS = {GEOPACKAGE: ".gpkg", "orthority": ".csv", "orthority-geojson": ".geojson", "colmap": "/"}
+ENDINGS = {
+    GEOPACKAGE: ".gpkg",
+    "historix": "extrinsics.csv",
+    "orthority": ".csv",
+    "orthority-geojson": ".geojson",
+    "omega-phi-kappa": ".txt",
+    "colmap": "/",
+    "opensfm": "reconstruction.json",
+}
 ENDINGS |= {f"cameras-{each}": f".{each}.yaml" for each in CONVENTIONS} | {"cameras": ".yaml"}
 """What a result is written as, and the ending that asks for it; that of a folder is ``/``."""
 TABLES = ("points", "photos", "residuals", "parallaxes", "rejected", "refined", "reliability", "links")  # of a run
@@ -24,11 +33,23 @@ def form_of(target: str, asked: str = "") -> str:
         if asked not in ENDINGS:
             message = f"a result is not written as `{shown(asked)}`"
             raise InputError(Fault(message, "export", key="--to", expected=expected))
-        return asked
+        return _installed(asked)
     found = next((name for name, ending in ENDINGS.items() if target.lower().endswith(ending)), "")
     if not found:
         raise InputError(Fault(f"`{shown(target)}` does not say by its ending what it is", "export", expected=expected))
-    return found
+    return _installed(found)
+
+
+def _installed(form: str) -> str:
+    """Refuse a form whose libraries are not there, before anything is computed."""
+    try:
+        missing = form == "historix" and not all(map(find_spec, ("laspy", "lazrs")))
+    except ValueError:  # put out of action: sys.modules["laspy"] is None
+        missing = True
+    if missing:
+        message = "a point cloud (LAZ) needs laspy with lazrs, which are not installed"
+        raise InputError(Fault(message, "extra", fix="pip install photostrip[laz]"))
+    return form
 
 
 def export(value: object) -> Text:
@@ -38,7 +59,7 @@ def export(value: object) -> Text:
         form = form_of(name)
     except InputError as error:
         fault = error.faults[0]
-        raise wrong(fault.message, code="export", expected=fault.expected) from None
+        raise wrong(fault.message, code=fault.code, expected=fault.expected, fix=fault.fix) from None
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or name == "/":
         raise wrong(f"`{shown(name)}` does not lie in the folder of the run", code="export", expected="a name")
