@@ -36,7 +36,7 @@ FILM, POINT, DISTANCE = "film", "principal point", "principal distance"
 SHIFT, SCALE = "shift of a photo", "scale of a photo"
 OF_CAMERAS = {
     LENS: K[:1],
-    EDGE: K[1:2],
+    EDGE: K[:2],
     DECENTRED: P,
     FILM: AFFINE,
     POINT: PRINCIPAL_POINT,
@@ -123,8 +123,7 @@ def _cameras(solution: BundleSolution) -> Iterator[Hypothesis]:
     used = np.flatnonzero(np.bincount(cameras.of_photo) > min(1, problem.photos - 1))  # of one photo see `_photos`
     for kind, columns in OF_CAMERAS.items():
         for camera in used.tolist():
-            lower = kind != EDGE or (cameras.unknown[camera, OF_CAMERAS[LENS]] >= 0).all()  # powers come in their order
-            if (cameras.unknown[camera, columns] < 0).all() and (given or kind != DISTANCE) and lower:
+            if (cameras.unknown[camera, columns] < 0).any() and (given or kind != DISTANCE):
                 yield Hypothesis(kind, camera)
 
 
@@ -270,17 +269,25 @@ def _explained(solution: BundleSolution, asked: Sequence[Hypothesis]) -> list[Ex
             continue
         every, end = solution.factored.explained(_columns_of_images(solution, [asked[n] for n in group])), 0
         for n in group:
-            own = np.arange(end, end + len(OF_IMAGE_COORDINATES[asked[n].kind]))
+            own = np.arange(end, end + len(_parameters(solution.prepared.problem, asked[n])))
             end += len(own)
             found[n] = Explained(every.pull[own], every.normal[np.ix_(own, own)], every.squares[own])
     return [found[n] for n in range(len(asked))]
+
+
+def _parameters(problem: BundleProblem, hypothesis: Hypothesis) -> list[int]:
+    """Columns of the parameters of a camera, or of a photo, that a hypothesis asks for: those not yet unknown."""
+    if hypothesis.kind in OF_PHOTOS:
+        return OF_PHOTOS[hypothesis.kind]
+    unknown = problem.cameras.unknown[hypothesis.number]
+    return [column for column in OF_CAMERAS[hypothesis.kind] if unknown[column] < 0]
 
 
 def _columns_of_images(solution: BundleSolution, together: Sequence[Hypothesis]) -> Columns:
     """Columns of hypotheses about one camera, or about one photo."""
     problem, number = solution.prepared.problem, together[0].number
     of_photo, of_camera = problem.images.photo, problem.cameras.of_photo
-    kinds = [kind for each in together for kind in OF_IMAGE_COORDINATES[each.kind]]
+    kinds = [kind for each in together for kind in _parameters(problem, each)]
     alone = together[0].kind in OF_PHOTOS
     among = (of_photo if alone else of_camera[of_photo]) == number
     rays = by_calibration(problem, int(of_camera[number]) if alone else number, among, kinds, solution.state)

@@ -94,7 +94,7 @@ CAUSES: dict[str, Cause] = {
     ),
     EDGE: Cause(
         title="lens distortion at the edge",
-        shows="what is left then, by the fifth power",
+        shows="the same, by the third and fifth power",
         told=("P110",),
         cure=_LENS,
         example="k2 left out",

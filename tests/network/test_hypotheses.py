@@ -14,6 +14,7 @@ from photostrip.network.hypotheses import (
     DECENTRED,
     DISTANCE,
     DRIFT,
+    EDGE,
     FILM,
     LENS,
     LIST,
@@ -74,7 +75,19 @@ def test_every_hypothesis_gains_what_an_adjustment_with_it_does() -> None:
     problem = with_positions_and_lists()
     solution = solve(problem)
     every = asked(solution)
-    assert {each.kind for each in every} == {OFFSET, DRIFT, LIST, LENS, DECENTRED, FILM, POINT, DISTANCE, SHIFT, SCALE}
+    assert {each.kind for each in every} == {
+        OFFSET,
+        DRIFT,
+        LIST,
+        LENS,
+        EDGE,
+        DECENTRED,
+        FILM,
+        POINT,
+        DISTANCE,
+        SHIFT,
+        SCALE,
+    }
     for each in nonempty(every):
         (found,) = hypotheses.likeliest(
             solution, 1.0, 1e-9, cameras=True, refused=[other for other in every if other is not each]

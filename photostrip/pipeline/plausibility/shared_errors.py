@@ -128,7 +128,8 @@ def _lens(errors: Sequence[Hypothesis], bundle: Bundle, inputs: Inputs) -> Itera
     images = bundle.screened.problem.images
     radius, names = float(np.hypot(*images.xy.T).max()), list(CALIBRATION)
     for camera in dict.fromkeys(each.number for each in errors):
-        kinds = [names[n] for each in errors if each.number == camera for n in OF_CAMERAS[each.kind]]
+        columns = {column for each in errors if each.number == camera for column in OF_CAMERAS[each.kind]}
+        kinds = [names[column] for column in sorted(columns)]
         name = bundle.screened.problem.camera_ids[camera]
         parameters = [each for each in bundle.parameters if each.camera == name and each.name in kinds]
         edge = [radius ** CALIBRATION[each.name].power * 1000.0 for each in parameters]
