@@ -44,6 +44,8 @@ OF_CAMERAS = {
 }
 """What may be wrong with a camera, with the columns of its parameters."""
 OF_LENSES = LENS, EDGE, DECENTRED
+PLAINER = {EDGE: LENS}
+"""What is asked for less: at the end a hypothesis has to explain more than it."""
 OF_PHOTOS = {SHIFT: PRINCIPAL_POINT, SCALE: [PRINCIPAL_DISTANCE]}
 """What may be wrong with one photo: it has a principal point, or a principal distance, of its own."""
 OF_IMAGE_COORDINATES = OF_CAMERAS | OF_PHOTOS
@@ -242,7 +244,8 @@ def _gain(explained: Explained) -> _Gain:
     pull, normal, size = explained
     if not len(pull) or (np.diag(normal) < LEAST_SHARE * size).any():
         return _Gain(0.0, np.zeros(len(pull)), np.full(len(pull), np.inf))
-    inverse = np.linalg.pinv(normal, rcond=ALIKE, hermitian=True)
+    unit = 1.0 / np.sqrt(size)  # columns of powers differ by powers of the radius
+    inverse = np.linalg.pinv(normal * np.outer(unit, unit), rcond=ALIKE, hermitian=True) * np.outer(unit, unit)
     value = inverse @ pull
     return _Gain(float(pull @ value), value, np.sqrt(np.diag(inverse)))
 

@@ -116,6 +116,10 @@ def test_what_the_end_does_not_support_is_given_up_whatever_it_is() -> None:
             done = search.adjust(supported(search.problem, every))
         left = search.put_back(done)
         assert left is not None, each
+        if each.kind in hypotheses.PLAINER:
+            assert [kept.kind for kept in search.common] == [hypotheses.PLAINER[each.kind]]
+            left = search.put_back(search.clean(supported(search.problem, left)))
+            assert left is not None, each
         assert search.common == []
         assert left.given == every.given
         again = search.clean(supported(search.problem, left))

@@ -23,7 +23,7 @@ from photostrip.network.datum import is_free
 from photostrip.network.gross_errors.point_decisions import cause_of_all
 from photostrip.network.gross_errors.ray_decisions import Adjusted, RayDecisions, decide_rays
 from photostrip.network.gross_errors.ray_log import ROBUST, START, RayLog, WrongRays
-from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER, Hypothesis, Likely
+from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER, PLAINER, Hypothesis, Likely
 from photostrip.network.problem import BundleProblem, PositionObservations
 from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, Limit
 from photostrip.network.selection import Selection, restarted, selected, supported
@@ -121,6 +121,11 @@ def _left_and_explained(done: ScreenedBundle, unit: float, level: float) -> floa
     numbers = len(done.selection.images), given + given_out, len(OF_PHOTOS) * observations.photos, len(OF_CAMERAS)
     price = sum(count * 2.0 * np.log(number / level) for count, number in zip(asked, numbers, strict=True))
     return float(done.solution.chi_square / unit**2 + price)
+
+
+def _plainer(hypothesis: Hypothesis) -> list[Hypothesis]:
+    """Return what stays of a hypothesis that explains no more than a plainer one."""
+    return [replace(hypothesis, kind=PLAINER[hypothesis.kind])] if hypothesis.kind in PLAINER else []
 
 
 def _searched(search: _Search, begin: Selection) -> ScreenedBundle:
@@ -334,7 +339,9 @@ class _Search:
         )
         if log_p <= self._level:
             return None
-        self.refused.append(self.common.pop(gone))
+        needless = self.common[gone]
+        self.refused.append(needless)
+        self.common[gone : gone + 1] = _plainer(needless)
         self.problem = self._with(self.common)
         return self._counting(done.selection)
 
@@ -352,7 +359,7 @@ class _Search:
         An adjustment without it is asked as the search was. It stays where there is none; an offset stays within a
         drift, which is asked about first.
         """
-        others = [each for each in self.common if each is not hypothesis]
+        others = [other for each in self.common for other in (_plainer(each) if each is hypothesis else [each])]
         if hypothesis.kind == OFFSET and any(each.kind == DRIFT for each in others):
             return -np.inf
         without = self._with(others)

@@ -99,7 +99,7 @@ def test_gross_errors_are_no_error_of_a_camera() -> None:
 @pytest.mark.slow
 def test_a_lens_is_told_among_gross_errors() -> None:
     wrong = (GrossError("image", count=8, size_um=300.0), GrossError("control", count=1, size_m=3.0))
-    result = adjusted(simulate(replace(strip(41, 20, *wrong), camera=replace(FILM, distortion=LENS))))
+    result = adjusted(simulate(replace(strip(42, 20, *wrong), camera=replace(FILM, distortion=LENS))))
     assert taken_up(result) == ["k1"]
     assert control_lost(result) <= 3
 
