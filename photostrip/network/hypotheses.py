@@ -25,7 +25,7 @@ from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.network.calibration import AFFINE, PRINCIPAL_DISTANCE, K, P, values_of
 from photostrip.network.calibration import POINT as PRINCIPAL_POINT
 from photostrip.network.normal_equations import Columns, Explained
-from photostrip.network.problem import BundleProblem, ControlObservations, PositionObservations
+from photostrip.network.problem import BundleProblem, ControlObservations, PositionObservations, StartValues
 from photostrip.network.rays import by_calibration
 from photostrip.network.settings import CALIBRATION
 from photostrip.network.solution import BundleSolution, Cofactors
@@ -59,6 +59,7 @@ ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most
 LEAST_SHARE = 1e-9  # of a column that the other unknowns leave to it, for it to be more than rounding
 ALIKE = 1e-6  # of columns of one hypothesis, from which they are one
 SHOWN_SIGMAS = 4.0  # standard deviations from which a component is off
+OTHER_HEIGHTS = 0.5, 2.0  # of photos above what they show, from which a principal distance is found, too
 UP_AXIS = 2
 HEIGHTS_ONLY = -1  # in place of the number of a list: what is given in height only
 
@@ -361,6 +362,26 @@ def taken_up(problem: BundleProblem, hypothesis: Hypothesis) -> BundleProblem:
     changed = replace(positions, group=group, offset_sigma=np.where(members > 0, np.inf, 0.0), drift_sigma=drift)
     names = ("of the block",) if hypothesis.of == ALL else problem.group_ids
     return replace(problem, positions=changed, group_ids=names)
+
+
+def starts(problem: BundleProblem, hypothesis: Hypothesis) -> Iterator[StartValues]:
+    """Yield start values with which to take a hypothesis up: those of the problem, and what else may lead to the end.
+
+    A network that is bent to its control by a principal distance far off is no start for another one: steps do not come
+    to an end. With photos at half or twice their height, where they were bent to nothing, they do.
+    """
+    start, images = problem.start, problem.images
+    yield start
+    if hypothesis.kind != DISTANCE:
+        return
+    known = np.isfinite(start.points).all(axis=1)[images.point]
+    photo, axis = images.photo[known], start.rotations[:, :, 2]
+    arm = start.centers[photo] - start.points[images.point[known]]
+    rays = np.bincount(photo, minlength=problem.photos)
+    height = np.bincount(photo, np.einsum("ni,ni->n", arm, axis[photo]), problem.photos) / np.maximum(rays, 1)
+    own = (problem.cameras.of_photo == hypothesis.number) * height
+    for times in OTHER_HEIGHTS:
+        yield replace(start, centers=start.centers + ((times - 1.0) * own)[:, None] * axis)
 
 
 def _with_own_camera(problem: BundleProblem, photo: int, columns: list[int]) -> BundleProblem:

@@ -300,17 +300,12 @@ class _Search:
             return self.adjust(supported(self.problem, done.selection))
         before, solution, tried = self.problem, done.solution, {}
         for each in likely_ones:
-            self.problem = hypotheses.taken_up(before, each.hypothesis)
-            try:
-                found = self.adjust(supported(self.problem, done.selection))
-            except GeometryError:  # what is left would not hold the photos
+            found = self._with(each.hypothesis, done.selection)
+            if found is None:
                 self.refused.append(each.hypothesis)
-                continue
-            if hypotheses.impossible(found.solution):
-                self.refused.append(each.hypothesis)
-                continue
-            tried[each.hypothesis.name] = each.hypothesis, found, self.problem
-        self.problem = before
+            else:
+                tried[each.hypothesis.name] = each.hypothesis, found, self.problem
+            self.problem = before
         if not tried:
             return None
         # what is wrong makes sigma0 large: the hypotheses are compared by what it becomes
@@ -329,6 +324,21 @@ class _Search:
         self.common.append(likely.hypothesis)
         return found
 
+    def _with(self, hypothesis: Hypothesis, selection: Selection) -> ScreenedBundle | None:
+        """Adjust a selection with a hypothesis, from the first of its starts that leads to an end; None: none does."""
+        for start in hypotheses.starts(self.problem, hypothesis):
+            before = self.problem
+            self.problem = replace(hypotheses.taken_up(before, hypothesis), start=start)
+            try:
+                found = self.adjust(supported(self.problem, selection))
+            except GeometryError:  # what is left would not hold the photos, or steps from there do not come to an end
+                self.problem = before
+                continue
+            if not hypotheses.impossible(found.solution):
+                return found
+            self.problem = before
+        return None
+
     def put_back(self, done: ScreenedBundle) -> Selection | None:
         """Give up what the end supports least of all that was taken up; None where it supports everything.
 
@@ -342,10 +352,10 @@ class _Search:
         needless = self.common[gone]
         self.refused.append(needless)
         self.common[gone : gone + 1] = _plainer(needless)
-        self.problem = self._with(self.common)
+        self.problem = self._with_all(self.common)
         return self._counting(done.selection)
 
-    def _with(self, common: Sequence[Hypothesis]) -> BundleProblem:
+    def _with_all(self, common: Sequence[Hypothesis]) -> BundleProblem:
         """Let what is given take up some hypotheses, and start where the last adjustment ended."""
         return replace(reduce(hypotheses.taken_up, common, self.given), start=self.problem.start)
 
@@ -362,7 +372,7 @@ class _Search:
         others = [other for each in self.common for other in (_plainer(each) if each is hypothesis else [each])]
         if hypothesis.kind == OFFSET and any(each.kind == DRIFT for each in others):
             return -np.inf
-        without = self._with(others)
+        without = self._with_all(others)
         selection = supported(without, self._counting(done.selection))
         try:
             if hypothesis.kind == ORDER:
