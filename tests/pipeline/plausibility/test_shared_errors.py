@@ -263,6 +263,15 @@ def test_what_is_given_elsewhere_is_told_and_no_camera(name: str, seed: int, cod
     assert [each.code for each in of_planted(name, seed).findings] == [code]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [100003, 100011])
+def test_a_lens_far_off_is_told_and_no_control_goes(seed: int) -> None:
+    """Steps that begin in a network which a lens of 0.58 times its distance has bent do not come to an end."""
+    result = of_planted("principal distance of another lens", seed)
+    assert [each.code for each in result.findings if each.severity in {"error", "warning"}] == ["P105"]
+    assert not lost(result)
+
+
 @pytest.mark.parametrize("scatter", [0.0, 0.05])
 def test_heights_of_level_ground_are_no_mistake(scatter: float) -> None:
     """They are one number, or nearly so; one of them is taken out for a wrong image of its point."""
