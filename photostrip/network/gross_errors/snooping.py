@@ -166,7 +166,7 @@ class _Search:
         self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
         self.held: set[tuple[str, int, int]] = set()  # given coordinates without which the adjustment fails
         self.spared[images.point[[] if kept is None else kept]] = True
-        self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates not put in yet
+        self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates that may be put in yet
         self.begin = begin.images
         self.control = begin.control.copy()  # those that were put in, and that nothing has rejected
         # what tests took out, in order; what they said of rays stands in the columns of the log
@@ -227,8 +227,6 @@ class _Search:
             done = self.adjust(supported(self.problem, selection))
         while True:
             worst = self._worst(done)
-            if not len(worst) and not reliability.sigma0_test(done.solution).too_large:
-                return done
             found = self._with_likeliest(done, worst)
             if found is None and not len(worst):
                 return done
@@ -478,9 +476,11 @@ class _Search:
             self.held.add((worst[0].kind, worst[0].row, worst[0].axes[0]))
             return done
         for each in worst:
-            self.out[each.kind, each.row, each.axes[0]] = each
+            key = each.kind, each.row, each.axes[0]
             if each.kind == CONTROL:
                 self.control[each.row, each.axes[0]] = False
+                self.waiting[each.row, each.axes[0]] = key not in self.out  # it comes back once only
+            self.out[key] = each
         return found
 
     def _tried(self, selection: Selection) -> ScreenedBundle | None:
@@ -630,7 +630,7 @@ class _Search:
         return None if same else chosen
 
     def _given(self, done: ScreenedBundle, limit: float) -> Flags:
-        """Control coordinates that were left out from the start and fit."""
+        """Control coordinates that were left out, from the start or by a test, and fit."""
         control = self.problem.control
         error = np.abs(done.solution.control_residuals)
         cofactor = -np.diagonal(done.precision.control_residuals, axis1=1, axis2=2)
