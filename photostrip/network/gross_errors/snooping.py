@@ -166,7 +166,7 @@ class _Search:
         self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
         self.held: set[tuple[str, int, int]] = set()  # given coordinates without which the adjustment fails
         self.spared[images.point[[] if kept is None else kept]] = True
-        self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates that may be put in yet
+        self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates that may come in
         self.begin = begin.images
         self.control = begin.control.copy()  # those that were put in, and that nothing has rejected
         # what tests took out, in order; what they said of rays stands in the columns of the log
