@@ -23,7 +23,17 @@ from photostrip.network.datum import is_free
 from photostrip.network.gross_errors.point_decisions import cause_of_all
 from photostrip.network.gross_errors.ray_decisions import Adjusted, RayDecisions, decide_rays
 from photostrip.network.gross_errors.ray_log import ROBUST, START, RayLog, WrongRays
-from photostrip.network.hypotheses import DRIFT, OF_CAMERAS, OF_PHOTOS, OFFSET, ORDER, PLAINER, Hypothesis, Likely
+from photostrip.network.hypotheses import (
+    DRIFT,
+    OF_CAMERAS,
+    OF_PHOTOS,
+    OFFSET,
+    ORDER,
+    PLAINER,
+    UP_AXIS,
+    Hypothesis,
+    Likely,
+)
 from photostrip.network.problem import BundleProblem, PositionObservations
 from photostrip.network.reliability import ATTITUDE, CONTROL, IMAGE, POSITION, Limit
 from photostrip.network.selection import Selection, restarted, selected, supported
@@ -31,6 +41,7 @@ from photostrip.network.settings import BundleSettings
 from photostrip.network.solution import BundleSolution, Cofactors
 from photostrip.network.solve import solve
 from photostrip.rejection import Rejection
+from photostrip.strip.gross_errors.control.control_deletion import LARGEST_SHARE
 from photostrip.strip.gross_errors.pairs.pair_search import AMPLE, OUT_TO_ONE_MORE
 
 RAYS_TO_ONE_MORE = 50  # of a photo, for each of its points that may go at a time beside the worst: they hardly move it
@@ -51,7 +62,8 @@ class ScreenedBundle:
     rejections: tuple[Rejection, ...] = ()  # what was taken out, in order; re-admitted ones are marked
     rounds: int = 1
     common: tuple[Hypothesis, ...] = ()  # what groups of observations share, taken up as unknowns
-    held: tuple[Rejection, ...] = ()  # given coordinates beyond the limit that stay: without them the adjustment fails
+    # given coordinates beyond the limit that stay: without them the adjustment fails, or half of the control would go
+    held: tuple[Rejection, ...] = ()
 
     @classmethod
     def of(
@@ -98,7 +110,7 @@ def screen_bundle(
     search = _Search(problem, begin, settings, kept, rough=rough)
     done = _searched(search, begin)
     taken = [*search.common, *search.refused]
-    lost = any(each.kind != IMAGE and not each.readmitted for each in done.rejections)
+    lost = done.held or any(each.kind != IMAGE and not each.readmitted for each in done.rejections)
     if not (taken and lost) and not any(each.kind in OF_PHOTOS for each in taken):
         return done
     other = _Search(problem, begin, settings, kept, rough=rough, refused=taken)
@@ -139,6 +151,7 @@ def _searched(search: _Search, begin: Selection) -> ScreenedBundle:
         done = search.clean(more)
     while (less := search.put_back(done)) is not None:
         done = search.clean(supported(search.problem, less))
+    done = search.with_most_control(done)
     held = tuple(each for each in search.tested(done)[1] if search.holds(each))
     done = replace(done, rejections=tuple(search.log(done)), held=held)
     return replace(done, rounds=search.rounds, common=tuple(search.common))
@@ -164,7 +177,7 @@ class _Search:
         self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
         self.free = is_free(problem)
         self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
-        self.held: set[tuple[str, int, int]] = set()  # given coordinates without which the adjustment fails
+        self.held: set[tuple[str, int, int]] = set()  # given coordinates that stay
         self.spared[images.point[[] if kept is None else kept]] = True
         self.waiting = Selection.everything(problem).control & ~begin.control  # given coordinates that may come in
         self.begin = begin.images
@@ -264,6 +277,25 @@ class _Search:
         self.waiting[:], self.control = False, everything
         self.began = {key: each for key, each in self.began.items() if key[0] != CONTROL}
         return supported(self.problem, done.selection)
+
+    def with_most_control(self, done: ScreenedBundle) -> ScreenedBundle:
+        """Put all control back where half of it went, in plan or in height: which half is wrong tests cannot tell.
+
+        They would leave what goes with some wrong coordinates. Where camera positions take part, these tell it.
+        """
+        gone = np.zeros_like(done.selection.control)
+        for kind, row, axis in (*self.out, *self.began):
+            if kind == CONTROL:
+                gone[row, axis] = not done.selection.holds(kind, row, axis)
+        every = done.selection.control | gone
+        parts = [(gone[:, axes].sum(), every[:, axes].sum()) for axes in (slice(UP_AXIS), UP_AXIS)]
+        half, back = any(out > 0 and out >= LARGEST_SHARE * whole for out, whole in parts), None
+        if half and not done.selection.positions.any():
+            back = self._tried(replace(done.selection, control=every))
+        if back is None:
+            return done
+        self.held |= {(CONTROL, row, axis) for row, axis in np.argwhere(every).tolist()}
+        return back
 
     @property
     def _level(self) -> float:

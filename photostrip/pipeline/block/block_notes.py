@@ -92,7 +92,7 @@ def _given_notes(bundle: Bundle) -> Iterator[Note]:
             yield Note("control-rejected" if points else "position-rejected", text, photos=photos, points=points)
     for each in bundle.screened.held:
         text, photos, points = _contradiction(problem, each, early)
-        text += "; it was used: the adjustment fails without it"
+        text += "; it was used: without it the adjustment fails, or half of the control would be out"
         yield Note("control-doubtful" if points else "position-doubtful", text, photos=photos, points=points)
 
 

@@ -97,14 +97,11 @@ def is_doubtful(stage: FormedPhotos, result: Result, predicted: Predicted) -> bo
 def _tested(result: Result) -> Flags:
     """Given coordinates (c, 3) that the run could test for gross errors, and of which it doubts none."""
     settings, control = result.settings, result.inputs.control
-    if result.bundle is not None:
-        return np.full(control.use.shape, settings.bundle.screening != "none")
-    tested = np.zeros(control.use.shape, bool)
-    if (settings.links if result.model_strips else settings.relative).screening == "none":
-        return tested
-    for strip in result.strips:
-        rows = locate(strip.control.ids, control.ids)
-        tested[rows] |= np.isfinite(strip.screened_control.redundancy) | (strip.shared is not None)
+    tested = np.full(control.use.shape, result.bundle is not None and settings.bundle.screening != "none")
+    if result.bundle is None and (settings.links if result.model_strips else settings.relative).screening != "none":
+        for strip in result.strips:
+            rows = locate(strip.control.ids, control.ids)
+            tested[rows] |= np.isfinite(strip.screened_control.redundancy) | (strip.shared is not None)
     doubtful = {name for note in result.notes if note.code == "control-doubtful" for name in note.points}
     tested[[name in doubtful for name in control.ids]] = False
     return tested

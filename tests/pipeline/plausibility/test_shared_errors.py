@@ -272,6 +272,23 @@ def test_a_lens_far_off_is_told_and_no_control_goes(seed: int) -> None:
     assert not lost(result)
 
 
+def test_what_photos_share_is_told_where_no_single_test_is_beyond_its_limit() -> None:
+    """A principal point 0.2 mm off hardly moves sigma0, and no residual; all of them together are sure of it."""
+    result = of_planted("principal point off by 0.05 to 0.3 mm", 310002)
+    assert result.bundle is not None
+    assert [each.code for each in result.findings] == ["P111"]
+    assert not lost(result)
+
+
+@pytest.mark.parametrize(("name", "code"), [("all heights zero", "P410"), ("heights counted downwards", "P401")])
+def test_control_of_which_half_would_go_stays(name: str, code: str) -> None:
+    """Single tests leave what goes with some wrong heights, and sound plan coordinates go for them."""
+    result = of_planted(name, 310003)
+    assert [each.code for each in result.findings] == [code]
+    assert not lost(result)
+    assert {note.code for note in result.notes} >= {"control-doubtful"}
+
+
 @pytest.mark.parametrize("scatter", [0.0, 0.05])
 def test_heights_of_level_ground_are_no_mistake(scatter: float) -> None:
     """They are one number, or nearly so; one of them is taken out for a wrong image of its point."""
