@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
+from math import comb, log
 
 import numpy as np
 
@@ -268,7 +269,9 @@ class _Search:
             self.problem = before
             return selection
         fall = max(done.solution.chi_square - without.solution.chi_square, 0.0) / done.limit.unit**2
-        doubted = hypotheses.log_probability(fall, int(self.waiting.sum()))
+        out = int(self.waiting.sum())
+        ways = comb(int(np.isfinite(before.control.sigma).sum()), out)
+        doubted = min(hypotheses.log_probability(fall, out) + log(ways), 0.0)
         likely = self._likeliest(done, doubted)
         if not likely:
             self.problem = before

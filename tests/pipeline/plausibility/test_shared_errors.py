@@ -289,6 +289,13 @@ def test_control_of_which_half_would_go_stays(name: str, code: str) -> None:
     assert {note.code for note in result.notes} >= {"control-doubtful"}
 
 
+def test_doubted_control_counts_how_many_coordinates_it_may_be() -> None:
+    """Heights of two kinds are one cause; the strips leave two of them out, any two of all that are given."""
+    result = of_planted("heights of two kinds in one list", 310032)
+    assert [each.code for each in result.findings] == ["P404"]
+    assert not lost(result)
+
+
 @pytest.mark.parametrize("scatter", [0.0, 0.05])
 def test_heights_of_level_ground_are_no_mistake(scatter: float) -> None:
     """They are one number, or nearly so; one of them is taken out for a wrong image of its point."""
