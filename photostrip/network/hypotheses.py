@@ -374,7 +374,7 @@ def starts(problem: BundleProblem, hypothesis: Hypothesis) -> Iterator[StartValu
     yield start
     if hypothesis.kind != DISTANCE:
         return
-    known = np.isfinite(start.points).all(axis=1)[images.point]
+    known = np.asarray(np.isfinite(start.points).all(axis=1), bool)[images.point]
     photo, axis = images.photo[known], start.rotations[:, :, 2]
     arm = start.centers[photo] - start.points[images.point[known]]
     rays = np.bincount(photo, minlength=problem.photos)
