@@ -273,10 +273,11 @@ class _Search:
         ways = comb(int(np.isfinite(before.control.sigma).sum()), out)
         doubted = min(hypotheses.log_probability(fall, out) + log(ways), 0.0)
         likely = self._likeliest(done, doubted)
-        if not likely:
+        first = hypotheses.most_likely(likely, self.settings.level).hypothesis if likely else None
+        if first is None or self._with(first, done.selection) is None:
             self.problem = before
             return selection
-        self._take_up(hypotheses.most_likely(likely, self.settings.level).hypothesis)
+        self.common.append(first)
         self.waiting[:], self.control = False, everything
         self.began = {key: each for key, each in self.began.items() if key[0] != CONTROL}
         return supported(self.problem, done.selection)

@@ -264,10 +264,17 @@ def test_what_is_given_elsewhere_is_told_and_no_camera(name: str, seed: int, cod
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [100003, 100011])
-def test_a_lens_far_off_is_told_and_no_control_goes(seed: int) -> None:
-    """Steps that begin in a network which a lens of 0.58 times its distance has bent do not come to an end."""
-    result = of_planted("principal distance of another lens", seed)
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        ("principal distance of another lens", 100003),
+        ("principal distance of another lens", 100011),
+        ("pixels of an image of another width", 330002),
+    ],
+)
+def test_a_lens_far_off_is_told_and_no_control_goes(name: str, seed: int) -> None:
+    """Steps that begin in a network which half the principal distance has bent do not come to an end."""
+    result = of_planted(name, seed)
     assert [each.code for each in result.findings if each.severity in {"error", "warning"}] == ["P105"]
     assert not lost(result)
 
