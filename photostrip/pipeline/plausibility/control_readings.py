@@ -143,17 +143,11 @@ class Better(NamedTuple):
 
 
 def find_reading(
-    held: HeldStrip,
-    control: ControlPoints,
-    frames: Sequence[GroundFrame],
-    as_given: OnControl | None,
-    *,
-    distance: bool = False,
+    held: HeldStrip, control: ControlPoints, frames: Sequence[GroundFrame], as_given: OnControl | None
 ) -> Better | None:
     """Find the reading under which a strip fits its control better than as it is given; None without one.
 
-    distance: whether the camera is in doubt, so that other principal distances are asked about wherever the strip does
-        not fit at once; else only where its heights ask for them. For them it is formed many times.
+    Other principal distances, for which it is formed many times, are asked about only where its heights ask for them.
     """
     lists, sizes = np.unique(control.frame[held.given], return_counts=True)
     smaller = lists[np.argsort(sizes, kind="stable")][:-1].tolist()  # against a majority nothing is said
@@ -169,11 +163,11 @@ def find_reading(
             continue
         if reading.code == "P405" and as_given is not None and not _tells(as_given, reading.factor[HEIGHT]):
             continue
-        if reading is DISTANCE and (best is not None or not (distance or as_given is None or not as_given.fits)):
+        if reading is DISTANCE and (best is not None or (as_given is not None and as_given.fits)):
             continue
         way, unknowns = reading, int(aside[held.given].any(axis=0).sum())
         if reading is DISTANCE:
-            factor, tried = _best_distance(held, control, frames, closely=distance or _stretched(as_given))
+            factor, tried = _best_distance(held, control, frames, closely=_stretched(as_given))
             way, unknowns = replace(reading, distance=factor), 1
         else:
             tried = held.read(reading(control, number), frames, aside)

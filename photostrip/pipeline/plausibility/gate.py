@@ -6,7 +6,7 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,7 +46,6 @@ OF_LISTS = ("P404", "P407")  # findings on control lists as wholes
 # findings on photos and bases that do not go on as those before them, on points that strips put at two places
 OF_STRIPS = ("P201", "P202", "P205", "P206", "P207", "P301", "P304")
 OF_DISTANCE = ("P101", "P105", "P107")  # findings on principal distances, or as much of the images
-OF_DISTANCE_OR_POINT = ("P105", "P111")
 ALIKE = "P410"  # coordinates that are those of others
 OUTSIDE = "P402"  # control lies outside its coordinate reference system: what a map stretches there no camera did
 PAIR = 2  # photos
@@ -153,11 +152,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     misread = any(each.code in OF_CAMERAS for each in causes)  # perhaps
     odd = {each.strip.id for each in formed if by_result.is_doubtful(each, result, predicted)}
     doubtful = [each for each in formed if misread or each.strip.id in odd]
-    # what was taken up does not explain all, or is what a distance that is far off is taken for
-    far = any(each.code in OF_DISTANCE_OR_POINT for each in causes)
-    cameras = {each.strip.id for each in formed if far or (misread and each.strip.id in odd)}
     findings = [*images.findings]
-    findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None, distances=cameras)
+    findings += _of_control(control, points, doubtful, settings, slips=result.bundle is None)
     if control is not None and not any(each.is_error for each in findings):
         named = {name for each in (*findings, *causes) for name in each.points}
         findings += [each for each in by_result.of_result(result, predicted, control) if named.isdisjoint(each.points)]
@@ -230,18 +226,12 @@ def _of_control(
     settings: Settings,
     *,
     slips: bool,
-    distances: Container[str] = (),
 ) -> list[Finding]:
-    """Look at given coordinates: where they lie, how they go with each strip, and with it by single points.
-
-    distances: ids of strips whose camera is in doubt.
-    """
+    """Look at given coordinates: where they lie, how they go with each strip, and with it by single points."""
     if control is None:
         return []
     copied = list(identity.find_copied_points(control.points, observations))
-    of_strips = [
-        given_control.of_strip(control, each, settings, distance=each.strip.id in distances) for each in formed
-    ]
+    of_strips = [given_control.of_strip(control, each, settings) for each in formed]
     findings = [*control.findings, *copied, *(finding for each in of_strips for finding in each.whole)]
     named = {name for each in copied for name in each.names}  # with the coordinates of another it looks like a slip
     single = (finding for each in of_strips for finding in each.slips) if slips else ()

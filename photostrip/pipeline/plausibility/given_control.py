@@ -72,13 +72,8 @@ class OfStrip:
     slips: list[Finding] = field(default_factory=list)  # of single ones: P406, P408
 
 
-def of_strip(
-    control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings, *, distance: bool = False
-) -> OfStrip:
-    """Compare the given points with a formed strip, as they are given and as they may be read.
-
-    distance: whether the camera is in doubt.
-    """
+def of_strip(control: GivenControl, stage: FormedPhotos | LinkedModels, settings: Settings) -> OfStrip:
+    """Compare the given points with a formed strip, as they are given and as they may be read."""
     strip, points = stage.strip.id, control.points
     held = HeldStrip.of(stage, points, settings)
     if not len(held.given):
@@ -87,7 +82,7 @@ def of_strip(
     whole = control_readings.of_heights(held, as_given)
     if whole:
         return OfStrip(whole)
-    better = control_readings.find_reading(held, points, control.read_in, as_given, distance=distance)
+    better = control_readings.find_reading(held, points, control.read_in, as_given)
     if better is not None:
         whole.append(control_readings.named(better, as_given, held, axes_are_right=control.axes_are_right))
     else:

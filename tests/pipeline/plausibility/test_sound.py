@@ -125,9 +125,9 @@ def test_a_bundle_says_whose_given_points_need_a_closer_look(role: str, monkeypa
     looked_at: list[str] = []
     compared = given_control.of_strip
 
-    def seen(control: GivenControl, stage: FormedPhotos, settings: Settings, *, distance: bool) -> OfStrip:
+    def seen(control: GivenControl, stage: FormedPhotos, settings: Settings) -> OfStrip:
         looked_at.append(stage.strip.id)
-        return compared(control, stage, settings, distance=distance)
+        return compared(control, stage, settings)
 
     monkeypatch.setattr(given_control, "of_strip", seen)
     made = simulate(replace(BLOCK, control=Control(check=4)))
