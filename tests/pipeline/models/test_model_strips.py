@@ -324,7 +324,7 @@ def mistaken(kind: str) -> Inputs:
         ("sigma in mm", {"sigma-unit", "unit-weight"}, set()),
         ("sigma in m", {"sigma-unit", "sigma-contradicted", "unit-weight"}, set()),
         ("a digit", {"control-rejected"}, {"P406"}),
-        ("heights in feet", {"control-rejected", "unchecked-control"}, {"P405"}),
+        ("heights in feet", {"control-doubtful", "unit-weight"}, {"P405"}),
     ],
 )
 def test_mistakes_that_a_result_tells(kind: str, notes: set[str], findings: set[str]) -> None:
