@@ -295,7 +295,10 @@ class _Search:
         parts = [(gone[:, axes].sum(), every[:, axes].sum()) for axes in (slice(UP_AXIS), UP_AXIS)]
         half, back = any(out > 0 and out >= LARGEST_SHARE * whole for out, whole in parts), None
         if half and not done.selection.positions.any():
-            back = self._tried(replace(done.selection, control=every))
+            point, images = self.problem.images.point, done.selection.images
+            unseen = np.setdiff1d(self.problem.control.point[gone.any(axis=1)], point[images])
+            images = images | (self.begin & np.isin(point, unseen))  # all went against what is given of their points
+            back = self._tried(replace(done.selection, images=images, control=every))
         if back is None:
             return done
         self.held |= {(CONTROL, row, axis) for row, axis in np.argwhere(every).tolist()}
