@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from photostrip.camera import Distortion
+from photostrip.camera import Camera, Distortion
 from photostrip.network.hypotheses import log_probability, log_probability_of_any
 from photostrip.pipeline.run import triangulate
-from photostrip.simulation import FILM, Control, Flight, GrossError, Points, Spec, simulate
+from photostrip.simulation import FILM, Control, Flight, GrossError, Image, Points, Spec, Terrain, simulate
 from tests.pipeline.blocks import errors
 from tests.simulated import inputs_of, settings_of
 
@@ -102,6 +102,29 @@ def test_a_lens_is_told_among_gross_errors() -> None:
     result = adjusted(simulate(replace(strip(42, 20, *wrong), camera=replace(FILM, distortion=LENS))))
     assert taken_up(result) == ["k1"]
     assert control_lost(result) <= 3
+
+
+@pytest.mark.slow
+def test_a_lens_that_nobody_calibrated_costs_no_more_than_one_that_is_asked_for() -> None:
+    """Three strips of a drone, turned by ten degrees: f 1 % off, the principal point 0.1 mm, k1 and k2 unstated."""
+    stated = Camera("uav", principal_distance=8.8, format=(13.2, 8.8), pixel_size=0.0024)
+    lens = Distortion("brown", "image_to_ideal", k=(2e-4, -3e-6, 0.0))
+    true = replace(stated, principal_distance=8.888, principal_point=(0.1, -0.07), distortion=lens)
+    laps = {"end_lap_percent": 80.0, "side_lap_percent": 70.0}
+    flight = Flight(photos=10, strips=3, flying_height=60.0, attitude_sigma_deg=(10.0, 10.0, 5.0), **laps)
+    control = Control(layout="random", count=17, check=16, sigma=(0.01, 0.01, 0.015))
+    points, terrain = Points(rows=5, extra_per_model=15), Terrain(relief=8.0)
+    spec = Spec(camera=true, flight=flight, terrain=terrain, points=points, control=control, image=Image(sigma_um=1.4))
+    simulation = simulate(spec)
+    inputs, settings = inputs_of(simulation), settings_of(simulation)
+    inputs = replace(inputs, strips=tuple(replace(each, camera=stated) for each in inputs.strips))
+    found = triangulate(inputs, settings)
+    assert [each.code for each in found.findings] == ["P107", "P110", "P111"]
+    assert "[k1, k2]" in found.findings[1].fix
+    assert control_lost(found) == 0
+    free = ("principal_distance", "principal_point", "k1", "k2")
+    asked = replace(inputs, strips=tuple(replace(each, calibrate=free) for each in inputs.strips))
+    assert errors(simulation, found) == pytest.approx(errors(simulation, triangulate(asked, settings)), abs=1e-6)
 
 
 def test_probabilities_are_those_of_scipy_and_go_on_where_numbers_end() -> None:
