@@ -74,7 +74,7 @@ def _camera(name: str, given: Camera | PixelCamera) -> camera.Camera:
     if isinstance(given, PixelCamera):
         return given.in_millimetres(name)
     solved = certificate_of(given)
-    return camera.Camera(
+    found = camera.Camera(
         name=name,
         principal_distance=given.principal_distance,
         principal_point=given.principal_point,
@@ -82,6 +82,28 @@ def _camera(name: str, given: Camera | PixelCamera) -> camera.Camera:
         fiducials=dict(given.fiducials) if solved is None else solved.marks,
         pixel_size=given.pixel_size,
         distortion=None if given.distortion is None else distortion_of(given.distortion),
+    )
+    return found if given.distortion is None else with_k0(found, given.distortion.k0)
+
+
+def with_k0(given: camera.Camera, k0: float) -> camera.Camera:
+    """Return a camera whose principal distance and coefficients hold what D = X k0 + ... does besides.
+
+    The linear term scales the image. From image to ideal: X (1 + k0) + D(X) over f is X + D(X) / (1 + k0) over
+    f / (1 + k0). From ideal to image: X (1 + k0) + D(X) of X = f u is X' + D(X' / (1 + k0)) of X' = f (1 + k0) u.
+    """
+    lens, scale = given.distortion, 1.0 + k0
+    if lens is None or not k0:
+        return given
+    inverse = lens.direction == "image_to_ideal"
+
+    def scaled(values: tuple[float, ...], *degrees: int) -> Any:  # noqa: ANN401 (as many as there are)
+        return tuple(value / scale ** (1 if inverse else degree) for value, degree in zip(values, degrees, strict=True))
+
+    return replace(
+        given,
+        principal_distance=given.principal_distance / scale if inverse else given.principal_distance * scale,
+        distortion=replace(lens, k=scaled(lens.k, 3, 5, 7), p=scaled(lens.p, 2, 2), b=scaled(lens.b, 1, 1)),
     )
 
 

@@ -17,7 +17,7 @@ from photostrip.formats.text.tables import Table
 from photostrip.notes import Note, counted, listed
 from photostrip.pipeline.inputs import AUTO, BUNDLE
 from photostrip.points import locate
-from photostrip.project.conversion import certificate_of
+from photostrip.project.conversion import cameras, certificate_of
 from photostrip.project.models import ModelTables
 from photostrip.project.resolved import OF_MODELS, OF_PHOTOS
 from photostrip.project.schema.cameras import Camera
@@ -92,6 +92,7 @@ def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
     """Explain every row and every definition that is not used: a note for each kind in each file."""
     photos = set(project.camera_of)
     yield from _unused_cameras(project, root)
+    yield from _linear_distortion(project, root)
     yield from _without_effect(project, root)
     for name, camera in project.cameras.items():
         if isinstance(camera, Camera) and (solved := certificate_of(camera)) is not None:
@@ -174,6 +175,19 @@ def _cameras_not_used(
     if others:
         note = _in_no_strip(read.table, [read.ids.index(name) for name in others], others, photos)
         yield replace(note, severity="note")
+
+
+def _linear_distortion(project: ProjectFile, root: Node) -> Iterator[Note]:
+    """Say which principal distance a camera has with its k0."""
+    for name, given in project.cameras.items():
+        if isinstance(given, Camera) and given.distortion is not None and given.distortion.k0:
+            f = cameras(project)[name].principal_distance
+            message = (
+                f"k0 of camera {name} scales its image: the principal distance {given.principal_distance:g} mm becomes "
+                f"{f:.6g} mm, and k, p are those beside it"
+            )
+            path = ("cameras", name, "distortion", "k0")
+            yield root.place_of(path).note("linear-distortion", message, key=key_path(path))
 
 
 def _unused_cameras(project: ProjectFile, root: Node) -> Iterator[Note]:

@@ -16,6 +16,7 @@ from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.notes import counted, listed
 from photostrip.pipeline.inputs import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, locate
+from photostrip.project.forms import form_of
 from photostrip.project.schema.measurements import Models
 from photostrip.project.yaml.references import listed_photos
 from photostrip.project.yaml.tree import Node, fault_at
@@ -58,9 +59,9 @@ def model_tables(points: ModelTable | None, centers: ModelTable | None, root: No
 def read_model_points(path: str, root: Node, findings: Findings, *, centers: bool) -> ModelTable | None:
     """Read one of the two tables of model coordinates; the project says what rows without standard deviations get."""
     where = ("models", "centers") if centers else ("models",)
-    columns = {name: each.text for name, each in root.mapping_at(*where, "columns").items() if each.text}
+    node = root.find(*where)
     has_sigma = root.has("models", "sigma") or (centers and root.has("models", "center_sigma"))
-    return read_models(path, findings, centers=centers, has_sigma=has_sigma, columns=columns)
+    return read_models(path, findings, centers=centers, has_sigma=has_sigma, form=form_of(node))
 
 
 def check_models(root: Node, tables: ModelTables, findings: Findings) -> dict[int, tuple[str, ...]]:

@@ -107,10 +107,15 @@ def completed(project: ProjectFile, root: Node, path: str, measured: Sequence[st
     )
 
 
-def _relative(root: Node, project: str, *owner: str | int) -> Text:
-    """Path of a table as seen from the project's folder, the same on every system."""
+def _relative(root: Node, project: str, *owner: str | int) -> Text | list[Text]:
+    """Path of a table as seen from the project's folder, the same on every system; of several tables a list."""
     node = root.find(*owner, "file")
-    path = path_of(node, project) if node is not None else ""
+    if node is not None and node.elements:
+        return [_seen(path_of(each, project), project) for each in node.elements]
+    return _seen(path_of(node, project) if node is not None else "", project)
+
+
+def _seen(path: str, project: str) -> Text:
     try:
         return Text(seen_from(path, Path(project).parent))
     except ValueError:  # another drive
@@ -131,7 +136,7 @@ def text_of(project: ProjectFile) -> str:
 def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
     """Turn sections into mappings, without keys that say nothing."""
     if isinstance(value, Section):
-        skipped = ("k", "p", "b") if isinstance(value, Distortion) and value.model == "radial-table" else ()
+        skipped = ("k0", "k", "p", "b") if isinstance(value, Distortion) and value.model == "radial-table" else ()
         fields = ((name, getattr(value, name)) for name in type(value).keys if name not in skipped)
         return {
             name: "auto" if each is None else _plain(each)

@@ -21,6 +21,7 @@ from photostrip.formats.text.numbers import number as read_number
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.notes import Note, counted, listed
 from photostrip.project.conversion import ground_columns
+from photostrip.project.forms import form_of
 from photostrip.project.models import ModelTables, model_tables, read_model_points
 from photostrip.project.schema.ground import Control
 from photostrip.project.yaml.reading import Reading
@@ -50,24 +51,25 @@ def read_tables(reading: Reading) -> Tables:
     root = reading.root
     photos = frozenset(photo.id for photo in listed_photos(root))
     observations = fiducials = positions = orientations = points = centers = None
-    for path, findings in reading.named(("observations", "file")):
-        observations = read_measurements(path, findings, _manner(root, "observations", photos))
-    for path, findings in reading.named(("fiducial_measurements", "file")):
-        fiducials = read_measurements(path, findings, _manner(root, "fiducial_measurements", photos))
+    for paths, findings in reading.named_together(("observations", "file")):
+        observations = read_measurements(paths, findings, _manner(root, "observations", photos))
+    for paths, findings in reading.named_together(("fiducial_measurements", "file")):
+        fiducials = read_measurements(paths, findings, _manner(root, "fiducial_measurements", photos))
     control: list[ControlTable | None] = []
     # an id is one text, in whichever tables it stands: those of check points take 60 bytes each
     known = {} if observations is None else dict(zip(observations.target_ids, observations.target_ids, strict=True))
     for number, node in enumerate(root.list_at("control")):
         control.append(None)
         for path, findings in reading.named(("control", number, "file")):
-            up, columns = _height_column(node), _columns(node)
-            read = read_control(path, up, findings, default_sigma=node.has("sigma"), columns=columns)
+            up, form = _height_column(node), form_of(node)
+            read = read_control(path, up, findings, default_sigma=node.has("sigma"), form=form)
             if read is not None:
                 control[-1] = replace(read, ids=[known.get(name, name) for name in read.ids])
     refuse_repeated(control, reading.findings)
     for path, findings in reading.named(("camera_positions", "file")):
         node = root.entries["camera_positions"]
-        positions = read_positions(path, _height_column(node), findings, default_sigma=node.has("sigma"))
+        up, form = _height_column(node), form_of(node)
+        positions = read_positions(path, up, findings, default_sigma=node.has("sigma"), form=form)
     for path, findings in reading.named(("orientations", "file")):
         orientations = _orientations(path, root.entries["orientations"], findings)
     for path, findings in reading.named(("models", "file")):
@@ -100,13 +102,9 @@ def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:
         has_sigma=source is not None,
         sigma=sigma,
         repeated=node.word("repeated"),
-        columns=_columns(node),
+        form=form_of(node),
         photos=photos,
     )
-
-
-def _columns(node: Node) -> dict[str, str]:
-    return {name: each.text for name, each in node.mapping_at("columns").items() if each.text}
 
 
 def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable | None:
@@ -116,7 +114,8 @@ def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable
         return None
     observed = node.word("role") in {"", "observed"}
     needs = observed and not node.has("sigma"), observed and not node.has("sigma_angles")
-    return read_orientations(path, system.split("-"), node.word("angles", "unit") or "deg", findings, needs_sigma=needs)
+    unit, form = node.word("angles", "unit") or "deg", form_of(node)
+    return read_orientations(path, system.split("-"), unit, findings, needs_sigma=needs, form=form)
 
 
 def _height_column(node: Node) -> int:

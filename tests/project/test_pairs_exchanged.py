@@ -49,7 +49,7 @@ def faults(tmp_path: Path, listing: tuple[str, frozenset[str]]) -> list[tuple[st
     path = tmp_path / "pairs.csv"
     path.write_text(listing[0], encoding="utf-8")
     findings = Findings()
-    read_measurements(str(path), findings, Manner(sigma=SIGMA, photos=listing[1]))
+    read_measurements([str(path)], findings, Manner(sigma=SIGMA, photos=listing[1]))
     return [(each.code, each.message) for each in findings.faults]
 
 

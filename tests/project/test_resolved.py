@@ -37,12 +37,18 @@ strips:
     photos: ["2001", "2002"]
 observations:
   file: "observations.csv"
+  separator: comma
+  decimal: point
+  skip: 0
   unit: mm
   y_axis: up
   origin: center
   sigma: 0.005
 control:
   - file: "control.csv"
+    separator: comma
+    decimal: point
+    skip: 0
     crs: "EPSG:32633"
     axes: [east, north, up]
     height: ellipsoidal

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,6 +13,7 @@ from photostrip.arrays import Flags, Floats
 from photostrip.formats.measured.columns import AXES, POINT, SIGMAS, numbers, sigmas
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
+from photostrip.formats.text.table_text import UNDECLARED, Form
 from photostrip.formats.text.tables import Column, Table
 from photostrip.notes import listed
 
@@ -53,15 +54,15 @@ class ControlTable(GivenTable):
 
 
 def read_control(
-    file: str, up: int, findings: Findings, *, default_sigma: bool = True, columns: Mapping[str, str] | None = None
+    file: str, up: int, findings: Findings, *, default_sigma: bool = True, form: Form = UNDECLARED
 ) -> ControlTable | None:
     """Read a table of given ground coordinates; None when the header is wrong.
 
     up: which of the columns x, y, z is the height: ``use: xy`` means the two others, ``use: z`` this one.
     default_sigma: whether the project file has standard deviations for rows without them.
-    columns: names in the header of columns that have another name there.
+    form: how the table is written.
     """
-    table = read_table(file, CONTROL, findings, columns=columns)
+    table = read_table(file, CONTROL, findings, form=form)
     if table is None:
         return None
     roles = table.cells("role") if "role" in table.ids else [ROLES[0]] * len(table)

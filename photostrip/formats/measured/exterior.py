@@ -24,6 +24,7 @@ from photostrip.formats.measured.columns import (
 from photostrip.formats.measured.control import USE, GivenTable, given_columns, refuse_empty
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
+from photostrip.formats.text.table_text import UNDECLARED, Form
 from photostrip.formats.text.tables import Column, Table
 
 FIX = "set `{}` in the project file, or fill the columns"
@@ -56,9 +57,11 @@ class OrientationTable:
     sigma_angles: Floats
 
 
-def read_positions(file: str, up: int, findings: Findings, *, default_sigma: bool = True) -> PositionTable | None:
+def read_positions(
+    file: str, up: int, findings: Findings, *, default_sigma: bool = True, form: Form = UNDECLARED
+) -> PositionTable | None:
     """Read a table of measured positions of cameras as ``read_control`` reads control."""
-    table = read_table(file, POSITIONS, findings)
+    table = read_table(file, POSITIONS, findings, form=form)
     if table is None:
         return None
     read = PositionTable(**given_columns(table, "photo", up), time=table.column("time"))
@@ -71,6 +74,16 @@ def read_positions(file: str, up: int, findings: Findings, *, default_sigma: boo
     return read
 
 
+def orientation_columns(names: Sequence[str], unit: str) -> tuple[Column, ...]:
+    """Return the columns of a table of orientations by the names of its angles and their unit."""
+    angle = tuple(Column(name, number=True, aliases=(f"{name}_{unit}",)) for name in names)
+    sigma_angle = tuple(
+        replace(each, name=f"s_{name}", aliases=(*each.aliases, f"{each.aliases[0]}_{unit}"))
+        for each, name in zip(sigmas(*names), names, strict=True)
+    )
+    return (PHOTO, *numbers(*AXES), *angle, *sigmas(*AXES), *sigma_angle)
+
+
 def read_orientations(
     file: str,
     names: Sequence[str],
@@ -78,6 +91,7 @@ def read_orientations(
     findings: Findings,
     *,
     needs_sigma: tuple[bool, bool] = (False, False),
+    form: Form = UNDECLARED,
 ) -> OrientationTable | None:
     """Read a table of given exterior orientations; None when the header is wrong.
 
@@ -86,13 +100,8 @@ def read_orientations(
     needs_sigma: whether rows must have standard deviations of the position and of the angles: they are observations,
         and the project file gives none.
     """
-    angle = tuple(Column(name, number=True, aliases=(f"{name}_{unit}",)) for name in names)
+    table = read_table(file, orientation_columns(names, unit), findings, form=form)
     sigma_names = [f"s_{name}" for name in names]
-    sigma_angle = tuple(
-        replace(each, name=name, aliases=(*each.aliases, f"{each.aliases[0]}_{unit}"))
-        for each, name in zip(sigmas(*names), sigma_names, strict=True)
-    )
-    table = read_table(file, (PHOTO, *numbers(*AXES), *angle, *sigmas(*AXES), *sigma_angle), findings)
     if table is None:
         return None
     read = OrientationTable(

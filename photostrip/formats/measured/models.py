@@ -5,7 +5,6 @@ Files of blocks, a model's id, lines ``point x y z`` and -99, are read as well.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.formats.measured.columns import AXES, PHOTO, POINT, SIGMAS, numbers, refuse_without_sigma, sigmas
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
+from photostrip.formats.text.table_text import UNDECLARED, Form
 from photostrip.formats.text.tables import Column, Table
 
 MODEL = Column("model", aliases=("model_id", "pair", "stereopair"))
@@ -49,17 +49,17 @@ def read_models(
     *,
     centers: bool = False,
     has_sigma: bool = True,
-    columns: Mapping[str, str] | None = None,
+    form: Form = UNDECLARED,
 ) -> ModelTable | None:
     """Read a table of model coordinates; None when the header is wrong.
 
     has_sigma: whether the project has standard deviations for rows without them.
-    columns: names in the header of columns that have another name there.
+    form: how the table is written.
     """
     target = "photo" if centers else "point"
     rewritten = None if centers else rows_of_blocks
     layout = MODEL_CENTERS if centers else MODEL_POINTS
-    table = read_table(file, layout, findings, columns=columns, rewritten=rewritten)
+    table = read_table(file, layout, findings, form=form, rewritten=rewritten)
     if table is None:
         return None
     read = ModelTable(

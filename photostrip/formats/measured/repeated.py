@@ -33,7 +33,7 @@ def refuse(read: Measurements, target: str, findings: Findings) -> None:
         row = int(order[place])
         number = first.setdefault(int(key[row]), int(order[place - 1]))
         name, photo = read.target_ids[read.target[row]], read.photo_ids[read.photo[row]]
-        message = f"{target} {name} is already measured on photo {photo}, in line {read.table.lines[number]}"
+        message = f"{target} {name} is already measured on photo {photo}, in {read.table.lines_of(number)}"
         fix = "keep one of the two, give one another id, or set `repeated: average`"
         findings.add(read.table.fault(row, target, message, "measured-twice", fix=fix))
 
@@ -124,9 +124,9 @@ def _refuse_far(read: Measurements, target: str, ratio: Floats, group: Numbers, 
         rows = np.flatnonzero(group == number)
         apart = np.ptp(read.xy[rows], axis=0)
         name, photo = read.target_ids[read.target[rows[0]]], read.photo_ids[read.photo[rows[0]]]
-        lines = ", ".join(str(line) for line in read.table.lines[rows].tolist())
+        lines = read.table.lines_of(*rows.tolist())
         message = (
-            f"{target} {name} is measured {len(rows)} times on photo {photo} (lines {lines}), up to {apart.max():g} in "
+            f"{target} {name} is measured {len(rows)} times on photo {photo} ({lines}), up to {apart.max():g} in "
             f"{'xy'[int(apart.argmax())]} apart: {farthest[number]:.0f} standard deviations from the mean"
         )
         fix = "remove the wrong one, or give the other point an id of its own"
@@ -146,7 +146,5 @@ def _spread(read: Measurements, target: str, off: Floats, count: Numbers) -> Not
         f" measurement scatters by {scatter[0]:.3g} in x and {scatter[1]:.3g} in y (standard deviations, unit of the"
         f" table), the worst is {target} {name} on photo {photo}, {np.abs(off[worst]).max():.3g} off its mean"
     )
-    line = int(read.table.lines[worst])
-    return Note(
-        "measurements-averaged", message, "note", photos=(photo,), points=(name,), file=read.table.file, line=line
-    )
+    line, file = int(read.table.lines[worst]), read.table.file_of(worst)
+    return Note("measurements-averaged", message, "note", photos=(photo,), points=(name,), file=file, line=line)

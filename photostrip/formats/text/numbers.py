@@ -8,7 +8,7 @@ import unicodedata
 LARGEST_NUMBER = 1e15  # no coordinate in any unit is larger, and its square is still a number
 SMALLEST_LENGTH = 1e-12  # no length, and no standard deviation in any unit, is smaller
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+")
+DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+")
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ '’_\u00a0\u202f][0-9]{3})+(?:\.[0-9]*)?")
 _WITH_UNIT = re.compile(rf"({NUMBER.pattern})\s*([^\W\d_]+|%|°)")
 _SEXAGESIMAL = re.compile(r"[+-]?[0-9]+[°: ][0-9]+(?:['′: ].*)?")
@@ -24,12 +24,18 @@ class NotANumber(ValueError):  # noqa: N818 (the name of what it says)
         self.message, self.fix = message, fix
 
 
-def number(text: str) -> float:
+def number(text: str, decimal: str = ".") -> float:
     """Read a decimal number of at most 15 digits before the point; blanks around it do not count.
 
-    Raises NotANumber for anything else, also for ``nan``, ``1_000``, decimal commas and full-width digits.
+    decimal: what stands before the decimals, a point or a comma.
+
+    Raises NotANumber for anything else, also for ``nan``, ``1_000``, full-width digits and the other decimal sign.
     """
     word = text.strip()
+    if decimal != ".":
+        if "." in word:
+            raise NotANumber(f"`{shown(word)}` has a point in a table with decimal commas", "write a decimal comma")
+        word = word.replace(decimal, ".")
     if NUMBER.fullmatch(word):
         value = float(word)
         if abs(value) <= LARGEST_NUMBER:
@@ -48,7 +54,7 @@ def _reason(word: str) -> NotANumber:
         what = "is not a measured value"
     elif _GROUPED.fullmatch(word):
         what, fix = "has digits in groups", "write the digits without separators"
-    elif _DECIMAL_COMMA.fullmatch(word):
+    elif DECIMAL_COMMA.fullmatch(word):
         what, fix = "has a decimal comma", f"write {word.replace(',', '.')}"
     elif plain != word and NUMBER.fullmatch(plain):
         what, fix = "is not written with ASCII characters", f"write {plain}"

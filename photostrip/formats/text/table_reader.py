@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import count, islice
+from typing import Any
 
 import numpy as np
 
@@ -18,15 +19,16 @@ from photostrip.arrays import Floats, Numbers
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import BYTE_ORDER_MARK
 from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import SMALLEST_LENGTH, NotANumber, number, shown
+from photostrip.formats.text.numbers import DECIMAL_COMMA, SMALLEST_LENGTH, NotANumber, number, shown
 from photostrip.formats.text.rows import Cells, PlainRows, SplitRows
-from photostrip.formats.text.table_text import TableText, content
+from photostrip.formats.text.table_text import UNDECLARED, Form, TableText, content
 from photostrip.formats.text.tables import CONTROL_CHARACTER, Column, Table
 from photostrip.notes import Note, counted, listed
 
 CHUNK = 16_384  # rows turned into columns at a time, so that a big table never stands in memory cell by cell
 STANDARD_DEVIATIONS = {"s", "sd", "std", "sigma", "stdev", "accuracy", "precision"}  # one column for all coordinates
-SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
+WORDS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "blank"}  # that a project has for separators
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "vertical bars", " ": "blanks"}
 
 
 def read_table(
@@ -35,14 +37,14 @@ def read_table(
     findings: Findings,
     *,
     others: Sequence[Sequence[Column]] = (),
-    columns: Mapping[str, str] | None = None,
+    form: Form = UNDECLARED,
     rewritten: Callable[[bytes], bytes] | None = None,
 ) -> Table | None:
     """Read a table; None when not even the header can be read.
 
     others: other layouts of the same kind of table; that of which the header has most is taken, the first when in
         doubt.
-    columns: names in the header of columns that the user calls otherwise.
+    form: how the table is written.
     rewritten: makes a table, line for line, of the text of another layout; gives a table as it is.
     """
     findings.meet(file)
@@ -54,8 +56,10 @@ def read_table(
     if marked:
         findings.notes.append(Note("byte-order-mark", BYTE_ORDER_MARK, "note", file=file, line=1))
     data = data if rewritten is None else rewritten(data)
-    layouts = [_renamed(each, columns or {}) for each in (layout, *others)]
-    return _Reader(TableText(file, data), layouts, findings).read()
+    if form.separator == " ":
+        data = data.replace(b"\t", b" ")
+    layouts = [_renamed(each, form.columns) for each in (layout, *others)]
+    return _Reader(TableText(file, data, form), layouts, findings).read()
 
 
 def _renamed(layout: Sequence[Column], columns: Mapping[str, str]) -> tuple[Column, ...]:
@@ -79,8 +83,8 @@ class _Reader:
 
     def __init__(self, source: TableText, layouts: Sequence[Sequence[Column]], findings: Findings) -> None:
         self.source, self.layouts, self.findings = source, layouts, findings
-        self.layout = layouts[0]
-        self.rows = csv.reader(source.stream(), strict=True, skipinitialspace=True)
+        self.layout, self.form = layouts[0], source.form
+        self.above = self.form.skipped  # lines that are no rows
         self.width = 0
         self.columns: list[Column] = []
         self.lines: list[Numbers] = []
@@ -102,7 +106,7 @@ class _Reader:
             if not column.number:
                 parts = [np.zeros(0, np.intp), *self.codes[column.name]]
                 codes[column.name], ids[column.name] = self._clean(column, np.concatenate(parts), places)
-        return Table(file=self.source.file, lines=places, numbers=numbers, codes=codes, ids=ids, _source=self.source)
+        return Table(file=self.source.file, lines=places, numbers=numbers, codes=codes, ids=ids, texts=(self.source,))
 
     def _add(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> None:
         if self.findings.full(self.source.file):
@@ -112,21 +116,30 @@ class _Reader:
 
     def _header(self) -> bool:
         """Read the header; False when the table cannot be read without it."""
+        rows = self._reader(self.source.start_of(self.above + 1))
         try:
-            cells = next((row for row in self.rows if any(map(str.strip, row))), [])
+            cells: list[str] = next((row for row in rows if any(map(str.strip, row))), [])
         except csv.Error as error:
-            self._unreadable(error, 1)
+            self._unreadable(error, self.above + 1)
             return False
-        line = self.rows.line_num
+        line = self.above + rows.line_num
         names = [cell.strip() for cell in cells]
-        while names and not names[-1]:
+        while names and not names[-1] and not (self.form.numbered and self.form.separator != " "):
             names.pop()
         self.width = len(names)
         before = self.findings.number(self.source.file)
+        if self.form.numbered:
+            names = [str(number) for number in range(1, self.width + 1)]
+        else:
+            self.above = line
         self.layout = self._fitting({name.casefold() for name in names})
         if self._looks_like_a_header(names, line):
             self._assign(names, line)
         return self.findings.number(self.source.file) == before
+
+    def _reader(self, start: int) -> Any:  # noqa: ANN401 (a reader of csv, whose type has no name)
+        stream = self.source.stream(start)
+        return csv.reader(stream, delimiter=self.form.separator, strict=True, skipinitialspace=True)
 
     def _fitting(self, names: set[str]) -> Sequence[Column]:
         """Layout that misses the fewest of its columns, of those the one that has most; the first when in doubt."""
@@ -139,22 +152,29 @@ class _Reader:
 
     def _looks_like_a_header(self, names: list[str], line: int) -> bool:
         """Refuse a first line that is not a header, and say what it is instead."""
-        wanted = ",".join(column.name for column in self.layout if column.required)
+        wanted = self._wanted()
         if not names:
             self._add(1, "", "has no header and no rows", "no-header", expected=f"a header `{wanted}`")
             return False
+        if self.form.numbered:
+            return True
+        known = {alias for column in self.layout for alias in column.accepted}
         other = next((mark for mark in SEPARATORS if mark in names[0]), "") if len(names) <= 2 else ""
-        if other:
+        if other and (other != " " or len(known.intersection(names[0].casefold().split())) > 1):
             message = f"fields are separated by {SEPARATORS[other]}"
             fix = "save as CSV with commas between the fields and points in the numbers"
-            self._add(line, "", message, "separator", expected="commas", fix=fix)
+            if self.form.declared and other in WORDS:
+                fix = f"write `separator: {WORDS[other]}` for this table in the project file"
+            self._add(line, "", message, "separator", expected=SEPARATORS[self.form.separator], fix=fix)
             return False
-        known = {alias for column in self.layout for alias in column.accepted}
         if not {name.casefold() for name in names} & known:
             message = f"the first line `{shown(','.join(names))}` is not a header"
             self._add(line, "", message, "no-header", expected=f"column names such as `{wanted}`")
             return False
         return True
+
+    def _wanted(self) -> str:
+        return self.form.separator.join(column.name for column in self.layout if column.required)
 
     def _assign(self, names: list[str], line: int) -> None:
         """Find the columns of the format among the names of the header."""
@@ -164,7 +184,7 @@ class _Reader:
             if places:
                 self.columns.append(column)
                 self.source.where[column.name] = places[0]
-                self.source.header[column.name] = names[places[0]]
+                self.source.header[column.name] = column.name if self.form.numbered else names[places[0]]
             for place in places:
                 del unused[place]
             for place in places[1:]:
@@ -183,11 +203,23 @@ class _Reader:
     def _missing(self, unused: dict[int, str], line: int) -> None:
         for column in self.layout:
             if column.required and column not in self.columns:
-                expected = ",".join(each.name for each in self.layout if each.required)
+                if self.form.numbered:
+                    self._not_numbered(column, line)
+                    continue
+                expected = self._wanted()
                 message = f"there is no column `{column.header or column.name}`"
                 near = suggestion(column.name, unused.values()) if len(column.name) > 1 else ""
                 fix = near or f"found: {', '.join(shown(name) or '(no name)' for name in self._names(unused))}"
                 self._add(line, column.name, message, "missing-column", expected=f"a header `{expected}`", fix=fix)
+
+    def _not_numbered(self, column: Column, line: int) -> None:
+        number = column.header
+        message = f"`columns` gives no number for `{column.name}`"
+        fix = f"add `{column.name}`, the number of its field, from 1 on"
+        if number:
+            message = f"there is no field {number} for `{column.name}` that is not another column's"
+            fix = f"the first row has {counted(self.width, 'field')}; is `separator` right?"
+        self._add(line, "", message, "missing-column", fix=fix)
 
     def _names(self, unused: dict[int, str]) -> list[str]:
         found = {self.source.where[column.name]: self.source.header[column.name] for column in self.columns}
@@ -214,7 +246,7 @@ class _Reader:
 
     def _chunks(self) -> Iterator[tuple[PlainRows | SplitRows, Numbers]]:
         """Give rows with the numbers of their lines, some thousands at a time."""
-        line = self.rows.line_num
+        line = self.above
         start = self.source.start_of(line + 1)
         while plain := self.source.plain(start, self.width):
             rows, start = plain
@@ -223,11 +255,11 @@ class _Reader:
         for read, numbers in self._rows(start, line):
             even, lines = self._even(read, numbers) if set(map(len, read)) - {self.width} else (read, numbers)
             if even:
-                yield SplitRows(list(zip(*even, strict=True))), np.array(lines, np.intp)
+                yield SplitRows(list(zip(*even, strict=True)), self.form.decimal), np.array(lines, np.intp)
 
     def _rows(self, start: int, before: int) -> Iterator[tuple[list[list[str]], list[int]]]:
         """Give rows from a byte of the text on with their line numbers; `before` is that of the line before them."""
-        reader = csv.reader(self.source.stream(start), strict=True, skipinitialspace=True)
+        reader = self._reader(start)
         last = before
         while True:
             rows, lines = [], []
@@ -262,7 +294,8 @@ class _Reader:
             kept = [row for row, cells in enumerate(zip(*fields, strict=True)) if any(map(str.strip, cells))]
             if len(kept) < len(lines):  # rows of empty cells, as spreadsheets leave them behind
                 if kept:
-                    self._take(SplitRows([[cells[row] for row in kept] for cells in fields]), lines[kept])
+                    cells_kept = [[cells[row] for row in kept] for cells in fields]
+                    self._take(SplitRows(cells_kept, self.form.decimal), lines[kept])
                 return
         for column in self.columns:
             name, place = column.name, self.source.where[column.name]
@@ -292,12 +325,16 @@ class _Reader:
         return kept, places
 
     def _uneven(self, row: list[str], line: int) -> None:
-        message = f"the row has {counted(len(row), 'field')}, the header {self.width}"
-        fix = ""
-        if len(row) == 1 and any(mark in row[0] for mark in SEPARATORS):
-            fix = "separate the fields by commas"
-        elif len(row) > self.width:
+        head = "first row" if self.form.numbered else "header"
+        fix, separator = "", self.form.separator
+        fields = len(row) - (separator == " " and not row[-1])  # blanks at the end of a line end no field
+        message = f"the row has {counted(fields, 'field')}, the {head} {self.width}"
+        if len(row) == 1 and any(mark in row[0] for mark in SEPARATORS if mark != " "):
+            fix = f"separate the fields by {SEPARATORS[separator]}"
+        elif len(row) > self.width and separator == ",":
             fix = "write decimal points, not commas; put an id that has a comma between quotation marks"
+        elif len(row) > self.width:
+            fix = f"put an id that has a {WORDS[separator]} between quotation marks"
         self._add(line, "", message, "row-length", fix=fix)
 
     def _floats(self, column: Column, cells: Cells, lines: Numbers) -> Floats:
@@ -307,9 +344,14 @@ class _Reader:
             if not cell.strip() and not column.filled:
                 continue
             try:
-                values[row] = number(cell)
+                values[row] = number(cell, self.form.decimal)
             except NotANumber as why:
-                self._add(int(lines[row]), column.name, why.message, "number", expected="a number", fix=why.fix)
+                fix = why.fix
+                if DECIMAL_COMMA.fullmatch(cell.strip()) and self.form.declared:
+                    fix += ", or `decimal: comma` for this table in the project file"
+                elif self.form.numbered and row == 0 and lines[0] == self.above + 1:
+                    fix = f"if line {lines[0]} is a header, write `skip: {lines[0]}`"
+                self._add(int(lines[row]), column.name, why.message, "number", expected="a number", fix=fix)
         return values
 
     def _positive(self, column: Column, lines: Numbers) -> None:

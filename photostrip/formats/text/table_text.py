@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO, TextIOWrapper
@@ -21,12 +22,33 @@ BLOCK = MEGABYTE // 5  # bytes of rows that are taken at a time; what comes of t
 LINE_END = re.compile(rb"\r\n|\r|\n")
 
 
+@dataclass(frozen=True)
+class Form:
+    """How a table is written, as far as a project says it."""
+
+    separator: str = ","  # between the fields; a blank: any number of blanks and tabs
+    decimal: str = "."
+    skipped: int = 0  # lines above the table that are passed over
+    # names that the user has for columns: those of the header or, where there is none, numbers of fields from 1 on
+    columns: Mapping[str, str] = field(default_factory=dict)
+    declared: bool = True  # whether a project can say so
+
+    @property
+    def numbered(self) -> bool:
+        """Whether the columns go by number, so that the table has no header."""
+        return any(name.strip().isdecimal() for name in self.columns.values())
+
+
+UNDECLARED = Form(declared=False)
+
+
 @dataclass(eq=False)
 class TableText:
     """The text of a table and where its columns stand: what positions are made from."""
 
     file: str
     data: bytes  # UTF-8; as a text, one long id in another script would make it four times as large
+    form: Form = UNDECLARED
     where: dict[str, int] = field(default_factory=dict)  # number of the field in a row, by column
     header: dict[str, str] = field(default_factory=dict)
 
@@ -42,7 +64,7 @@ class TableText:
     def plain(self, start: int, width: int) -> tuple[PlainRows, int] | None:
         """Find rows from a byte on, and where the next one begins; None where ``csv`` has to split them."""
         stop = self.data.find(b"\n", start + BLOCK) + 1 or len(self.data)
-        rows = plain_rows(self.data[start:stop], width)
+        rows = plain_rows(self.data[start:stop], width, self.form.separator, self.form.decimal)
         return None if rows is None else (rows, stop)
 
     @cached_property
@@ -54,7 +76,7 @@ class TableText:
         places, header = dict(self.where), dict(self.header)
         if where in places:
             places[column], header[column] = places[where], header[where]
-        return TableText(file=self.file, data=self.data, where=places, header=header)
+        return TableText(file=self.file, data=self.data, form=self.form, where=places, header=header)
 
     def fault(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
         """Make a fault at the character where a cell begins; without a column at the line."""
@@ -66,18 +88,20 @@ class TableText:
 
     def _position(self, line: int, wanted: int) -> int:
         """Character, counted from 1, at which a field of a line begins; 0 when the line has not so many."""
-        text = self._lines[line - 1]
+        text, separator = self._lines[line - 1], self.form.separator
         start, quoted, number_of_field = 0, False, 0
         for position, character in enumerate(text):
             if number_of_field == wanted:
                 break
             if character == '"':
                 quoted = not quoted
-            elif character == "," and not quoted:
-                number_of_field, start = number_of_field + 1, position + 1
+            elif character == separator and not quoted:
+                # one more blank ends no field
+                number_of_field += separator != " " or position > start
+                start = position + 1
         if number_of_field != wanted:
             return 0
-        blanks = len(text[start:]) - len(text[start:].lstrip(" \t"))
+        blanks = len(text[start:]) - len(text[start:].lstrip(" " if separator == "\t" else " \t"))
         return start + blanks + 1
 
 

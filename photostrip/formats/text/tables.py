@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.errors import Fault
 from photostrip.notes import Note
+from photostrip.points import locate
 
 if TYPE_CHECKING:
     from photostrip.formats.text.table_text import TableText
@@ -38,14 +39,15 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What a CSV file holds."""
+    """What a CSV file holds, or several below each other."""
 
-    file: str
-    lines: Numbers  # (n,): line of each row, counted from 1
+    file: str  # several: their names with commas between
+    lines: Numbers  # (n,): line of each row in its file, counted from 1
     numbers: dict[str, Floats]  # (n,): columns of numbers; NaN where a cell is empty or wrong
     codes: dict[str, Numbers]  # (n,): columns of ids, as numbers that count in ``ids``
     ids: dict[str, tuple[str, ...]]  # the different ids of a column in order of first appearance
-    _source: TableText = field(repr=False)
+    texts: tuple[TableText, ...] = field(repr=False)
+    _source: Numbers | None = field(default=None, repr=False)  # (n,): number of the file of each row; None: the first
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -72,18 +74,57 @@ class Table:
     def take(self, rows: Numbers) -> Table:
         numbers = {name: each[rows] for name, each in self.numbers.items()}
         codes = {name: each[rows] for name, each in self.codes.items()}
-        return replace(self, lines=self.lines[rows], numbers=numbers, codes=codes)
+        source = None if self._source is None else self._source[rows]
+        return replace(self, lines=self.lines[rows], numbers=numbers, codes=codes, _source=source)
 
     def placed_as(self, column: str, where: str) -> Table:
         """Return the table with the faults of a column that it does not have placed at one that it has."""
-        return replace(self, _source=self._source.placed_as(column, where))
+        return replace(self, texts=tuple(each.placed_as(column, where) for each in self.texts))
+
+    @property
+    def files(self) -> tuple[tuple[str, Flags], ...]:
+        """The files, each with its rows."""
+        number = np.zeros(len(self), np.intp) if self._source is None else self._source
+        return tuple((each.file, number == place) for place, each in enumerate(self.texts))
+
+    def _text_of(self, row: int) -> TableText:
+        return self.texts[0 if self._source is None else int(self._source[row])]
+
+    def file_of(self, row: int) -> str:
+        return self._text_of(row).file
+
+    def lines_of(self, *rows: int) -> str:
+        """Say in which lines rows stand, as ``lines 7, 9``, or ``line 7 of a.csv, line 9 of b.csv``."""
+        if self._source is None:
+            return f"line{'s' * (len(rows) > 1)} {', '.join(str(self.lines[row]) for row in rows)}"
+        return ", ".join(f"line {self.lines[row]} of {self.file_of(row)}" for row in rows)
 
     def note(
         self, row: int, code: str, message: str, severity: str = "warning", *, key: str, points: Sequence[str] = ()
     ) -> Note:
-        line = int(self.lines[row])
-        return Note(code, message, severity, points=tuple(points), file=self.file, line=line, key=key)
+        line, file = int(self.lines[row]), self.file_of(row)
+        return Note(code, message, severity, points=tuple(points), file=file, line=line, key=key)
 
     def fault(self, row: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
         """Make a fault with the place of a cell."""
-        return self._source.fault(int(self.lines[row]), column, message, code, expected=expected, fix=fix)
+        return self._text_of(row).fault(int(self.lines[row]), column, message, code, expected=expected, fix=fix)
+
+
+def joined(tables: Sequence[Table]) -> Table:
+    """Put tables with the same columns of ids below each other; numbers that one lacks are NaN in its rows."""
+    if len(tables) == 1:
+        return tables[0]
+    numbers = dict.fromkeys(name for each in tables for name in each.numbers)
+    codes, ids = {}, {}
+    for name in tables[0].ids:
+        ids[name] = tuple(dict.fromkeys(each for table in tables for each in table.ids[name]))
+        codes[name] = np.concatenate([locate(table.ids[name], ids[name])[table.codes[name]] for table in tables])
+    return Table(
+        file=", ".join(each.file for each in tables),
+        lines=np.concatenate([each.lines for each in tables]),
+        numbers={name: np.concatenate([each.column(name) for each in tables]) for name in numbers},
+        codes=codes,
+        ids=ids,
+        texts=tuple(text for each in tables for text in each.texts),
+        _source=np.repeat(np.arange(len(tables)), [len(each) for each in tables]),
+    )

@@ -87,10 +87,10 @@ def table_rows(project: Project, tables: Tables, used: Numbers) -> list[Document
     count: dict[str, int] = {}
     if tables.observations is not None:
         count = rays(tables.observations, photos)
-        found.append(_measured(tables.observations, photos, count, apart, control if bundle else set()))
+        found += _measured(tables.observations, photos, count, apart, control if bundle else set())
     if (marks := tables.fiducials) is not None:
         reasons = [_outside(IN_NO_STRIP, marks.photo_ids, photos, marks.photo)]
-        found.append(_block(marks.table, reasons, marks.times))
+        found += _blocks(marks.table, reasons, marks.times)
     if bundle:  # and control of a single one
         count = {name: max(number, 2) for name, number in count.items()}
     found += [_given(read, count, apart) for read in tables.control if read is not None]
@@ -135,7 +135,9 @@ def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: b
     return _block(read.table, reasons)
 
 
-def _measured(read: Measurements, photos: set[str], count: dict[str, int], gaps: set[str], whole: set[str]) -> Document:
+def _measured(
+    read: Measurements, photos: set[str], count: dict[str, int], gaps: set[str], whole: set[str]
+) -> list[Document]:
     """Sort the rows of measured points by what becomes of them."""
     outside = _outside(IN_NO_STRIP, read.photo_ids, photos, read.photo)
     once = np.array([count.get(name) == 1 and name not in whole for name in read.target_ids], bool)[read.target]
@@ -146,7 +148,7 @@ def _measured(read: Measurements, photos: set[str], count: dict[str, int], gaps:
         Reason(why=ONCE, rows=~outside.rows & once, **ids),
         Reason(why=NO_NEIGHBOUR, rows=~outside.rows & ~once & apart, **ids),
     ]
-    return _block(read.table, reasons, read.times)
+    return _blocks(read.table, reasons, read.times)
 
 
 def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
@@ -162,8 +164,16 @@ def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Documen
     return _block(read.table, reasons)
 
 
+def _blocks(table: Table, reasons: list[Reason], times: Numbers) -> list[Document]:
+    """Count the rows of each file of a table; `times` says of how many rows of the file each of them is made."""
+    found = []
+    for file, inside in table.files:
+        of_file = [each._replace(rows=each.rows & inside) for each in reasons]
+        found.append(_block(table, of_file, np.where(inside, times, 0)) | {"file": file})
+    return found
+
+
 def _block(table: Table, reasons: list[Reason], times: Numbers | None = None) -> Document:
-    """Count the rows of a table; `times` says of how many rows of the file each of them is made."""
     times = np.ones(len(table.lines), np.intp) if times is None else times
     unused: list[Document] = []
     for reason in reasons:

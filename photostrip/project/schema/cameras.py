@@ -76,6 +76,20 @@ class Distortion(Section):
             raise wrong("the radii do not ascend", at="radius", expected="distances from 0 upwards")
 
 
+class CertifiedDistortion(Distortion):
+    """Lens distortion of a camera as its certificate has it."""
+
+    k0: Number = key("`brown`: the radial coefficient k0 of USGS, D = X k0: part of the principal distance", 0.0)
+
+    @Rule
+    def _k0_scales_the_image(self) -> None:
+        if self.k0 and self.model != "brown":
+            raise wrong(f"`k0` does not belong to model {self.model}", at="k0", fix="remove it or change model")
+        if not abs(self.k0) < 1.0:
+            message = f"{self.k0:g} is out of range"
+            raise wrong(message, code="range", at="k0", expected="a number near 0, as 1.2e-4, without unit")
+
+
 Focal = Annotated[
     tuple[float, ...],
     Read(
@@ -144,7 +158,7 @@ class Camera(Section):
     fiducial_distances: list[tuple[Id, Id, Positive]] = key(
         "Calibrated distances between marks, `[[F1, F2, 211.98], ...]`, where nothing else is calibrated", [], unit="mm"
     )
-    distortion: Distortion | None = key("Lens distortion", None)
+    distortion: CertifiedDistortion | None = key("Lens distortion", None)
     self_calibration: list[Parameter] | None = key(
         "Parameters of this camera that the bundle adjustment estimates. Default: `processing.self_calibration`",
         None,

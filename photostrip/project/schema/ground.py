@@ -2,12 +2,17 @@
 
 from typing import Annotated, Any
 
+from photostrip.formats.measured.exterior import POSITIONS, orientation_columns
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.pipeline.inputs import Settings
-from photostrip.project.schema.measurements import COLUMNS, ControlColumns
+from photostrip.project.schema.measurements import COLUMNS, Columns, ControlColumns, TableFile, header_names
 from photostrip.project.schema.sections import Rule, Section, key, wrong
 from photostrip.project.schema.values import Axes, Flag, Height, Number, Positive, Sigma3, Triple, Words, choice
 
+PositionColumns = Annotated[Columns, header_names(POSITIONS)]
+OrientationColumns = Annotated[
+    Columns, header_names(*(orientation_columns(each.split("-"), "deg") for each in SYSTEMS))
+]
 USUAL = Settings()
 CRS = "An authority code (`EPSG:32633`), a PROJ string, WKT, `geocentric`, or `local` (right-handed, metres)"
 SIGMA = "Standard deviations of rows without sx, sy, sz, in the order of `axes`"
@@ -23,7 +28,7 @@ class Ellipsoid(Section):
     b: Positive = key("Semi-minor axis", unit="m")
 
 
-class GivenList(Section):
+class GivenList(TableFile):
     """A table of given coordinates and their ground frame."""
 
     file: Words
@@ -66,6 +71,7 @@ class CameraPositions(GivenList):
     """Measured positions of the cameras, for the bundle adjustment."""
 
     file: Words = key("Table `photo,x,y,z[,use][,time][,sx,sy,sz]`, .csv or .csv.gz")
+    columns: PositionColumns = key(COLUMNS, {})
     sigma: Sigma3 | None = key(SIGMA, None, unit="m")
     lever_arm: Triple = key(
         "Antenna as seen from the perspective centre along the image axes: x right, y up, z towards the viewer",
@@ -97,6 +103,7 @@ class Orientations(GivenList):
     file: Words = key(
         "Table `photo,x,y,z` and the angles by name, as `alpha,omega,kappa`, [,sx,sy,sz][,s_alpha,s_omega,s_kappa]"
     )
+    columns: OrientationColumns = key(COLUMNS, {})
     angles: Angles = key("System and unit of the angles", Angles())
     role: Annotated[str, choice(("observed", "approximate"))] = key(
         "`observed`: observations with their standard deviations; `approximate`: a start, without influence", "observed"

@@ -109,7 +109,7 @@ def schema_number(name: str, number: int, kind: str = "") -> Callable[[object], 
     return read
 
 
-def _whole(value: object) -> int:
+def whole(value: object) -> int:
     expected = "a whole number"
     if not isinstance(value, str) or not value:
         raise wrong("no number is given here", code="type", expected=expected)
@@ -193,7 +193,7 @@ Fraction = Annotated[float, Read(_read_fraction, _FRACTION)]
 PositiveOrAuto = Annotated[float | None, Read(or_auto(read_positive), {"anyOf": [AUTO, _POSITIVE]})]
 NumberOrAuto = Annotated[float | None, Read(or_auto(_read_number), {"anyOf": [AUTO, _NUMBER]})]
 Flag = Annotated[bool, Read(_flag, {"type": "boolean"})]
-Whole = Annotated[int, Read(_whole, {"type": "integer"})]
+Whole = Annotated[int, Read(whole, {"type": "integer"})]
 Pair = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
 Sigma3 = tuple[Positive, Positive, Positive]

@@ -63,18 +63,28 @@ class Reading:
 
         Faults of that file as a whole are reported where it is named, those without a file at their own key.
         """
+        if self.root.word(*key):
+            for paths, inner in self.named_together(key):
+                yield paths[0], inner
+
+    def named_together(self, key: Path) -> Iterator[tuple[list[str], Findings]]:
+        """Return the same for a key that names one file or a list of them."""
         node = self.root.find(*key)
-        if node is None or not node.text:
+        if node is None:
             return
-        path, inner = path_of(node, self.file), Findings(self.findings.notes)
-        yield path, inner
+        nodes = {(*key, number): each for number, each in enumerate(node.elements)} or {key: node}
+        named = {path_of(each, self.file): where for where, each in nodes.items() if each.text}
+        if not named:
+            return
+        inner = Findings(self.findings.notes)
+        yield list(named), inner
 
         def placed(fault: Fault) -> Fault:
-            return where_named(fault, self.root, key) if fault.file else at_own_key(fault, self.root)
+            where = named.get(fault.file, key)
+            return where_named(fault, self.root, where) if fault.file else at_own_key(fault, self.root)
 
         self.findings.absorb(inner, placed)
-        if path not in self.files:
-            self.files.append(path)
+        self.files += [path for path in named if path not in self.files]
 
     @contextmanager
     def places(self, keys: Mapping[str, str] | None = None) -> Iterator[None]:

@@ -132,7 +132,7 @@ def test_plain_and_quoted_rows_make_one_table(
     path = tmp_path / "o.csv"
     path.write_bytes(ending.join(lines).encode())
     findings = Findings()
-    read = read_measurements(str(path), findings)
+    read = read_measurements([str(path)], findings)
     assert read is not None
     assert [read.photo_ids[code] for code in read.photo] == ["1", "2", "3", "4", "5", "6"]
     assert [read.target_ids[code] for code in read.target] == ["A", "Ä", "中", "A,B", "C", "D"]

@@ -28,7 +28,7 @@ HEADER = "photo,point,x,y\n"
 
 def faults(path: Path) -> list[str]:
     findings = Findings()
-    read_measurements(str(path), findings)
+    read_measurements([str(path)], findings)
     return [str(fault).replace(str(path), path.name) for fault in findings.faults]
 
 
@@ -47,7 +47,7 @@ def test_chunks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chu
     rows = [(f"p{i % 3}", f"Q{i}", i / 7, -i / 3) for i in range(10)]
     text = HEADER + "\n".join(",".join(map(str, row)) + "\n" * (i % 2) for i, row in enumerate(rows))
     findings = Findings()
-    read = read_measurements(str(write(tmp_path / "o.csv", text)), findings)
+    read = read_measurements([str(write(tmp_path / "o.csv", text))], findings)
     assert read is not None
     assert findings.faults == ()
     assert [read.photo_ids[code] for code in read.photo] == [row[0] for row in rows]
@@ -61,7 +61,7 @@ def test_ten_thousand_rows_of_several_chunks(tmp_path: Path) -> None:
     n = 2 * table_reader.CHUNK + 5
     text = HEADER + "".join(f"{i // 100},P{i % 100},{i}.5,-{i}\n" for i in range(n))
     findings = Findings()
-    read = read_measurements(str(write(tmp_path / "o.csv", text)), findings)
+    read = read_measurements([str(write(tmp_path / "o.csv", text))], findings)
     assert read is not None
     assert findings.faults == ()
     np.testing.assert_array_equal(read.xy, np.column_stack([np.arange(n) + 0.5, -np.arange(n)]))
@@ -73,7 +73,7 @@ def test_memory_is_a_few_times_the_file(tmp_path: Path) -> None:
     text = HEADER + "".join(f"{i // 100},P{i:08d},{i / 1000:.4f},{-i / 1000:.4f}\n" for i in range(60_000))
     path = write(tmp_path / "o.csv", text)
     tracemalloc.start()
-    read = read_measurements(str(path), Findings())
+    read = read_measurements([str(path)], Findings())
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert read is not None
@@ -116,7 +116,7 @@ def test_a_fault_names_the_character_where_its_cell_begins(
     with tempfile.TemporaryDirectory() as folder:
         path = write(Path(folder) / "o.csv", ",".join(order) + "\n" + stream.getvalue() + "\n")
         findings = Findings()
-        read_measurements(str(path), findings)
+        read_measurements([str(path)], findings)
     told = [fault for fault in findings.faults if fault.key == "y"]
     assert [(fault.line, fault.column) for fault in told] == [(2, begins[wanted])]
 

@@ -47,7 +47,7 @@ def test_the_example_of_a_table_is_right(tmp_path: Path, page: str, rows: int) -
         assert control is not None
         assert len(control.table) == rows
     else:
-        read = read_measurements(str(path), findings, Manner(marks=page == "fiducials.md"))
+        read = read_measurements([str(path)], findings, Manner(marks=page == "fiducials.md"))
         assert read is not None
         assert len(read.table) == rows
     assert (findings.faults, findings.notes) == ((), [])
