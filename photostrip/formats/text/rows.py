@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from photostrip.arrays import Floats, Numbers
+from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.formats.text.numbers import LARGEST_NUMBER
 
 Cells = Sequence[str]
@@ -25,10 +25,9 @@ LINE_END, PLUS, MINUS, ZERO = map(ord, "\n+-0")
 class PlainRows:
     """Rows of a text, with the places where their fields begin and end."""
 
-    def __init__(self, text: str, signs: NDArray[np.uint32], ends: Numbers, decimal: str) -> None:
+    def __init__(self, text: str, signs: NDArray[np.uint32], starts: Numbers, ends: Numbers, *, decimal: str) -> None:
         self.text, self.signs, self.decimal = text, signs, decimal
-        self.ends = ends  # (n, width)
-        self.starts = np.append(0, ends.ravel()[:-1] + 1).reshape(ends.shape)
+        self.starts, self.ends = starts, ends  # (n, width)
 
     def __len__(self) -> int:
         return len(self.ends)
@@ -105,14 +104,34 @@ def _numbers(cells: Cells, decimal: str) -> Floats | None:
 def plain_rows(block: bytes, width: int, separator: str = ",", decimal: str = ".") -> PlainRows | None:
     """Find the fields of rows; None where ``csv`` might find others, and where a row has not as many as `width`."""
     block = block.replace(b"\r\n", b"\n")
-    if not block or any(sign in block for sign in (b'"', b" ", b"\r")):
+    blanks = separator == " "
+    if not block or any(sign in block for sign in (b'"', b"\r", *(() if blanks else (b" ",)))):
         return None
     text = block.decode() if block.endswith(b"\n") else block.decode() + "\n"
     signs = np.frombuffer(text.encode("utf-32-le"), np.uint32)
-    ends = np.flatnonzero((signs == ord(separator)) | (signs == LINE_END))
+    gap = (signs == ord(separator)) | (signs == LINE_END)
+    starts, ends = _between_blanks(gap) if blanks else _between(gap)
     rows, rest = divmod(len(ends), width)
-    if rest or text.count("\n") != rows or (signs[ends[width - 1 :: width]] != LINE_END).any():
+    if rest or text.count("\n") != rows or (ends - starts).max() >= LONGEST_FIELD:
         return None
-    if np.diff(ends, prepend=-1).max() > LONGEST_FIELD:
+    last = ends[width - 1 :: width]
+    if blanks:  # more of them may follow the last field
+        line_ends = np.flatnonzero(signs == LINE_END)
+        whole = (last <= line_ends).all() and (line_ends[:-1] < starts[width::width]).all()
+    else:
+        whole = (signs[last] == LINE_END).all()
+    if not whole:
         return None
-    return PlainRows(text, signs, ends.reshape(rows, width), decimal)
+    return PlainRows(text, signs, starts.reshape(rows, width), ends.reshape(rows, width), decimal=decimal)
+
+
+def _between(gap: Flags) -> tuple[Numbers, Numbers]:
+    """Find where fields begin and end of which each ends at one sign."""
+    ends = np.flatnonzero(gap)
+    return np.append(0, ends[:-1] + 1), ends
+
+
+def _between_blanks(gap: Flags) -> tuple[Numbers, Numbers]:
+    """Find the same where one more blank ends no field, and none begins at the end of a line."""
+    filled = np.append(False, ~gap)
+    return np.flatnonzero(filled[1:] & ~filled[:-1]), np.flatnonzero(~filled[1:] & filled[:-1])
