@@ -1,4 +1,4 @@
-"""Rotations in the angles of the field: alpha-omega-kappa, omega-phi-kappa, phi-omega-kappa.
+"""Rotations in the angles of the field: alpha-omega-kappa, omega-phi-kappa, phi-omega-kappa, yaw-pitch-roll.
 
 All matrices map photo vectors (x, y, -f) to object vectors, ``X = A r``. Arrays of angles give arrays of
 matrices: the functions work on leading axes of any shape.
@@ -18,6 +18,9 @@ AXES = {
     "alpha-omega-kappa": ((1, 0, 2), -1.0),
     "omega-phi-kappa": ((0, 1, 2), 1.0),
     "phi-omega-kappa": ((1, 0, 2), 1.0),
+    # of an aircraft, yaw clockwise from north, pitch nose up, roll right wing down, with a camera that looks down and
+    # has the top of its photos ahead: Rz(yaw) Ry(pitch) Rx(roll) of axes ahead, right, down, in east, north, up
+    "yaw-pitch-roll": ((2, 0, 1), -1.0),
 }
 SYSTEMS = tuple(AXES)
 GIMBAL_LIMIT = 1e-12  # 1 - |sine of the middle angle| below which the other two are not separable
@@ -82,12 +85,12 @@ def angles(matrix: ArrayLike, system: str) -> Floats:
     hand = 1.0 if (i + 1) % 3 == j else -1.0
     sine = hand * a[..., i, k]
     if np.any(1 - np.abs(sine) < GIMBAL_LIMIT):
-        first, middle, _ = system.split("-")
-        msg = f"{middle} is 90 degrees: {first} and kappa cannot be separated; choose another system of angles"
+        first, middle, last = system.split("-")
+        msg = f"{middle} is 90 degrees: {first} and {last} cannot be separated; choose another system of angles"
         raise GeometryError(msg, code="gimbal")
     first_angle = sign * np.arctan2(-hand * a[..., j, k], a[..., k, k])
-    last = np.arctan2(-hand * a[..., i, j], a[..., i, i])
-    return np.stack([first_angle, np.arcsin(np.clip(sine, -1, 1)), last], axis=-1)
+    last_angle = np.arctan2(-hand * a[..., i, j], a[..., i, i])
+    return np.stack([first_angle, np.arcsin(np.clip(sine, -1, 1)), last_angle], axis=-1)
 
 
 def separable_angles(matrix: ArrayLike) -> tuple[str, Floats]:

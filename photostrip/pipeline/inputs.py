@@ -92,9 +92,11 @@ class GivenOrientations:
     angles: Floats  # (n, 3): angles of ``system``, radians
     system: str  # one of ``geometry.rotation.SYSTEMS``
     sigma: Floats  # (n, 3): standard deviations of the centres, metres
-    sigma_angles: Floats  # (n, 3): standard deviations of the angles, radians
+    sigma_turns: Floats  # (n, 3): standard deviations of small turns about the axes of the photo, radians
     # whether they are observations; otherwise a start without influence, and the standard deviations are NaN
     observed: bool
+    # whether angles and system are those that the user has; otherwise they were made of matrices, say
+    stated: bool = True
 
     @property
     def has_own_frame(self) -> bool:

@@ -15,13 +15,15 @@ import numpy as np
 from photostrip import camera
 from photostrip.arrays import Floats, Numbers
 from photostrip.formats.measured.control import ControlTable
+from photostrip.formats.measured.exterior import ROTATIONS
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.geodesy.curvature import mean_radius, radius_in_azimuth
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
-from photostrip.geodesy.ground_frame import WGS84
+from photostrip.geodesy.ground_frame import WGS84, GroundFrame
 from photostrip.geometry.rotation import from_angles
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Settings, Strip
 from photostrip.points import ControlPoints, PhotoPoints, concatenated
+from photostrip.project.attitudes import attitudes
 from photostrip.project.schema.cameras import AUTO, Camera, Distortion, FirstPhoto, PixelCamera
 from photostrip.project.schema.ground import CameraPositions as PositionsBlock
 from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
@@ -324,24 +326,44 @@ def camera_positions(
 
 
 def given_orientations(
-    read: OrientationTable | None, given: Orientations | None, photos: Mapping[str, camera.Camera]
+    read: OrientationTable | None,
+    given: Orientations | None,
+    photos: Mapping[str, camera.Camera],
+    frames: Mapping[FrameSpec, GroundFrame],
 ) -> GivenOrientations | None:
-    """Return the given orientations of `photos`, in the internal order of axes and in radians."""
+    """Return the given orientations of `photos`, in the internal order of axes, in radians and from grid north.
+
+    frames: the ground frames, tied, by what the project says of them.
+    """
     if read is None or given is None:
         return None
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos], np.intp)
     spec = frame_spec(given)
     columns, radians = _columns(spec), RADIANS[given.angles.unit]
+    ids, enu = tuple(read.ids[row] for row in rows), read.xyz[rows][:, columns]
+    values, north = read.angles[rows], None
+    if given.angles.system not in ROTATIONS:
+        values = values * radians
+    if given.angles.north == "true":
+        north = norths(ids, enu, frames[spec])
+    sigma = _filled(read.sigma_angles[rows], given.sigma_angles) * radians
+    found = attitudes(values, sigma, given.angles, north)
     return GivenOrientations(
-        photos=tuple(read.ids[row] for row in rows),
+        photos=ids,
         frame=spec,
-        enu=read.xyz[rows][:, columns],
-        angles=read.angles[rows] * radians,
-        system=given.angles.system,
+        enu=enu,
+        angles=found.angles,
+        system=found.system,
         sigma=_filled(read.sigma[rows], given.sigma)[:, columns],
-        sigma_angles=_filled(read.sigma_angles[rows], given.sigma_angles) * radians,
+        sigma_turns=found.sigma_turns,
         observed=given.role == "observed",
+        stated=found.stated,
     )
+
+
+def norths(photos: Sequence[str], enu: Floats, frame: GroundFrame) -> Floats:
+    """Return the azimuth of grid north at each photo, radians."""
+    return frame.convergence(frame.cartesian_from_ground(enu, ids=[f"of photo {name}" for name in photos]))
 
 
 def _filled(sigma: Floats, default: Sequence[float] | float | None) -> Floats:

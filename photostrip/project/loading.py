@@ -17,6 +17,8 @@ from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.source import current, seen_from
 from photostrip.geodesy.crs import grid_names
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Finding, Note
 from photostrip.pipeline.frames import TiedFrames
@@ -150,7 +152,7 @@ def read_project(path: Path, overrides: Sequence[str] = ()) -> tuple[Project, Ta
     tied = _tied_frames(root, checked, grid_folder, findings)
     try:
         project = completed(reading.complete(checked), root, reading.file, measured_photos(tables))
-        inputs, notes = _inputs(project, tables, root, placed_models)
+        inputs, notes = _inputs(project, tables, root, placed_models, {} if tied is None else tied.frames)
     except InputError as error:
         error.findings = _units_of_images(reading, tables)
         raise
@@ -248,7 +250,7 @@ def _units_of_images(reading: Reading, tables: Tables) -> tuple[Finding, ...]:
         return ()
     read = Tables(observations=_whole(measured), fiducials=tables.fiducials and _whole(tables.fiducials), control=[])
     try:
-        inputs, _ = _inputs(completed(given, root, reading.file, measured_photos(read)), read, root, {})
+        inputs, _ = _inputs(completed(given, root, reading.file, measured_photos(read)), read, root, {}, {})
         if not np.isfinite(inputs.observations.xy).all():
             return ()  # the size of a pixel, or the format, is what is missing
         findings = image_evidence.of_units(inputs, conversion.settings(given))
@@ -265,7 +267,11 @@ def _whole(read: Measurements) -> Measurements:
 
 
 def _inputs(
-    project: ProjectFile, tables: Tables, root: Node, placed_models: Mapping[int, Sequence[str]]
+    project: ProjectFile,
+    tables: Tables,
+    root: Node,
+    placed_models: Mapping[int, Sequence[str]],
+    frames_of: Mapping[FrameSpec, GroundFrame],
 ) -> tuple[Inputs, list[Note]]:
     """Turn a project without faults into what the pipeline takes."""
     known, derived = with_pixel_sizes(project, tables.fiducials, conversion.cameras(project), root)
@@ -289,10 +295,26 @@ def _inputs(
         output=(output or first) if not frames else None if output == first else output,
         fiducials=_fiducials(project, tables, photos),
         positions=conversion.camera_positions(tables.positions, project.camera_positions, photos),
-        orientations=conversion.given_orientations(tables.orientations, project.orientations, photos),
+        orientations=conversion.given_orientations(tables.orientations, project.orientations, photos, frames_of),
         models=models,
     )
-    return inputs, [*derived, *joined]
+    return inputs, [*derived, *joined, *_from_true_north(project, inputs, root, frames_of)]
+
+
+def _from_true_north(
+    project: ProjectFile, inputs: Inputs, root: Node, frames_of: Mapping[FrameSpec, GroundFrame]
+) -> Iterator[Note]:
+    """Say by how much the given angles were turned from true to grid north."""
+    given, read = project.orientations, inputs.orientations
+    if given is None or read is None or not read.photos or given.angles.north != "true":
+        return
+    turns = np.degrees(conversion.norths(read.photos, read.enu, frames_of[read.frame]))
+    message = (
+        f"the given angles count from true north; grid north lies {turns.min():+.4f} to {turns.max():+.4f} degrees "
+        "from it at the photos, which is taken off their azimuths"
+    )
+    path = ("orientations", "angles", "north")
+    yield root.place_of(path).note("true-north", message, key=".".join(path))
 
 
 def _observations(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints:

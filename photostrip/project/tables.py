@@ -12,7 +12,13 @@ import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.measured.control import ControlTable, read_control, refuse_repeated
-from photostrip.formats.measured.exterior import OrientationTable, PositionTable, read_orientations, read_positions
+from photostrip.formats.measured.exterior import (
+    ROTATIONS,
+    OrientationTable,
+    PositionTable,
+    read_orientations,
+    read_positions,
+)
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.text.findings import Findings, meant, suggestion
@@ -110,12 +116,12 @@ def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:
 def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable | None:
     """Read given orientations by the names of their angles; nothing when the system is not known, which is reported."""
     system = node.word("angles", "system") or SYSTEMS[0]
-    if system not in SYSTEMS:
+    if system not in (*SYSTEMS, *ROTATIONS):
         return None
     observed = node.word("role") in {"", "observed"}
     needs = observed and not node.has("sigma"), observed and not node.has("sigma_angles")
     unit, form = node.word("angles", "unit") or "deg", form_of(node)
-    return read_orientations(path, system.split("-"), unit, findings, needs_sigma=needs, form=form)
+    return read_orientations(path, system, unit, findings, needs_sigma=needs, form=form)
 
 
 def _height_column(node: Node) -> int:

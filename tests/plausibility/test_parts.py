@@ -191,6 +191,32 @@ def test_angles_in_another_system() -> None:
     assert list(rotations.find_wrong_angles(rough, "omega-phi-kappa", matrices, names)) == []
 
 
+def test_rotations_that_are_no_angles() -> None:
+    _, matrices = attitudes()
+    names = [f"{number}" for number in range(len(matrices))]
+    read = {
+        "from object to image": matrices.transpose(0, 2, 1),
+        "y has the other direction": matrices * [1, -1, -1],
+        "looks ahead": matrices @ Rotation.from_euler("x", -90, degrees=True).as_matrix(),
+    }
+    assert list(rotations.find_wrong_rotations(matrices, matrices, names)) == []
+    for words, stated in read.items():
+        (finding,) = rotations.find_wrong_rotations(stated, matrices, names)
+        assert finding.code == "P602"
+        assert words in finding.message
+
+
+def test_yaw_pitch_roll_of_a_gimbal() -> None:
+    """Where a camera that is stated to look down looks ahead, pitch lies about -90 degrees."""
+    _, matrices = attitudes()
+    names = [f"{number}" for number in range(len(matrices))]
+    gimbal = Rotation.from_matrix(matrices) * Rotation.from_euler("x", -90, degrees=True)
+    stated = gimbal.as_euler("ZXY") * [-1, 1, 1]
+    (finding,) = rotations.find_wrong_angles(stated, "yaw-pitch-roll", matrices, names)
+    assert finding.code == "P602"
+    assert "of a camera that looks ahead where pitch and roll are zero" in finding.message
+
+
 def test_angles_against_another_north() -> None:
     """All photos are turned alike about the vertical."""
     values, matrices = attitudes()

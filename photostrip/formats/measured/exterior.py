@@ -52,9 +52,8 @@ class OrientationTable:
     # xyz, sigma: (n, 3): perspective centres and their standard deviations, columns x, y, z; NaN where a cell is empty
     xyz: Floats
     sigma: Floats
-    # angles, sigma_angles: (n, 3): angles in the order and unit of their system, and their standard deviations
-    angles: Floats
-    sigma_angles: Floats
+    angles: Floats  # (n, 3): angles in the order and unit of their system; quaternions (n, 4), matrices (n, 9)
+    sigma_angles: Floats  # (n, 3): their standard deviations, or those of small turns about the axes of the photo
 
 
 def read_positions(
@@ -74,19 +73,37 @@ def read_positions(
     return read
 
 
-def orientation_columns(names: Sequence[str], unit: str) -> tuple[Column, ...]:
-    """Return the columns of a table of orientations by the names of its angles and their unit."""
+QUATERNION, MATRIX = "quaternion", "matrix"
+ROTATIONS = {  # by what is no system of angles: columns of the rotation
+    QUATERNION: ("qw", "qx", "qy", "qz"),
+    MATRIX: tuple(f"r{row}{column}" for row in "123" for column in "123"),
+}
+TURNS = ("rx", "ry", "rz")  # small turns about the axes of the photo, of which such a table has standard deviations
+NO_ROTATION = 1e-3  # of a quaternion's length, or of a product of a matrix's rows: beyond, it is a slip of the pen
+
+
+def orientation_columns(system: str, unit: str) -> tuple[Column, ...]:
+    """Return the columns of a table of orientations by the system of its angles and their unit."""
+    names, turns = rotation_names(system)
     angle = tuple(Column(name, number=True, aliases=(f"{name}_{unit}",)) for name in names)
     sigma_angle = tuple(
         replace(each, name=f"s_{name}", aliases=(*each.aliases, f"{each.aliases[0]}_{unit}"))
-        for each, name in zip(sigmas(*names), names, strict=True)
+        for each, name in zip(sigmas(*turns), turns, strict=True)
     )
     return (PHOTO, *numbers(*AXES), *angle, *sigmas(*AXES), *sigma_angle)
 
 
+def rotation_names(system: str) -> tuple[Sequence[str], Sequence[str]]:
+    """Return the columns of the rotation, and what their standard deviations are of."""
+    if system in ROTATIONS:
+        return ROTATIONS[system], TURNS
+    names = system.split("-")
+    return names, names
+
+
 def read_orientations(
     file: str,
-    names: Sequence[str],
+    system: str,
     unit: str,
     findings: Findings,
     *,
@@ -95,13 +112,14 @@ def read_orientations(
 ) -> OrientationTable | None:
     """Read a table of given exterior orientations; None when the header is wrong.
 
-    names: names of the three angles, in the order of their system.
-    unit: their unit, ``deg``, ``gon`` or ``rad``; a column may be called ``kappa`` or ``kappa_deg``.
+    system: what their rotations are: angles in a system, ``quaternion`` or ``matrix``.
+    unit: unit of the angles, ``deg``, ``gon`` or ``rad``; a column may be called ``kappa`` or ``kappa_deg``.
     needs_sigma: whether rows must have standard deviations of the position and of the angles: they are observations,
         and the project file gives none.
     """
-    table = read_table(file, orientation_columns(names, unit), findings, form=form)
-    sigma_names = [f"s_{name}" for name in names]
+    table = read_table(file, orientation_columns(system, unit), findings, form=form)
+    names, turns = rotation_names(system)
+    sigma_names = [f"s_{name}" for name in turns]
     if table is None:
         return None
     read = OrientationTable(
@@ -113,6 +131,7 @@ def read_orientations(
         sigma_angles=table.columns(*sigma_names),
     )
     if findings.number(file) == 0:
+        _refuse_no_rotation(read, system, findings)
         _refuse_repeated(table, read.ids, np.arange(len(table)), findings)
         if needs_sigma[0]:
             refuse_without_sigma(table, np.isnan(read.sigma), SIGMAS, FIX.format("orientations.sigma"), findings)
@@ -120,6 +139,24 @@ def read_orientations(
             fix = FIX.format("orientations.sigma_angles")
             refuse_without_sigma(table, np.isnan(read.sigma_angles), sigma_names, fix, findings)
     return read
+
+
+def _refuse_no_rotation(read: OrientationTable, system: str, findings: Findings) -> None:
+    """Refuse quaternions whose length is not 1, and matrices that do not turn."""
+    if system == QUATERNION:
+        off = np.abs(np.linalg.norm(read.angles, axis=1) - 1.0)
+        what = "the length of the quaternion of photo {} is {:.4g} off 1"
+    elif system == MATRIX:
+        matrices = read.angles.reshape(-1, 3, 3)
+        off = np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+        off = np.where(np.linalg.det(matrices) > 0.0, off, np.maximum(off, 2.0))
+        what = "the matrix of photo {} is no rotation: its rows are {:.4g} off right angles, length 1 and right hand"
+    else:
+        return
+    for row in np.flatnonzero(off > NO_ROTATION).tolist():
+        message = what.format(read.ids[row], off[row])
+        fix = f"are the columns {', '.join(ROTATIONS[system])} in this order, without a scale?"
+        findings.add(read.table.fault(row, ROTATIONS[system][0], message, "no-rotation", fix=fix))
 
 
 def _refuse_repeated(table: Table, ids: Sequence[str], rows: Numbers, findings: Findings) -> None:

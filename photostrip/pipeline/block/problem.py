@@ -11,7 +11,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.geometry.rotation import angle_rates, from_angles
+from photostrip.geometry.rotation import from_angles
 from photostrip.network.problem import (
     AttitudeObservations,
     BundleCameras,
@@ -242,15 +242,13 @@ def _level_positions(
 
 
 def _attitudes(given: GivenOrientations | None, frame: GroundFrame | None, start: BlockStart) -> AttitudeObservations:
-    """Observed rotations; the standard deviations of the angles become those about the photo's own axes."""
+    """Observed rotations, with standard deviations about the photo's own axes."""
     if given is None or frame is None or not given.observed or not given.photos:
         return AttitudeObservations()
     photo = start.rows_of(given.photos)
     centers = frame.cartesian_from_ground(given.enu, ids=[f"of photo {name}" for name in given.photos])
     rotations = from_angles(given.angles, given.system)
-    rates = rotations.transpose(0, 2, 1) @ angle_rates(given.angles, given.system)
-    sigma = np.sqrt(np.einsum("nij,nj->ni", rates**2, given.sigma_angles**2))
-    return AttitudeObservations(photo, frame.axes_at(centers).transpose(0, 2, 1) @ rotations, sigma)
+    return AttitudeObservations(photo, frame.axes_at(centers).transpose(0, 2, 1) @ rotations, given.sigma_turns)
 
 
 def refilled(

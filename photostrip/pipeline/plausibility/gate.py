@@ -32,9 +32,9 @@ from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images, of_units
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import accepted
-from photostrip.plausibility.photos import flight, flight_order, identity, rotations, shared_ids, units
+from photostrip.plausibility.photos import flight, flight_order, identity, shared_ids, units
 from photostrip.plausibility.photos.shared_ids import OrientedRays
-from photostrip.points import PhotoPoints, locate
+from photostrip.points import PhotoPoints
 from photostrip.strip.resection.collinearity import KnownPhotos
 
 if TYPE_CHECKING:
@@ -387,6 +387,5 @@ def _of_rotations(result: Result, formed: Sequence[FormedPhotos], directory: Pat
     photos = [photo for photo in found if photo in listed]
     if not photos:
         return []
-    angles = given.angles[locate(photos, given.photos)]
     of_photos, north = np.array([found[name] for name in photos]), float(np.median(np.concatenate(norths)))
-    return list(rotations.find_wrong_angles(angles, given.system, of_photos, photos, north))
+    return given_cameras.wrong_angles(given, photos, of_photos, north)

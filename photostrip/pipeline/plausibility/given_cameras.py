@@ -14,10 +14,11 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
+from photostrip.geometry.rotation import from_angles
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.notes import Finding
 from photostrip.pipeline.given_points import cartesian_of, rows_of_given
-from photostrip.pipeline.inputs import Inputs, Strip
+from photostrip.pipeline.inputs import GivenOrientations, Inputs, Strip
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.plausibility import found
 from photostrip.plausibility.photos import flight
@@ -228,13 +229,21 @@ def angles(
         norths = [tied[0].convergence(similarity(each.formed.centers)) for each, similarity in held]
     except (GeometryError, InputError):
         return []
-    rows = [row for row, photo in enumerate(given.photos) if photo in turned]
-    if not rows:
+    photos = [photo for photo in given.photos if photo in turned]
+    if not photos:
         return []
-    photos = [given.photos[row] for row in rows]
     rotations = np.array([turned[photo] for photo in photos])
     north = float(np.median(np.concatenate(norths)))
-    return list(given_angles.find_wrong_angles(given.angles[rows], given.system, rotations, photos, north))
+    return wrong_angles(given, photos, rotations, north)
+
+
+def wrong_angles(given: GivenOrientations, photos: Sequence[str], rotations: Floats, north: float) -> list[Finding]:
+    """Compare the given angles of some photos with rotations found (n, 3, 3), in the readings that they can have."""
+    angles = given.angles[locate(photos, given.photos)]
+    if given.stated:
+        return list(given_angles.find_wrong_angles(angles, given.system, rotations, photos, north))
+    stated = from_angles(angles, given.system)
+    return list(given_angles.find_wrong_rotations(stated, rotations, photos, north))
 
 
 def _rotations(formed: FormedPhotos, similarity: Similarity, frame: GroundFrame) -> Floats:

@@ -8,13 +8,14 @@ from itertools import product
 import numpy as np
 
 from photostrip.arrays import Floats
-from photostrip.geometry.rotation import SYSTEMS, from_angles
+from photostrip.geometry.rotation import SYSTEMS, about, from_angles
 from photostrip.notes import Finding
 from photostrip.plausibility.finding import found
 
 LEAST_PHOTOS = 3  # photos
 HARMLESS_DEG = 0.3  # rms difference: start values need not be better
 BETTER_SHARE = 0.25  # of the rms difference that another reading may leave
+Reading = tuple[Floats, str, str]  # rotations, how they are read in words, code
 DEGREES, GONS = 180.0 / np.pi, 200.0 / np.pi
 UNITS = (
     (DEGREES / GONS, "gons read as degrees"),
@@ -36,11 +37,29 @@ def find_wrong_angles(
     convergence: azimuth of grid north there, radians.
     Yields P601 or P602, at most one.
     """
+    stated = from_angles(angles, system)
+    readings = [*_readings(angles, system), _transposed(stated)]
+    if system == "yaw-pitch-roll":
+        readings += _mounted(stated)
+    yield from _misread(stated, readings, rotations, photos, convergence)
+
+
+def find_wrong_rotations(
+    stated: Floats, rotations: Floats, photos: Sequence[str], convergence: float = 0.0
+) -> Iterator[Finding]:
+    """Compare given rotations (n, 3, 3) that are no angles with those found, as ``find_wrong_angles`` does."""
+    other_y = stated * np.array([1.0, -1.0, -1.0]), "with image axes of which y has the other direction", "P602"
+    yield from _misread(stated, [_transposed(stated), other_y, *_mounted(stated)], rotations, photos, convergence)
+
+
+def _misread(
+    as_stated: Floats, readings: Sequence[Reading], rotations: Floats, photos: Sequence[str], convergence: float
+) -> Iterator[Finding]:
     if len(photos) < LEAST_PHOTOS:
         return
-    stated = _rms(from_angles(angles, system), rotations)
+    stated = _rms(as_stated, rotations)
     best, text, code = stated, "", ""
-    for other, what, kind in (*_readings(angles, system), _turned(angles, system, rotations, convergence)):
+    for other, what, kind in (*readings, _turned(as_stated, rotations, convergence)):
         left = _rms(other, rotations)
         if left < best:
             best, text, code = left, what, kind
@@ -64,7 +83,17 @@ def _rms(one: Floats, other: Floats) -> float:
     return float(np.degrees(np.sqrt(np.mean(np.arccos(np.clip(cosine, -1.0, 1.0)) ** 2))))
 
 
-def _readings(angles: Floats, system: str) -> Iterator[tuple[Floats, str, str]]:
+def _transposed(stated: Floats) -> Reading:
+    return stated.transpose(0, 2, 1), "as rotations from object to image", "P602"
+
+
+def _mounted(stated: Floats) -> Iterator[Reading]:
+    """Give the rotations of a camera that is mounted otherwise."""
+    for turn, where in ((np.pi / 2.0, "ahead"), (-np.pi / 2.0, "down")):
+        yield stated @ about(0, turn), f"of a camera that looks {where} where pitch and roll are zero", "P602"
+
+
+def _readings(angles: Floats, system: str) -> Iterator[Reading]:
     """Give rotations under other readings, in words, with the code: other units first, then systems, senses, turns."""
     for factor, text in UNITS:
         yield from_angles(angles * factor, system), f"as {text.split(' read as ')[0]}", "P601"
@@ -75,18 +104,17 @@ def _readings(angles: Floats, system: str) -> Iterator[tuple[Floats, str, str]]:
         if signs != (1.0, 1.0, 1.0):
             names = [name for name, sign in zip(system.split("-"), signs, strict=True) if sign < 0]
             yield from_angles(angles * signs, system), f"with {' and '.join(names)} of the other sign", "P602"
+    about_view = "yaw" if system.startswith("yaw") else "kappa"
     for turn in (90.0, 180.0, 270.0):
-        changed = angles + np.radians([0.0, 0.0, turn])
-        yield from_angles(changed, system), f"with kappa larger by {turn:.0f} degrees", "P602"
-    yield from_angles(angles, system).transpose(0, 2, 1), "as rotations from object to image", "P602"
+        changed = angles + np.radians([turn if name == about_view else 0.0 for name in system.split("-")])
+        yield from_angles(changed, system), f"with {about_view} larger by {turn:.0f} degrees", "P602"
 
 
-def _turned(angles: Floats, system: str, rotations: Floats, convergence: float) -> tuple[Floats, str, str]:
+def _turned(stated: Floats, rotations: Floats, convergence: float) -> Reading:
     """Turn all photos about the vertical by the angle that goes best with the rotations found."""
-    stated = from_angles(angles, system)
     together = np.einsum("nij,nkj->ik", rotations, stated)
     turn = float(np.arctan2(together[1, 0] - together[0, 1], together[0, 0] + together[1, 1]))
     text = f"turned about the vertical by {np.degrees(turn):+.2f} degrees"
     if convergence:
         text += f" (grid north lies {np.degrees(convergence):+.2f} degrees from true north there)"
-    return from_angles(np.array([[0.0, 0.0, turn]]), system) @ stated, text, "P602"
+    return about(2, turn) @ stated, text, "P602"

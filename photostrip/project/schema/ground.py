@@ -2,17 +2,18 @@
 
 from typing import Annotated, Any
 
-from photostrip.formats.measured.exterior import POSITIONS, orientation_columns
+from photostrip.formats.measured.exterior import POSITIONS, ROTATIONS, orientation_columns
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.pipeline.inputs import Settings
 from photostrip.project.schema.measurements import COLUMNS, Columns, ControlColumns, TableFile, header_names
 from photostrip.project.schema.sections import Rule, Section, key, wrong
-from photostrip.project.schema.values import Axes, Flag, Height, Number, Positive, Sigma3, Triple, Words, choice
+from photostrip.project.schema.values import Axes, Flag, Height, Number, Positive, Sigma3, Triple, Words, YAxis, choice
 
 PositionColumns = Annotated[Columns, header_names(POSITIONS)]
 OrientationColumns = Annotated[
-    Columns, header_names(*(orientation_columns(each.split("-"), "deg") for each in SYSTEMS))
+    Columns, header_names(*(orientation_columns(each, "deg") for each in (*SYSTEMS, *ROTATIONS)))
 ]
+YAW = "yaw-pitch-roll"
 USUAL = Settings()
 CRS = "An authority code (`EPSG:32633`), a PROJ string, WKT, `geocentric`, or `local` (right-handed, metres)"
 SIGMA = "Standard deviations of rows without sx, sy, sz, in the order of `axes`"
@@ -92,9 +93,46 @@ class Angles(Section):
     """Angles of the exterior orientations."""
 
     system: Annotated[str, choice(SYSTEMS)] = key(
-        "`alpha-omega-kappa`, `omega-phi-kappa` or `phi-omega-kappa`", USUAL.angle_system
+        "`alpha-omega-kappa`, `omega-phi-kappa`, `phi-omega-kappa` or `yaw-pitch-roll`", USUAL.angle_system
     )
     unit: Annotated[str, choice(("deg", "gon", "rad"))] = key("`deg`, `gon` or `rad`", USUAL.angle_unit)
+
+
+class GivenAngles(Section):
+    """Angles, quaternions or matrices of given orientations."""
+
+    system: Annotated[str, choice((*SYSTEMS, *ROTATIONS))] = key(
+        "`alpha-omega-kappa`, `omega-phi-kappa`, `phi-omega-kappa`, `yaw-pitch-roll`, `quaternion` (columns qw, qx, qy,"
+        " qz) or `matrix` (r11, r12, ... r33)",
+        USUAL.angle_system,
+    )
+    unit: Annotated[str, choice(("deg", "gon", "rad"))] = key("`deg`, `gon` or `rad`", USUAL.angle_unit)
+    north: Annotated[str, choice(("grid", "true"))] = key(
+        "North that they count from: `grid`, or `true`: then the meridian convergence at each photo is applied", "grid"
+    )
+    looks: Annotated[str, choice(("down", "ahead"))] | None = key(
+        "Of yaw-pitch-roll, required: where the camera looks with pitch and roll zero, `down` or `ahead` (a gimbal)",
+        None,
+    )
+    rotates: Annotated[str, choice(("image_to_ground", "ground_to_image"))] | None = key(
+        "Of quaternions and matrices, required: `image_to_ground` or `ground_to_image`", None
+    )
+    y_axis: YAxis | None = key(
+        "Of quaternions and matrices, required: y of the image axes, `up` (z towards the viewer) or `down` (z ahead)",
+        None,
+    )
+
+    @Rule
+    def _conventions_are_said(self) -> None:
+        needed = ("rotates", "y_axis") if self.system in ROTATIONS else ("looks",) if self.system == YAW else ()
+        for name in ("looks", "rotates", "y_axis"):
+            given = getattr(self, name)
+            if name in needed and given is None:
+                expected = self.keys[name].description.partition(": ")[2]
+                message = f"`{name}` is missing, which nothing else says of {self.system}"
+                raise wrong(message, code="missing-key", at=name, expected=expected)
+            if name not in needed and given is not None:
+                raise wrong(f"`{name}` says nothing of {self.system}", at=name, fix="remove it")
 
 
 class Orientations(GivenList):
@@ -104,16 +142,23 @@ class Orientations(GivenList):
         "Table `photo,x,y,z` and the angles by name, as `alpha,omega,kappa`, [,sx,sy,sz][,s_alpha,s_omega,s_kappa]"
     )
     columns: OrientationColumns = key(COLUMNS, {})
-    angles: Angles = key("System and unit of the angles", Angles())
+    angles: GivenAngles = key("System and unit of the angles", GivenAngles())
     role: Annotated[str, choice(("observed", "approximate"))] = key(
         "`observed`: observations with their standard deviations; `approximate`: a start, without influence", "observed"
     )
     sigma: Sigma3 | None = key(SIGMA, None, unit="m")
     sigma_angles: Sigma3 | None = key(
-        "Standard deviations of the angles of rows without them, in the order of their system",
+        "Standard deviations of the angles of rows without them, in the order of their system; of quaternions and"
+        " matrices of small turns about the image axes x, y, z",
         None,
         unit="the angles' unit",
     )
+
+    @Rule
+    def _true_north_is_somewhere(self) -> None:
+        if self.angles.north == "true" and self.crs in {"local", "geocentric"}:
+            message = f"nothing says where true north is in the frame `{self.crs}`"
+            raise wrong(message, at="angles", fix="give the crs of a map, or of longitude and latitude")
 
 
 class Output(Section):

@@ -154,7 +154,7 @@ def test_a_strip_with_a_pair_that_cannot_be_oriented_starts_from_given_orientati
     known = orientations(simulation, observed=given == "observed")
     if given == "one short":
         left = slice(0, 5)
-        parts = {name: getattr(known, name)[left] for name in ("photos", "enu", "angles", "sigma", "sigma_angles")}
+        parts = {name: getattr(known, name)[left] for name in ("photos", "enu", "angles", "sigma", "sigma_turns")}
         known = replace(known, **parts)
     inputs = replace(inputs_of(simulation), observations=replace(seen, xy=xy), orientations=known)
     if given == "one short":

@@ -151,9 +151,7 @@ def test_a_start_may_be_far_off() -> None:
     rng = np.random.default_rng(5)
     far = replace(given, enu=given.enu + rng.normal(0.0, 500.0, given.enu.shape) - [0.0, 0.0, 1500.0])
     assert told(replace(inputs_of(made), orientations=far), BUNDLE) == []
-    observed = replace(
-        far, observed=True, sigma=np.full(far.enu.shape, 500.0), sigma_angles=np.full(far.enu.shape, 1.0)
-    )
+    observed = replace(far, observed=True, sigma=np.full(far.enu.shape, 500.0), sigma_turns=np.full(far.enu.shape, 1.0))
     assert "P204" in told(replace(inputs_of(made), orientations=observed), BUNDLE)
 
 
