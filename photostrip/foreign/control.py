@@ -117,7 +117,7 @@ class Marks:
 
 
 def joined(
-    block: ForeignBlock, control: GivenControl, marks: Marks, asked: Asked, left_out: Iterable[str]
+    block: ForeignBlock, control: GivenControl | None, marks: Marks, asked: Asked, left_out: Iterable[str]
 ) -> ForeignBlock:
     """Put control and marks into a block."""
     own = np.full(len(marks.xy), np.nan if asked.mark_sigma is None else asked.mark_sigma)

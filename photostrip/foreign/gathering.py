@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -104,4 +104,25 @@ def gathered(origin: Origin, cameras: Mapping[str, PixelCamera], photos: Sequenc
         rotations=to_camera.transpose(0, 2, 1) * (1.0, -1.0, -1.0),
         frame=origin.frame,
         left_out=tuple(left_out),
+    )
+
+
+def measured_alone(block: ForeignBlock) -> ForeignBlock:
+    """Leave out photos without image points of a block whose orientations are given; without any it stays as it is."""
+    used = np.unique(block.photo)
+    if block.centers is None or block.rotations is None or len(used) in {0, len(block.photos)}:
+        return block
+    kept = used.tolist()
+    lost = [name for place, name in enumerate(block.photos) if place not in set(kept)]
+    camera_of = tuple(block.camera_of[place] for place in kept)
+    return replace(
+        block,
+        cameras={name: each for name, each in block.cameras.items() if name in camera_of},
+        photos=tuple(block.photos[place] for place in kept),
+        camera_of=camera_of,
+        photo=np.searchsorted(used, block.photo),
+        centers=block.centers[used],
+        rotations=block.rotations[used],
+        center_sigma=None if block.center_sigma is None else block.center_sigma[used],
+        left_out=(*block.left_out, f"{counted(len(lost), 'photo')} without points: {listed(lost, 4)}"),
     )

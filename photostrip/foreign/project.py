@@ -9,10 +9,10 @@ import numpy as np
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera
-from photostrip.foreign.tables import WGS84, ForeignBlock, GivenControl, GivenPositions, Wanted
+from photostrip.foreign.tables import ForeignBlock, GivenControl, GivenPositions, Wanted
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.text.writing import Content
-from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import separable_angles
 from photostrip.notes import counted
 from photostrip.number_columns import as_repr, as_texts, joined, repeated, texts_of
@@ -27,6 +27,7 @@ OF_MODEL = """\
 # Place, direction and scale of its orientations are arbitrary. They are a start: with control the photos are laid on
 # it, without any the result is a free network in the frame of the model.
 """
+ON_EARTH = "# Its orientations are a start, without influence on the result.\n"
 WITHOUT_RAYS = "# Tie points are missing: put their rows into observations.csv, with the columns of its header.\n"
 
 
@@ -35,7 +36,8 @@ def project_files(name: str, block: ForeignBlock, wanted: Wanted) -> dict[str, C
     posed, system = _orientations(block)
     rays = [(block.photos, block.photo), (block.points, block.point)]
     project = _project(name, block, wanted, system)
-    header = HEADER.format(source=block.source) + (OF_MODEL if system else WITHOUT_RAYS)
+    start = OF_MODEL if block.crs == "local" else ON_EARTH
+    header = HEADER.format(source=block.source) + (start if system else WITHOUT_RAYS)
     return {
         "observations.csv": _table("photo,point,x,y", rays, block.xy)
         if block.sigma is None
@@ -54,6 +56,8 @@ def _orientations(block: ForeignBlock) -> tuple[dict[str, Content], str]:
     system, turned = separable_angles(block.rotations)
     posed = np.hstack([block.centers, np.degrees(turned)])
     header = f"photo,x,y,z,{system.replace('-', ',')}"
+    if block.center_sigma is not None and np.isfinite(block.center_sigma).any():
+        header, posed = f"{header},sx,sy,sz", np.hstack([posed, block.center_sigma])
     return {"orientations.csv": _table(header, [(block.photos, np.arange(len(block.photos)))], posed)}, system
 
 
@@ -81,23 +85,27 @@ def _project(name: str, block: ForeignBlock, wanted: Wanted, system: str) -> dic
             "sigma": wanted.sigma,
         },
         **({} if block.control is None else {"control": [{"file": "control.csv", **_frame(block.control.crs)}]}),
-        **({} if block.positions is None else {"camera_positions": {"file": "positions.csv", **_frame(WGS84)}}),
-        **({"orientations": _approximate(system)} if system else {}),
+        **(
+            {}
+            if block.positions is None
+            else {"camera_positions": {"file": "positions.csv", **_frame(block.positions.crs)}}
+        ),
+        **({"orientations": _approximate(system, block.crs)} if system else {}),
     }
 
 
-def _approximate(system: str) -> dict[str, object]:
+def _approximate(system: str, crs: str) -> dict[str, object]:
     angles = {"system": system, "unit": "deg"}
-    return {"file": "orientations.csv", **_frame("local"), "angles": angles, "role": "approximate"}
+    return {"file": "orientations.csv", **_frame(crs), "angles": angles, "role": "approximate"}
 
 
 def _positions(photos: Sequence[str], given: GivenPositions) -> Iterator[str]:
-    values = np.hstack([given.xyz, given.sigma])
-    return _table("photo,x,y,z,sx,sy,sz", [(photos, np.arange(len(photos)))], values)
+    values, known = np.hstack([given.xyz, given.sigma]), np.flatnonzero(np.isfinite(given.xyz[:, 0]))
+    return _table("photo,x,y,z,sx,sy,sz", [(photos, known)], values[known])
 
 
 def _frame(crs: str) -> dict[str, object]:
-    return {"crs": Text(crs), "axes": list(GROUND_AXES)}
+    return {"crs": Text(crs), "axes": list(CARTESIAN_AXES if crs == "geocentric" else GROUND_AXES)}
 
 
 def _control(given: GivenControl) -> str:
@@ -168,6 +176,7 @@ def understood(block: ForeignBlock, wanted: Wanted) -> Mapping[str, str]:
     )
     said = {"read": f"{block.source}: {counts}"}
     said |= {f"camera {name}": _of_camera(name, given) for name, given in list(block.cameras.items())[:5]}
+    said |= {f"precision of {name}": text for name, text in list(block.calibrated.items())[:5]}
     if len(block.cameras) > 5:
         said["more"] = counted(len(block.cameras) - 5, "camera")
     said |= _of_photo(block)

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from photostrip.errors import Fault, InputError
-from photostrip.foreign import colmap, historix, opensfm
+from photostrip.foreign import colmap, historix, metashape, opensfm
 from photostrip.foreign.tables import ForeignBlock, Wanted
 from photostrip.formats.text.files import refuse
 
 READ = f"a folder with cameras.bin or cameras.txt (COLMAP), reconstruction.json (OpenSfM) or {historix.INTRINSICS} \
-(HISTORIX)"
+(HISTORIX), or an .xml of cameras (Metashape)"
 
 
 def read_source(source: Path, wanted: Wanted) -> ForeignBlock:
@@ -43,4 +43,6 @@ def own_control(source: Path) -> Path | None:
 def _model_reader(source: Path) -> Callable[[Path], ForeignBlock] | None:
     if colmap.is_model(source):
         return colmap.read
+    if metashape.is_file(source):
+        return metashape.read
     return opensfm.read if opensfm.is_reconstruction(source) else None

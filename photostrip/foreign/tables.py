@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from photostrip.arrays import Floats, Numbers
 from photostrip.camera import Camera
@@ -39,11 +39,12 @@ class GivenControl:
 
 @dataclass(frozen=True, eq=False)
 class GivenPositions:
-    """Measured positions of all photos of a block, WGS 84 with ellipsoidal heights."""
+    """Measured positions of the photos of a block."""
 
-    xyz: Floats  # (m, 3): longitude, latitude in degrees, height in metres
+    xyz: Floats  # (m, 3): east, north, up; longitude, latitude in degrees; NaN of a photo without one
     sigma: Floats  # (m, 3): east, north, up in metres
     said: str  # which photo has which, and of what they are
+    crs: str = WGS84
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,9 @@ class ForeignBlock:
     sigma: Floats | None = None  # (n,): standard deviation of each ray in pixels; NaN, or None: as for all
     control: GivenControl | None = None
     positions: GivenPositions | None = None
+    crs: str = "local"  # of the centres: ``local`` of any place, direction and scale, or ``geocentric``
+    center_sigma: Floats | None = None  # (m, 3): standard deviations of the centres; NaN where there is none
+    calibrated: Mapping[str, str] = field(default_factory=dict)  # standard deviations of cameras, in words
     beside: tuple[str, ...] = ()  # files of control that lie beside the others
     left_out: tuple[str, ...] = ()  # sentences
 

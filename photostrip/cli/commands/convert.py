@@ -14,7 +14,8 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     source: Annotated[
         Path,
         typer.Argument(
-            metavar="SOURCE", help="Folder of a COLMAP model, of OpenSfM, of HISTORIX; or a result.json, or its folder."
+            metavar="SOURCE",
+            help="Folder of a COLMAP model, of OpenSfM, of HISTORIX; cameras of Metashape, .xml; or a result.json.",
         ),
     ],
     target: Annotated[
@@ -48,7 +49,7 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
         typer.Option(
             "--control",
             metavar="FILE",
-            help="Control with its marks: CSV, gcp_list.txt, or ground_control_points.json.",
+            help="Control with its marks: CSV, gcp_list.txt, ground_control_points.json, markers of Metashape, .xml.",
         ),
     ] = None,
     crs: Annotated[str, typer.Option("--crs", metavar="CRS", help="Frame of the control, as EPSG:32633.")] = "",
@@ -65,7 +66,11 @@ def convert(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = None,
     positions: Annotated[
         Path | None,
-        typer.Option("--positions", metavar="FILE", help="GNSS events: Timestamp.MRK of DJI, events.pos of RTKLIB."),
+        typer.Option(
+            "--positions",
+            metavar="FILE",
+            help="GNSS events: Timestamp.MRK of DJI, events.pos of RTKLIB; references of Metashape, .xml.",
+        ),
     ] = None,
     positions_sigma: Annotated[
         str | None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,10 +10,13 @@ from photostrip.errors import Fault, InputError
 from photostrip.foreign.control import Asked, with_control
 from photostrip.foreign.events import with_events
 from photostrip.foreign.exports import exported
+from photostrip.foreign.gathering import measured_alone
+from photostrip.foreign.metashape import ENDING
+from photostrip.foreign.metashape_markers import with_markers, with_references
 from photostrip.foreign.opensfm_control import with_ground_control
 from photostrip.foreign.project import project_files, understood
 from photostrip.foreign.sources import own_control, read_source
-from photostrip.foreign.tables import Wanted
+from photostrip.foreign.tables import ForeignBlock, Wanted
 from photostrip.formats.output.result_json import read_result
 from photostrip.formats.text.numbers import LARGEST_NUMBER, SMALLEST_LENGTH, NotANumber
 from photostrip.formats.text.numbers import number as read_number
@@ -65,12 +68,16 @@ def converted(source: Path, output: Path, options: Options, *, force: bool) -> t
             mark_sigma=options.mark_sigma,
             width=options.mark_width,
         )
-        json = asked.file.casefold().endswith((".json", ".json.gz"))
-        block = (with_ground_control if json else with_control)(block, asked)
+        block = _reader_of(asked.file)(block, asked)
+    block = measured_alone(block)
     if options.positions is not None:
-        block = with_events(block, str(options.positions))
+        xml = options.positions.suffix.casefold() == ENDING
+        block = (with_references if xml else with_events)(block, str(options.positions))
     if not len(block.xy):
         message, fix = "nothing is measured on these photos", "give --control FILE, a table with its marks"
+        if block.beside:
+            message += ": tie points are in none of the files"
+            fix = f"its markers are taken with {' or '.join(f'--control {file}' for file in block.beside)}; or {fix}"
         raise InputError(Fault(message, "no-points", str(source), key="--control", fix=fix))
     files = project_files(output.resolve().name or "project", block, wanted)
     if not force:
@@ -80,6 +87,12 @@ def converted(source: Path, output: Path, options: Options, *, force: bool) -> t
     width = max(map(len, said))
     lines = [f"{name:<{width}}  {text}" for name, text in said.items()]
     return lines, f"wrote {', '.join(files)} to {output}; next: photostrip check {output / 'project.yaml'}"
+
+
+def _reader_of(control: str) -> Callable[[ForeignBlock, Asked], ForeignBlock]:
+    if control.casefold().endswith((".json", ".json.gz")):
+        return with_ground_control
+    return with_markers if control.casefold().endswith(ENDING) else with_control
 
 
 def is_result(source: Path) -> bool:

@@ -1,0 +1,299 @@
+"""``photostrip convert`` of cameras and markers of Metashape, as a user calls it."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import re
+from random import Random
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import yaml
+from pyproj import Transformer
+
+import photostrip
+from photostrip.cli.main import main
+from photostrip.geometry.rotation import from_angles
+from photostrip.project.checks.check import check_project
+from tests.foreign import colmap_models
+from tests.foreign.colmap_models import F
+from tests.foreign.converting import convert, refused
+from tests.foreign.metashape_models import LOCAL, SCALE, UTM, cameras, document, label_of, markers, simulated
+from tests.foreign.test_damaged import DAMAGED, WORDS, damaged
+from tests.loops import nonempty
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from photostrip.arrays import Floats
+    from photostrip.notes import Document
+
+CONTROL = {"layout": "random", "count": 8, "sigma": [0.01, 0.01, 0.015], "check": 25}
+
+
+def on_earth(truth: Document) -> tuple[Floats, Floats]:
+    """Give grid axes and geocentric places of the photos of a simulation in UTM, by pyproj alone."""
+    to_wgs84 = Transformer.from_crs("EPSG:32633", "EPSG:4979", always_xy=True)
+    to_earth = Transformer.from_crs("EPSG:4979", "EPSG:4978", always_xy=True)
+
+    def geocentric(places: Floats) -> Floats:
+        longitude, latitude = to_wgs84.transform(places[:, 0], places[:, 1])
+        return np.column_stack(to_earth.transform(longitude, latitude, places[:, 2]))
+
+    ground = np.array([[photo[axis] for axis in "xyz"] for photo in truth["photos"]])
+    axes = []
+    for step in 10.0 * np.eye(3):
+        along = geocentric(ground + step) - geocentric(ground - step)
+        axes.append(along / np.linalg.norm(along, axis=1, keepdims=True))
+    return np.stack(axes, axis=2), geocentric(ground)
+
+
+def level(truth: Document) -> tuple[Floats, Floats]:
+    """Give the same of a simulation in a local frame."""
+    ground = np.array([[photo[axis] for axis in "xyz"] for photo in truth["photos"]])
+    return np.tile(np.eye(3), (len(ground), 1, 1)), ground
+
+
+@pytest.fixture
+def chunk(tmp_path: Path) -> Path:
+    """Write a chunk on the Earth, beside its native project."""
+    truth = simulated(tmp_path / "native", control=CONTROL)
+    axes, origin = on_earth(truth)
+    source = tmp_path / "cameras.xml"
+    text = document(cameras(truth, axes, origin), markers(tmp_path / "native", truth), UTM, origin)
+    source.write_text(text, encoding="utf-8")
+    return source
+
+
+def run(project: Path) -> dict[str, dict[str, Document]]:
+    result = photostrip.run(project)
+    return {table: {each["id"]: each for each in result.document[table]} for table in ("points", "photos")}
+
+
+# ----------------------------------------------------------------------------------------------------- results
+
+
+def test_markers_come_back_to_the_result_of_the_native_project(
+    tmp_path: Path, chunk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert convert(chunk, tmp_path / "block", "--control", str(chunk)) == 0
+    said = capsys.readouterr().out
+    assert "Metashape cameras: 12 photos of 1 camera, 0 points, 0 rays" in said
+    assert "precision of 7  f 0.2, cx 0.1" in re.sub(r" {3,}", "  ", said)
+    assert "49 points, 25 of them check points, 354 marks; EPSG:32633, heights taken as ellipsoidal; " in said
+    assert "1 photo that is not aligned" in said
+    project = tmp_path / "block" / "project.yaml"
+    assert check_project(project).faults == ()
+    found = run(project)
+    native = tmp_path / "native"
+    rows = (native / "observations.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    text = "".join([rows[0], *(f"{row}" for row in rows[1:] if row.split(",")[1][0] in "GK")])
+    (native / "observations.csv").write_text(text, encoding="utf-8")
+    start = (tmp_path / "block" / "orientations.csv").read_text(encoding="utf-8")
+    ids = {label_of(each): each for each in (row.partition(",")[0] for row in rows[1:])}
+    (native / "orientations.csv").write_text(re.sub(r"flight \d/Фото & (\d+)", r"\1", start), encoding="utf-8")
+    read = yaml.safe_load(project.read_text(encoding="utf-8"))
+    with (native / "project.yaml").open("a", encoding="utf-8") as file:
+        file.write(yaml.safe_dump({"orientations": read["orientations"]}))
+    known = run(native / "project.yaml")
+    assert len(known["points"]) == 49
+    for name in ("x", "y", "z", "sigma_x", "sigma_z"):
+        expected = {point: each[name] for point, each in known["points"].items()}
+        assert {point: each[name] for point, each in found["points"].items()} == pytest.approx(expected, abs=3e-4)
+    for photo in nonempty(found["photos"].values()):
+        same = known["photos"][ids[photo["id"]]]
+        assert [photo[axis] for axis in "xyz"] == pytest.approx([same[axis] for axis in "xyz"], abs=1e-3)
+
+
+def test_orientations_are_those_of_the_chunk_on_the_earth(tmp_path: Path, chunk: Path) -> None:
+    assert convert(chunk, tmp_path / "block", "-q", "--control", str(chunk)) == 0
+    inputs = photostrip.load(tmp_path / "block" / "project.yaml").loaded.inputs
+    given = inputs.orientations
+    assert given is not None
+    assert (given.frame.crs, given.observed) == ("geocentric", False)
+    truth = simulated(tmp_path / "again", control=CONTROL)
+    axes, places = on_earth(truth)
+    order = [given.photos.index(label_of(each["id"])) for each in truth["photos"]]
+    np.testing.assert_allclose(given.enu[order], places, atol=1e-4)
+    expected = axes @ np.array([each["rotation"] for each in truth["photos"]]).reshape(-1, 3, 3)
+    np.testing.assert_allclose(from_angles(given.angles, given.system)[order], expected, atol=1e-6)
+    with (tmp_path / "block" / "orientations.csv").open(encoding="utf-8") as file:
+        sigma = {float(row[name]) for row in csv.DictReader(file) for name in ("sx", "sy", "sz")}
+    assert sorted(sigma) == pytest.approx([2e-3 * SCALE] * len(sigma))
+
+
+def test_a_chunk_in_a_local_system_is_laid_on_its_control(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    truth = simulated(tmp_path / "native", crs="local", control=CONTROL)
+    source = tmp_path / "cameras.xml"
+    marks = markers(tmp_path / "native", truth, sigmas=False)
+    source.write_text(document(cameras(truth, *level(truth)), marks, LOCAL, level(truth)[1]), encoding="utf-8")
+    assert convert(source, tmp_path / "block", "--control", str(source)) == 0
+    assert "; local, heights taken as ellipsoidal" in capsys.readouterr().out
+    with (tmp_path / "block" / "control.csv").open(encoding="utf-8") as file:
+        assert {row[name] for row in csv.DictReader(file) for name in ("sx", "sy", "sz")} == {"0.02"}  # the settings
+    found = run(tmp_path / "block" / "project.yaml")
+    for photo in nonempty(truth["photos"]):
+        center = [found["photos"][label_of(photo["id"])][axis] for axis in "xyz"]
+        assert center == pytest.approx([photo[axis] for axis in "xyz"], abs=0.1)
+
+
+def small(*changes: tuple[str, str]) -> str:
+    """Give two photos, three markers of which one has no reference, and marks."""
+    pose = [f"1 0 0 {x} 0 -1 0 0 0 0 -1 0 0 0 0 1" for x in (0, 3)]
+    photos = [
+        f'<camera id="{n}" sensor_id="7" component_id="0" label="DJI_{n}"><transform>{each}</transform>\n'
+        f'<reference x="15.3" y="49.2" z="41{n}" sx="1" sy="1" sz="2" enabled="true"/></camera>'
+        for n, each in enumerate(pose)
+    ]
+    points = [
+        '<marker id="0" label="G1"><reference x="15.3" y="49.2" z="312" enabled="true"/></marker>',
+        '<marker id="1" label="G2"><reference x="15.301" y="49.2" z="313" sx="1" sy="1" sz="3" enabled="0"/></marker>',
+        '<marker id="2" label="point 3"/>',
+    ]
+    marks = [
+        f'<marker marker_id="{m}">\n'
+        + "".join(f'<location camera_id="{n}" pinned="true" x="{900 + 100 * n}" y="{800 + m}"/>\n' for n in (0, 1))
+        + "</marker>"
+        for m in range(3)
+    ]
+    text = document(photos, (points, marks), 'GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]]', np.zeros((2, 3)))
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    return text
+
+
+def test_what_markers_say_of_themselves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    loose = '<location camera_id="1" pinned="true" x="1000" y="802"/>'
+    source = tmp_path / "cameras.XML"
+    source.write_text(small((loose, loose.replace("true", "false"))), encoding="utf-8")
+    assert convert(source, tmp_path / "block", "--control", str(source), "--control-sigma", "0.1,0.1,0.2") == 0
+    said = capsys.readouterr().out
+    assert "1 mark that Metashape placed by itself (not pinned)" in said
+    assert "1 point, 1 ray" in said
+    assert (tmp_path / "block" / "control.csv").read_text(encoding="utf-8").splitlines() == [
+        "point,x,y,z,use,role,sx,sy,sz",
+        "G1,15.3,49.2,312.0,xyz,control,0.1,0.1,0.2",
+        "G2,15.301,49.2,313.0,xyz,check,1.0,1.0,3.0",
+    ]
+    assert 'crs: "EPSG:4979"' in (tmp_path / "block" / "project.yaml").read_text(encoding="utf-8")
+    rows = (tmp_path / "block" / "observations.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[1:4] == ["DJI_0,G1,900.0,800.0", "DJI_1,G1,1000.0,800.0", "DJI_0,G2,900.0,801.0"]
+
+
+def test_references_of_cameras_are_their_positions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "cameras.xml"
+    off = 'z="411" sx="1" sy="1" sz="2" enabled="true"'
+    source.write_text(small((off, off.replace("true", "false"))), encoding="utf-8")
+    assert convert(source, tmp_path / "block", "--control", str(source), "--positions", str(source)) == 0
+    assert "references of 1 photo in Metashape; EPSG:4979, heights" in capsys.readouterr().out
+    assert (tmp_path / "block" / "positions.csv").read_text(encoding="utf-8").splitlines() == [
+        "photo,x,y,z,sx,sy,sz",
+        "DJI_0,15.3,49.2,410.0,1.0,1.0,2.0",
+    ]
+
+
+def test_markers_beside_a_block_of_another_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Photos are found by their names without an ending."""
+    truth = simulated(tmp_path / "native", control=CONTROL)
+    model = colmap_models.simulated(tmp_path / "same", ground={"crs": "EPSG:32633"}, control=CONTROL)
+    source, (lines, marks) = tmp_path / "markers.xml", markers(tmp_path / "native", truth)
+    photos = [
+        f'<camera id="{40 + number}" label="Фото {photo["id"]}" sensor_id="7"/>'
+        for number, photo in enumerate(truth["photos"])
+    ]
+    source.write_text(document(photos, (lines, marks), UTM, np.zeros((1, 3))), encoding="utf-8")
+    block = model.write_text(tmp_path / "model")
+    assert convert(block, tmp_path / "block", "--control", str(source)) == 0
+    assert "49 points, 25 of them check points, 354 marks" in capsys.readouterr().out
+    found, known = run(tmp_path / "block" / "project.yaml"), run(tmp_path / "native" / "project.yaml")
+    for point in nonempty(each for each in known["points"] if each[0] in "GK"):
+        expected = [known["points"][point][axis] for axis in "xyz"]
+        assert [found["points"][point][axis] for axis in "xyz"] == pytest.approx(expected, abs=3e-4)
+
+
+def test_the_largest_component_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "cameras.xml"
+    pose = "<transform>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</transform>"
+    third = f'<camera id="5" sensor_id="7" component_id="1" label="DJI_5">{pose}</camera>'
+    disabled = '<camera id="6" sensor_id="7" enabled="0" label="DJI_6"><transform/></camera>'
+    source.write_text(small(("     </group>", third + disabled + "</group>")), encoding="utf-8")
+    assert convert(source, tmp_path / "block", "--control", str(source)) == 0
+    said = capsys.readouterr().out
+    assert "1 smaller component of 1 photo" in said
+    assert "1 photo that is not enabled; 1 photo that is not aligned" in said
+
+
+# ---------------------------------------------------------------------------------------------------- refusals
+
+
+def test_without_image_points_an_option_is_named(
+    tmp_path: Path, chunk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = refused(capsys, chunk, tmp_path / "block")
+    assert "nothing is measured on these photos: tie points are in none of the files" in said
+    assert f"its markers are taken with --control {chunk}" in said
+
+
+MARK = '<location camera_id="1" pinned="true" x="1000" y="800"/>'
+CAMERA = 'camera id="1" sensor_id="7"'
+WRONG = {
+    "document type": (("<document", '<!DOCTYPE d [<!ENTITY e "x">]><document'), ":2: has a document type"),
+    "entity": (('label="G1"', 'label="&e;"'), ": is no XML here: undefined entity"),
+    "no chunk": (("<chunk", "<chunk></chunk><chunk"), ":2: document: holds 2 chunks"),
+    "cut": (("</document>", ""), ": is no XML here: no element found"),
+    "fisheye": (
+        ('<calibration type="frame" class="adjusted"', '<calibration type="fisheye"'),
+        "the camera type fisheye",
+    ),
+    "k4": (("<cx>10</cx>", "<cx>10</cx><k4>0.1</k4>"), "the coefficient k4 of metashape has no counterpart"),
+    "no f": ((f"<f>{F!r}</f>", ""), "has no focal length f in pixels"),
+    "f": ((f"<f>{F!r}</f>", "<f>-1</f>"), "width, height and focal length are not above 0"),
+    "word": (("<cx>10</cx>", "<cx>ten</cx>"), "cx: cx: `ten` is not a number"),
+    "no sensor": ((CAMERA, CAMERA.replace("7", "8")), "camera DJI_1: there is no sensor 8"),
+    "camera twice": ((CAMERA, CAMERA.replace("1", "0", 1)), "camera 0 is already given"),
+    "label twice": (('label="DJI_1"', 'label="DJI_0"'), "a photo called DJI_0 is already given"),
+    "pose": (("1 0 0 3 0 -1", "1 0 0 3 0 -2"), "transform: holds no rotation"),
+    "few": (("1 0 0 3 0 -1 0", "1 0 0 3 0 -1"), "holds 15 values; expected 16 numbers"),
+    "scale": ((f"<scale>{SCALE}", "<scale>0"), "0 is no scale"),
+    "marker": (('marker_id="0"', 'marker_id="9"'), "there is no marker 9"),
+    "photo of a mark": ((MARK, MARK.replace('"1"', '"77"', 1)), "there is no camera 77"),
+    "outside": ((MARK, MARK.replace("1000", "9000")), "the mark lies outside photo DJI_1, which has 5500 x 3667 px"),
+    "twice": ((MARK, MARK + MARK), "the mark of G1 on photo DJI_1 is already given"),
+    "pinned": ((MARK, MARK.replace("true", "maybe")), "pinned: `maybe` is neither true nor false"),
+    "sigma": (('sx="1" sy="1" sz="3"', 'sx="1" sy="0" sz="3"'), "a standard deviation is not above 0"),
+    "no frame": (('GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]]', ""), "nothing says in which frame the markers lie"),
+    "no precision": (('name="accuracy_markers"', 'name="other"'), "nothing says how precise the control is"),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_what_is_wrong_is_refused(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    change, words = WRONG[kind]
+    source = tmp_path / "cameras.xml"
+    source.write_text(small(change), encoding="utf-8")
+    said = refused(capsys, source, tmp_path / "block", "--control", str(source))
+    assert words in said
+    assert "cameras.xml" in said
+
+
+@pytest.mark.slow
+def test_a_damaged_file_is_refused_or_written_whole(tmp_path: Path) -> None:
+    random, whole, written = Random("metashape"), small().encode(), 0
+    source = tmp_path / "cameras.xml"
+    for number in nonempty(range(DAMAGED)):
+        source.write_bytes(damaged(whole, random, WORDS))
+        target, said = tmp_path / str(number), io.StringIO()
+        arguments = ["--sigma", "0.5", "--control", str(source), "--control-sigma", "1"]
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+            code = main(["convert", str(source), "-o", str(target), *arguments])
+        assert code in {0, 2}, said.getvalue()
+        assert target.exists() == (code == 0)
+        if code == 2:
+            assert re.search(r"cameras\.xml(:\d+)*: ", said.getvalue()), said.getvalue()
+        else:
+            written += 1
+    assert 0.02 * DAMAGED < written < 0.9 * DAMAGED
