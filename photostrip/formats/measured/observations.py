@@ -16,14 +16,13 @@ from photostrip.formats.measured.columns import PHOTO, POINT, numbers, refuse_wi
 from photostrip.formats.measured.measurements import Measurements
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.table_reader import read_table
-from photostrip.formats.text.table_text import Form
+from photostrip.formats.text.table_text import UNDECLARED, Form
 from photostrip.formats.text.tables import Column, Table, joined
 
 MARK = Column("mark", aliases=("mark_id", "fiducial", "fiducial_mark"))
 COORDINATES = (*numbers("x", "y"), *sigmas("x", "y"))
 OBSERVATIONS = (PHOTO, POINT, *COORDINATES)
 FIDUCIALS = (PHOTO, MARK, *COORDINATES)
-USUAL = Form()
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class Manner:
     sigma: float | None = None
     # ``refuse`` or ``average`` several measurements of one point on a photo; empty: averaged in lists of pairs
     repeated: str = ""
-    form: Form = USUAL  # how it is written
+    form: Form = UNDECLARED  # how it is written
     photos: frozenset[str] = frozenset()  # photos of the strips, by which the names of pairs are understood
 
 

@@ -42,7 +42,7 @@ def read_step(file: str, step: str) -> tuple[list[str], list[Floats]]:
 def read_rays(file: str) -> Measurements:
     """Read image coordinates of photos in flight order, or raise every fault of their table."""
     findings = Findings()
-    read = read_measurements(file, findings)
+    read = read_measurements([file], findings)
     findings.stop()
     if read is None:  # cannot be, see above
         raise InputError(f"{file} cannot be read")
