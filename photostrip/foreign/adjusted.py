@@ -16,6 +16,7 @@ import numpy as np
 from photostrip.arrays import Flags, Floats, Numbers
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import Fault, InputError
+from photostrip.geodesy.crs import map_entry
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.geodesy.tying import tie_frames
@@ -156,10 +157,7 @@ class Adjusted:
 
         enu: those of the same points in the frame, where they are known.
         """
-        if self.ground.kind == "geocentric":
-            geodetic = self.ground.geodetic(xyz)
-            return np.column_stack([np.degrees(geodetic[:, :2]), geodetic[:, 2]])
-        return self.ground.ground_from_cartesian(xyz) if enu is None else enu.copy()
+        return _on_map(self.ground, xyz, enu)
 
     def said_of_map(self) -> list[str]:
         """Say by how much who takes the coordinates of a map for Cartesian ones is wrong."""
@@ -245,6 +243,28 @@ def require_squares(camera: Camera, form: str) -> None:
     if any(camera.pixel_affinity):
         message = f"pixels of camera {camera.name} are no squares, for which {form} has no key"
         raise InputError(Fault(message, "export", fix="write it in pixels (.metashape.yaml)"))
+
+
+def places_on_map(frame: Document, xyz: Floats) -> tuple[Floats, str | None]:
+    """Return coordinates (n, 3) of the frame of a result as maps have them, and the reference system of the plan.
+
+    East, north, up, whatever the order of the frame; longitude, latitude in degrees and height in place of geocentric
+    ones. None: a local frame, which has no reference system.
+    Raises InputError for a frame that cannot be computed with here.
+    """
+    ground, enu = _ground_frame(frame), xyz[:, _columns(frame["axes"])]
+    if ground.kind == "local":
+        return enu, None
+    known = map_entry(ground.spec)
+    places = _on_map(ground, ground.cartesian_from_ground(enu), enu)
+    return places, f"EPSG:{known.epsg}" if known.epsg else known.wkt
+
+
+def _on_map(ground: GroundFrame, xyz: Floats, enu: Floats | None = None) -> Floats:
+    if ground.kind == "geocentric":
+        geodetic = ground.geodetic(xyz)
+        return np.column_stack([np.degrees(geodetic[:, :2]), geodetic[:, 2]])
+    return ground.ground_from_cartesian(xyz) if enu is None else enu.copy()
 
 
 def coordinates(records: tuple[Document, ...], names: tuple[str, ...] = ("x", "y", "z")) -> Floats:

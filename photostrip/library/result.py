@@ -67,6 +67,11 @@ class Result:
         return str(self._document["status"])
 
     @property
+    def crs(self) -> str:
+        """Reference system of all ground coordinates, as a project has it: a code, a PROJ string, WKT, or local."""
+        return str(self._document["frame"]["crs"])
+
+    @property
     def accuracy(self) -> str:
         """How good the points are, in one sentence."""
         return str(self._document["verdict"]["accuracy"])
@@ -130,7 +135,7 @@ class Result:
         from photostrip.library.table import Table
         from photostrip.result.tables import table_of
 
-        return Table(name, table_of(self._document, name))
+        return Table(name, table_of(self._document, name), self._document.get("frame"))
 
     def covariance_of(self, ids: Sequence[str] | str, *, joint: bool = False) -> Floats:
         """Return the covariances of points, in the order of the ids, along x, y, z of the frame.

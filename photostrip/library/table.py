@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from photostrip.errors import Fault, InputError
+
 if TYPE_CHECKING:
+    from photostrip.notes import Document
     from photostrip.result.tables import ResultColumn
 
 SHOWN = 10  # rows in a notebook
@@ -22,8 +25,9 @@ class Table:
     else are arrays of objects, None where there is none. Arrays cannot be written to: a copy can.
     """
 
-    def __init__(self, name: str, columns: Sequence[ResultColumn]) -> None:
+    def __init__(self, name: str, columns: Sequence[ResultColumn], frame: Document | None = None) -> None:
         self.name = name
+        self._frame = frame  # of its coordinates
         self.units: Mapping[str, str] = {each.name: each.quantity.unit for each in columns}
         """The unit of each column: m, um, deg, ...; empty for ratios, counts and texts."""
         self.meanings: Mapping[str, str] = {each.name: each.quantity.meaning for each in columns}
@@ -53,7 +57,7 @@ class Table:
         rows = key if isinstance(key, slice) else np.asarray(key)
         if not isinstance(rows, slice) and not rows.size:
             rows = np.zeros(0, np.intp)
-        part = Table(self.name, ())
+        part = Table(self.name, (), self._frame)
         part.units, part.meanings, part._texts = dict(self.units), dict(self.meanings), self._texts
         part._columns = {name: _fixed(column[rows]) for name, column in self._columns.items()}
         return part
@@ -79,6 +83,33 @@ class Table:
     def to_pandas(self) -> Any:  # noqa: ANN401 (a library that need not be there)
         """Return a ``pandas.DataFrame``; its ``attrs["units"]`` are the units. Needs pandas."""
         frame = import_module("pandas").DataFrame({name: column.copy() for name, column in self._columns.items()})
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def to_geopandas(self) -> Any:  # noqa: ANN401 (a library that need not be there)
+        """Return points and photos as a ``geopandas.GeoDataFrame``: the data frame with a place on the map in each row.
+
+        East, north, up in the reference system of the result; of geocentric coordinates longitude, latitude, height,
+        of local ones without a system. Rows without coordinates have no place. Needs geopandas.
+        Raises InputError for a table without coordinates, and ImportError where geopandas is not installed.
+        """
+        if self._frame is None or not {"x", "y", "z"} <= self._columns.keys():
+            message = f"the table {self.name} has no coordinates"
+            raise InputError(Fault(message, "no-coordinate", fix="take result.points or result.photos"))
+        try:
+            geopandas = import_module("geopandas")
+        except ModuleNotFoundError as error:
+            if error.name != "geopandas":
+                raise
+            message = "to_geopandas() needs the package geopandas, which is not installed: pip install geopandas"
+            raise ImportError(message, name="geopandas") from None
+        from photostrip.foreign.adjusted import places_on_map
+
+        places = np.column_stack([np.asarray(self._columns[each], float) for each in "xyz"])
+        known = np.isfinite(places).all(axis=1)
+        places[known], crs = places_on_map(self._frame, places[known])
+        points = np.where(known, geopandas.points_from_xy(*places.T), None)
+        frame = geopandas.GeoDataFrame(self.to_pandas(), geometry=points, crs=crs)
         frame.attrs["units"] = dict(self.units)
         return frame
 

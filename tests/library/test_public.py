@@ -28,12 +28,12 @@ MEMBERS = {
     "Plan": ["document", "files", "report"],
     "Project": ["check", "files_read", "loaded", "name", "overridden", "photos", "resolved", "run"],
     "Result": [
-        "accuracy", "computed", "control", "covariance_of", "document", "files", "findings", "in_columns", "name",
-        "notes", "pairs", "parallaxes", "photos", "pictures", "points", "rejected", "report", "residuals", "statement",
-        "status", "strips", "summary", "trace", "write",
+        "accuracy", "computed", "control", "covariance_of", "crs", "document", "files", "findings", "in_columns",
+        "name", "notes", "pairs", "parallaxes", "photos", "pictures", "points", "rejected", "report", "residuals",
+        "statement", "status", "strips", "summary", "trace", "write",
     ],
     "Simulation": ["files", "files_read", "project", "summary", "truth", "write"],
-    "Table": ["columns", "meanings", "name", "to_arrow", "to_pandas", "units", "where"],
+    "Table": ["columns", "meanings", "name", "to_arrow", "to_geopandas", "to_pandas", "units", "where"],
 }  # fmt: skip
 STEPS = [
     "absolute", "bundle", "chain", "interior", "intersection", "polynomial", "refine", "relative", "resection",

@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import pickle
+import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from pyproj import Transformer
 
 import photostrip
 from photostrip.cli.main import main
@@ -155,6 +157,54 @@ def test_tables_become_data_frames(result: photostrip.Result) -> None:
     frame.loc[0, "x"] = 0.0  # its own copy
     assert result.points["x"][0] > 0
     assert result.findings.to_pandas().shape == (0, len(result.findings.columns))
+
+
+def test_points_and_photos_have_a_place_on_a_map(result: photostrip.Result) -> None:
+    geopandas = pytest.importorskip("geopandas")
+    assert result.crs == "EPSG:32633"
+    frame = result.points.where(role="check").to_geopandas()
+    assert isinstance(frame, geopandas.GeoDataFrame)
+    assert (frame.crs.to_epsg(), frame.attrs["units"]["x"]) == (32633, "m")
+    check = result.points.where(role="check")
+    for axis in "xyz":
+        np.testing.assert_array_equal(getattr(frame.geometry, axis), check[axis])
+    assert result.photos.to_geopandas().geometry.has_z.all()
+    with pytest.raises(photostrip.InputError, match=r"the table control has no coordinates; take result\.points"):
+        result.control.to_geopandas()
+
+
+def test_their_places_are_east_north_up_whatever_the_frame(result: photostrip.Result) -> None:
+    geopandas = pytest.importorskip("geopandas")
+    document = json.loads(json.dumps(result.document))
+    east, north = result.points["x"], result.points["y"]
+    document["frame"]["axes"] = ["north", "east", "up"]
+    for each in document["points"]:
+        each["x"], each["y"] = each["y"], each["x"]
+    document["points"][3]["z"] = None
+    places = photostrip.Result(document).points.to_geopandas().geometry
+    assert places.isna().tolist() == [row == 3 for row in range(len(places))]
+    known = np.arange(len(places)) != 3
+    np.testing.assert_array_equal(places[known].x, east[known])
+    np.testing.assert_array_equal(places[known].y, north[known])
+    document["frame"] |= {"crs": "local", "axes": ["east", "north", "up"]}
+    assert photostrip.Result(document).points.to_geopandas().crs is None
+    there = geopandas.GeoSeries.from_xy(east, north, result.points["z"], crs="EPSG:32633").to_crs("EPSG:4979")
+    to_earth = Transformer.from_crs("EPSG:4979", "EPSG:4978", always_xy=True)
+    for each, *xyz in zip(document["points"], *to_earth.transform(there.x, there.y, there.z), strict=True):
+        each["x"], each["y"], each["z"] = xyz
+    document["frame"] |= {"crs": "geocentric", "axes": ["x", "y", "z"], "ellipsoid": [6378137.0, 6356752.314245179]}
+    found = photostrip.Result(document).points.to_geopandas()
+    assert found.crs.to_epsg() == 4326
+    np.testing.assert_allclose(np.array([found.geometry.x, found.geometry.y]), np.array([there.x, there.y]), atol=1e-9)
+    np.testing.assert_allclose(found.geometry.z, there.z, atol=1e-4)
+
+
+def test_a_package_that_is_missing_is_named(result: photostrip.Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "geopandas", None)
+    with pytest.raises(
+        ImportError, match=r"needs the package geopandas, which is not installed: pip install geopandas"
+    ):
+        result.points.to_geopandas()
 
 
 def test_tables_become_arrow_tables(result: photostrip.Result) -> None:
