@@ -53,10 +53,10 @@ def unpack_grids(parcel: Parcel, folder: Path) -> None:
 
 
 def _values(node: Node, key: str) -> Iterator[Node]:
-    """Return every text of the project that stands under a key of this name."""
+    """Return every text of the project that stands under a key of this name, or in a list under it."""
     for name, inner in node.entries.items():
-        if name == key and inner.text:
-            yield inner
+        if name == key:
+            yield from (each for each in (inner, *inner.elements) if each.text)
         yield from _values(inner, key)
     for inner in node.elements:
         yield from _values(inner, key)

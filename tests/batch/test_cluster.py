@@ -310,6 +310,11 @@ def test_a_parcel_is_all_that_is_needed(tmp_path: Path, monkeypatch: pytest.Monk
     (project,) = write_projects(tmp_path / "strips", 1)
     monkeypatch.chdir(tmp_path)
     path = Path(project).relative_to(tmp_path)
+    head, *rows = (path.parent / "observations.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    for name, some in (("first.csv", rows[:20]), ("second.csv", rows[20:])):  # a list of files travels as a whole
+        (path.parent / name).write_text(head + "".join(some), encoding="utf-8")
+    several = path.read_text(encoding="utf-8").replace("observations.csv", "[first.csv, second.csv]")
+    path.write_text(several, encoding="utf-8")
     here = evaluate(Task(0, str(path)))
     parcel = pack(path)
     (tmp_path / "away").mkdir()
