@@ -38,16 +38,18 @@ def attitudes(values: Floats, sigma: Floats, given: GivenAngles, north: Floats |
     else:
         rotations = _rotations(values, given)
     if north is None and stated:
-        return Attitudes(values, given.system, sigma, stated)
+        return Attitudes(angles=values, system=given.system, sigma_turns=sigma, stated=stated)
     if north is not None:  # an azimuth from grid north is smaller by the convergence
         rotations = about(2, north) @ rotations
     if stated:
         try:
-            return Attitudes(angles(rotations, given.system), given.system, sigma, stated)
+            return Attitudes(
+                angles=angles(rotations, given.system), system=given.system, sigma_turns=sigma, stated=stated
+            )
         except GeometryError:
             pass
     system, separable = separable_angles(rotations)
-    return Attitudes(separable, system, sigma, stated=False)
+    return Attitudes(angles=separable, system=system, sigma_turns=sigma, stated=False)
 
 
 def _rotations(values: Floats, given: GivenAngles) -> Floats:

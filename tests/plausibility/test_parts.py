@@ -200,7 +200,7 @@ def test_rotations_that_are_no_angles() -> None:
         "looks ahead": matrices @ Rotation.from_euler("x", -90, degrees=True).as_matrix(),
     }
     assert list(rotations.find_wrong_rotations(matrices, matrices, names)) == []
-    for words, stated in read.items():
+    for words, stated in nonempty(read.items()):
         (finding,) = rotations.find_wrong_rotations(stated, matrices, names)
         assert finding.code == "P602"
         assert words in finding.message
