@@ -54,6 +54,7 @@ EACH = "each"  # those of every group have one of their own
 REVERSED, FORWARDS, BACKWARDS = "reversed", "forwards", "backwards"  # rows of positions that belong to other photos
 ORDERS = REVERSED, FORWARDS, BACKWARDS
 EXCHANGED = "exchanged"  # two of them
+SHARED = 0.1  # of the level of all tests: what an accusation may cost that single observations do not make
 MOST_ASKED = 4  # positions of which any two may be exchanged: those that go least with the photos
 ASKED_PHOTOS = 8  # photos that are asked about: those whose residuals have most in common
 LEAST_SHARE = 1e-9  # of a column that the other unknowns leave to it, for it to be more than rounding
@@ -462,7 +463,7 @@ def order_of_positions(
         return None
     number = len(ORDERS) + rows * (rows - 1) // 2
     p = number * fdtrc(given.freedom, best.freedom, given.mean / max(best.mean, 1.0))
-    return least if p < level / 2 else None
+    return least if p < SHARED * level else None
 
 
 class _Misfit(NamedTuple):

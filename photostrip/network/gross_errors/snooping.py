@@ -306,8 +306,8 @@ class _Search:
 
     @property
     def _level(self) -> float:
-        """Logarithm of the level at which anything but single observations is taken up: half of that of all tests."""
-        return float(np.log(self.settings.level / 2))
+        """Logarithm of the level at which anything but single observations is taken up, a part of that of all tests."""
+        return float(np.log(hypotheses.SHARED * self.settings.level))
 
     def _likeliest(self, done: ScreenedBundle, bound: float) -> list[Likely]:
         """Hypotheses that are likelier than a bound, one of each kind, and than the level.
