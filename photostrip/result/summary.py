@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from photostrip.result.adjustment.pairs import Parallaxes, sigma0
 from photostrip.result.adjustment.rejected import rejected_by_strip
 from photostrip.result.numbers import Plain, rms
 from photostrip.result.points.given import Differences, of_used
+from photostrip.result.points.photos import ImageResiduals, ground_sample_distance
 from photostrip.result.quantities import record
 
 # Name of a tolerance in the project file: where its value stands in the summary, and its unit.
@@ -83,10 +84,11 @@ def _counts_of_models(result: Result) -> Document:
     }
 
 
-def summary_of(result: Result, found: Differences) -> Document:
+def summary_of(result: Result, images: Sequence[ImageResiduals], found: Differences) -> Document:
     """Return the block ``summary``: the accuracy of the whole project.
 
-    `found` is what is left at control and check points; rejected control does not count.
+    `images` holds the residuals of all photos, `found` what is left at control and check points; rejected control does
+    not count.
     """
     found = of_used(result, found)
     control = result.inputs.control
@@ -95,6 +97,7 @@ def summary_of(result: Result, found: Differences) -> Document:
         values = _of_models(result)
     else:
         values = _of_photos(result) if result.photo_strips else _of_singles(result)
+    values |= ground_sample_distance(images)
     for role, rows in roles.items():
         values[f"{role}_rms"] = _by_axis(rms, found.axes[rows])
         values[f"{role}_rms_um"] = _by_axis(rms, found.axes[rows] / found.scale[rows, None] * 1e6)

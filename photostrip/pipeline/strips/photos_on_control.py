@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from photostrip.arrays import Floats, Numbers, pieces
+from photostrip.arrays import Floats, Numbers
 from photostrip.errors import GeometryError
 from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.pipeline import overruling
@@ -31,6 +31,7 @@ from photostrip.strip.gross_errors.control import control_screening
 from photostrip.strip.gross_errors.control.control_rejections import EITHER, WRONG_IMAGE
 from photostrip.strip.gross_errors.control.control_screening import ScreenedControl
 from photostrip.strip.polynomial.correction import Polynomial
+from photostrip.strip.resection.collinearity import depths
 from photostrip.strip.resection.resection import Resection, resect
 
 
@@ -164,7 +165,7 @@ def adjusted(screened: ScreenedPhotos, correction: Polynomial | None, settings: 
         xyz=xyz,
         cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
         rays=np.bincount(points, minlength=len(formed.point)),
-        depth=_mean_depth(xyz, points, photo, resection),
+        depth=float(depths(xyz, points, resection.centers, resection.rotations, photo).mean()),
         notes=(
             *overruling.notes(settings.relative, strip.id, strip.photos),
             *notes.screening_notes(strip, stage.screened, stage.sigma),
@@ -214,12 +215,3 @@ def _mean_shifts(moved: Floats, points: Numbers, photo: Numbers, photos: int) ->
     """Mean shifts (photos, 3) of the points on each photo, 0 where it has none; moved: (q, 3), shifts of points."""
     count = np.maximum(np.bincount(photo, minlength=photos), 1)
     return np.column_stack([np.bincount(photo, moved[points, axis], photos) / count for axis in range(3)])
-
-
-def _mean_depth(xyz: Floats, points: Numbers, photo: Numbers, resection: Resection) -> float:
-    """Mean depth of points below the photos, metres; points, photo: (m,), of each image point."""
-    axes, depth = resection.rotations[:, :, 2], np.empty(len(photo))
-    for rows in pieces(len(photo)):  # all at once take 100 bytes an image point
-        some = photo[rows]
-        depth[rows] = ((xyz[points[rows]] - resection.centers[some]) * axes[some]).sum(axis=1)
-    return float(-depth.mean())

@@ -11,6 +11,7 @@ from photostrip.report.page.parts import Section, Words
 from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.decisions import decisions_section, weights_section
 from photostrip.report.sections.findings import findings_sections
+from photostrip.report.sections.marks import marks_section
 from photostrip.report.sections.models import deformation_section, links_section, models_section, of_models
 from photostrip.report.sections.overview import overview
 from photostrip.report.sections.points import (
@@ -53,6 +54,7 @@ class SectionName(StrEnum):
     DEFORMATIONS = "deformations"
     CONTROL = "control"
     CHECK = "check"
+    MARKS = "marks"
     STATEMENT = "statement"
     CROSS_VALIDATION = "cross-validation"
     TIES = "ties"
@@ -117,6 +119,9 @@ def _of_the_points(document: Document, *, everything: bool) -> Iterator[tuple[Se
 
     yield SectionName.CONTROL, control_section(document, everything=everything)
     yield SectionName.CHECK, check_section(document, everything=everything)
+    marks = marks_section(document, everything=everything)
+    if marks.parts:
+        yield SectionName.MARKS, marks
     if "statement" in document:
         yield SectionName.STATEMENT, statement_section(document)
     if "cross_validation" in document:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from photostrip.notes import Document, counted
 from photostrip.report.page.angles import AngleUnit, angle_unit
 from photostrip.report.page.numbers import fixed, metres, power, short, unit
-from photostrip.report.page.parts import DASH, Facts, Part, Section, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import Shown, number, tabulated, words
 from photostrip.report.sections import common_causes
+from photostrip.report.sections.strip import column_of
 
 NAMES = {
     "image": "image coordinates",
@@ -40,7 +41,7 @@ def bundle_sections(document: Document, *, everything: bool) -> list[Section]:
     if block["variance_components"]:
         found.append(_components(block["variance_components"]))
     if block["calibration"] or block["corrections"] or block.get("taken_up"):
-        found.append(_parameters(block, everything=everything))
+        found.append(_parameters(document, everything=everything))
     return found
 
 
@@ -197,15 +198,6 @@ def _components(rows: Sequence[Document]) -> Section:
     return Section("Variance components", (Words(text), tabulated(rows, columns)))
 
 
-CALIBRATION = (
-    words("camera", "camera"),
-    words("parameter", "parameter"),
-    number("correction", "value", partial(short, digits=5)),
-    number("σ", "sigma", partial(short, digits=2)),
-    words("", lambda each: "" if each["unit"] == "1" else each["unit"]),
-    number("p", "p", partial(short, digits=2)),
-    words("", lambda each: "significant" if each["significant"] else "not significant"),
-)
 CORRECTIONS = (
     words("camera positions", "name"),
     number("correction", "value", partial(short, digits=5), "m"),
@@ -218,13 +210,60 @@ CORRELATIONS = (
 )
 
 
-def _parameters(block: Document, *, everything: bool) -> Section:
+def _calibration(document: Document) -> tuple[Shown, ...]:
+    """Columns of the parameters of cameras: lengths also in pixels, where cameras have some."""
+    pixels = {camera["id"]: camera["pixel_size_mm"] for camera in document["cameras"] if "pixel_size_mm" in camera}
+
+    def in_pixels(row: Document) -> str:
+        pixel = pixels.get(row["camera"])
+        return short(row["value"] / pixel, 4) if pixel and row["unit"] == "mm" else ""
+
+    return (
+        words("camera", "camera"),
+        words("parameter", "parameter"),
+        number("correction", "value", partial(short, digits=5)),
+        number("σ", "sigma", partial(short, digits=2)),
+        words("", lambda each: "" if each["unit"] == "1" else each["unit"]),
+        *((number("pixels", in_pixels, rank=1),) if pixels else ()),
+        number("p", "p", partial(short, digits=2)),
+        words("", lambda each: "significant" if each["significant"] else "not significant"),
+    )
+
+
+def _correlated(rows: Sequence[Document]) -> Iterator[Table]:
+    """Give the correlations of the parameters of each camera, below the diagonal."""
+    places = {
+        camera: [n for n, row in enumerate(rows) if row["camera"] == camera] for camera in column_of(rows, "camera")
+    }
+    for camera, own in places.items():
+        if len(own) < 2 or not all("correlations" in rows[place] for place in own):  # results of older versions
+            continue
+        heads = [str(number) for number in range(1, len(own))]
+        lines = tuple(
+            (
+                f"{number} {rows[place]['parameter']}",
+                *(_correlation(rows[place], other) for other in own[: number - 1]),
+                *[""] * (len(own) - number),
+            )
+            for number, place in enumerate(own, 1)
+        )
+        yield Table((Column(f"correlations, camera {camera}", left=True), *map(Column, heads)), lines)
+
+
+def _correlation(row: Document, place: int) -> str:
+    value = row["correlations"][place]
+    return DASH if value is None else f"{value:+z.2f}"
+
+
+def _parameters(document: Document, *, everything: bool) -> Section:
     """Calibration parameters, offsets and drifts, and what is hard to tell apart."""
+    block = document["bundle"]
     shared = tuple(common_causes.taken_up(block, NAMED))
     parts: list[Part] = [Facts(shared)] if shared else []
     if block["calibration"]:
         note = "corrections to the given calibration; p: probability of a value this large by chance"
-        parts.append(tabulated(block["calibration"], CALIBRATION, note=note))
+        parts.append(tabulated(block["calibration"], _calibration(document), note=note))
+        parts.extend(_correlated(block["calibration"]))
     if block["corrections"]:
         note = "added to the given positions of a strip; a drift is per unit of time"
         parts.append(tabulated(block["corrections"], CORRECTIONS, note=note))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import nlargest
 from itertools import groupby
 from operator import itemgetter
@@ -64,26 +64,63 @@ class _Estimated(NamedTuple):
     size: float  # largest value in units of its standard deviation
 
 
-def estimated(block: Document, most: int) -> Iterator[Row]:
+def estimated(document: Document, most: int) -> Iterator[Row]:
     """Say in a line for each camera and group of positions what was estimated; of many the most significant."""
-    found = [*_cameras(block["calibration"]), *_positions(block["corrections"])]
+    block = document["bundle"]
+    pixels = {camera["id"]: camera.get("pixel_size_mm") for camera in document["cameras"]}
+    found = [*_cameras(block, pixels), *_positions(block["corrections"])]
     for place in sorted(nlargest(most, range(len(found)), key=lambda place: found[place].size)):
         yield "estimated", found[place].text
     if len(found) > most:
         more = counted(len(found) - most, "more camera or group of positions", "more cameras or groups of positions")
         yield "estimated", f"{more}, less significant: --section bundle"
+    yield from _hardly_told_apart(block["correlations"], most)
 
 
-def _cameras(rows: Sequence[Document]) -> Iterator[_Estimated]:
-    for camera, group in groupby(rows, key=itemgetter("camera")):
+def _hardly_told_apart(rows: Sequence[Document], most: int) -> Iterator[Row]:
+    """Name what is common to many observations and what else could stand for it; not two parameters of cameras."""
+    shared = ("camera ", "positions ")
+    pairs = [
+        f"{row['first']} with {row['second']} {row['value']:+.3f}"
+        for row in rows
+        if any(row[key].startswith(shared) for key in ("first", "second"))
+        and not all(row[key].startswith("camera ") for key in ("first", "second"))
+    ]
+    if pairs:
+        yield "highly correlated", listed(pairs, most)
+
+
+def _cameras(block: Document, pixels: Mapping[str, float | None]) -> Iterator[_Estimated]:
+    for camera, group in groupby(block["calibration"], key=itemgetter("camera")):
         own = list(group)
-        said = (f"{each['parameter'].replace('_', ' ')} {_sized(each)}" for each in own)
-        yield _Estimated(f"camera {camera}: {', '.join(said)}", _largest(own, "value", "sigma"))
+        said = ", ".join(_parameter(each, pixels.get(camera)) for each in own)
+        pairs = [(each, *pair) for each in own if (pair := _strongest(block["calibration"], each))]
+        if pairs:
+            row, other, value = max(pairs, key=lambda pair: abs(pair[2]))
+            said += f"; largest correlation {value:+.2f}, {row['parameter'].replace('_', ' ')} with {other}"
+        yield _Estimated(f"camera {camera}: {said}", _largest(own, "value", "sigma"))
 
 
-def _sized(row: Document) -> str:
+def _strongest(rows: Sequence[Document], row: Document) -> tuple[str, float] | None:
+    """Return which other parameter of a calibration a parameter is most correlated with, and how much."""
+    others = [
+        (
+            each["parameter"].replace("_", " ") + (f" of {each['camera']}" if each["camera"] != row["camera"] else ""),
+            value,
+        )
+        for each, value in zip(rows, row.get("correlations", ()), strict=False)
+        if each is not row and value is not None
+    ]
+    return max(others, key=lambda pair: abs(pair[1]), default=None)
+
+
+def _parameter(row: Document, pixel: float | None) -> str:
+    """Say a parameter with its standard deviation, lengths in pixels too, and whether it could be chance."""
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
-    return f"{short(row['value'])}{unit} (σ {short(row['sigma'], 2)})"
+    more = f", {short(row['value'] / pixel, 3)} px" if pixel and row["unit"] == "mm" else ""
+    more += "" if row["significant"] else ", not significant"
+    name = row["parameter"].replace("_", " ")
+    return f"{name} {short(row['value'])}{unit} (σ {short(row['sigma'], 2)}{more})"
 
 
 def _positions(rows: Sequence[Document]) -> Iterator[_Estimated]:

@@ -18,6 +18,7 @@ from photostrip.report.sections.bundle import classical_line
 from photostrip.report.sections.check_points import check_section, cross_validation_section
 from photostrip.report.sections.decisions import chosen_degrees
 from photostrip.report.sections.findings import cures_section
+from photostrip.report.sections.marks import marks_section
 from photostrip.report.sections.models import of_models
 from photostrip.report.sections.points import (
     control_section,
@@ -66,6 +67,7 @@ def _overview(document: Document, most: int) -> tuple[Section, ...]:
         _facts("Stages", _stages(document, min(most, NAMED))),
         control_section(document, everything=False, most=most),
         check_section(document, everything=False, most=most),
+        marks_section(document, everything=False, most=min(most, 2 * NAMED)),
         *_left_out(document, most),
         _facts("Worst", _worst(document)),
         _notes(remarks, most),
@@ -110,7 +112,7 @@ def _stages(document: Document, most: int) -> Rows:
     if "bundle" in document:
         yield "bundle adjustment", _bundle(document["bundle"])
         yield from common_causes.taken_up(document["bundle"], most)
-        yield from common_causes.estimated(document["bundle"], most)
+        yield from common_causes.estimated(document, most)
     if "classical" in document:
         yield "polynomials instead", classical_line(document["classical"])
     if summary["image_rms_um"] is not None:

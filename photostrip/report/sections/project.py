@@ -104,11 +104,23 @@ def _adjustment_of(document: Document) -> str:
     return f"polynomial, degree {document['settings']['polynomial']['degree']}"
 
 
+def cameras_of(document: Document) -> dict[str, Document]:
+    """Return the camera of each photo, as far as the result says it; of a single photo older ones may not."""
+    cameras = {row["id"]: row for row in document["cameras"]}
+    of_strip = {strip["id"]: cameras[strip["camera"]] for strip in document["strips"] if strip["camera"] in cameras}
+    single = {photo: camera for camera in cameras.values() for photo in camera.get("single_photos", ())}
+    only = next(iter(cameras.values())) if len(cameras) == 1 else None
+    found = {photo["id"]: single.get(photo["id"]) or of_strip.get(photo["strip"], only) for photo in document["photos"]}
+    return {photo: camera for photo, camera in found.items() if camera is not None}
+
+
 def camera_line(camera: Document) -> str:
     x0, y0 = camera["principal_point_mm"]
     text = f"principal distance {camera['principal_distance_mm']:g} mm, principal point {x0:g}, {y0:g} mm"
     if camera["format_mm"]:
         text += ", format {:g} x {:g} mm".format(*camera["format_mm"])
+    if "pixel_size_mm" in camera:
+        text += f", pixels of {1000 * camera['pixel_size_mm']:g} µm"
     return f"{text}, {'distortion ' + camera['distortion'] if camera['distortion'] else 'no distortion'}"
 
 
@@ -180,6 +192,10 @@ def counts_rows(document: Document) -> Iterator[tuple[str, str]]:
         summary = document["summary"]
         scale = f"1:{summary['photo_scale']:.0f}, flying height {fixed(summary['flying_height'], 0)} m above ground"
         yield "photo scale", scale
+    size = document["summary"].get("gsd")
+    if size:
+        text = f"{short(size['median'], 3)} m, {short(size['least'], 3)} to {short(size['largest'], 3)} m"
+        yield "ground sample", f"{text}: what a pixel covers, median and range of the photos"
 
 
 def _rejections(counts: Document) -> str:

@@ -18,7 +18,7 @@ from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import centre_columns, photo_columns
 from photostrip.result.quantities import angle_decimals, grouped, records
 from photostrip.result.records import Named, Records
-from photostrip.strip.resection.collinearity import project
+from photostrip.strip.resection.collinearity import depths, project
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +29,7 @@ class ImageResiduals:
     rows: Numbers  # (m,): rows of the observations, by photo in flight order, then by natural order of the points
     photo: Numbers  # (m,): place of each row's photo in the strip
     residuals: Floats  # (m, 2): in x and y, mm; NaN where the point has no coordinates in the strip
+    depth: Floats  # (m,): of the point before the photo, along its viewing direction, metres
     used: Flags  # (m,): whether the measurement took part
 
 
@@ -54,7 +55,10 @@ def _of_strip(result: Result, strip: StripResult, rank: Numbers) -> ImageResidua
     photos = stages.strip.oriented(stages.resection.centers, stages.resection.rotations)
     with np.errstate(invalid="ignore"):
         residuals = observations.xy[rows] - project(places, photos, position[rows])
-    return ImageResiduals(strip=stages.strip, rows=rows, photo=position[rows], residuals=residuals, used=used[rows])
+        depth = depths(known, observations.point[rows], photos.centers, photos.rotations, position[rows])
+    return ImageResiduals(
+        strip=stages.strip, rows=rows, photo=position[rows], residuals=residuals, depth=depth, used=used[rows]
+    )
 
 
 def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
@@ -69,13 +73,14 @@ def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
     for single in result.bundle.singles:
         rows = np.flatnonzero(observations.photo == observations.photo_ids.index(single.strip.photos[0]))
         rows = rows[np.argsort(rank[observations.point[rows]], kind="stable")]
-        photo, places = np.zeros(len(rows), np.intp), known[observations.point[rows]]
+        photo, point = np.zeros(len(rows), np.intp), observations.point[rows]
         photos = single.strip.oriented(single.center[None], single.rotation[None])
         with np.errstate(invalid="ignore"):
-            computed = project(places, photos, photo)
+            residuals = observations.xy[rows] - project(known[point], photos, photo)
+            depth = depths(known, point, photos.centers, photos.rotations, photo)
         found.append(
             ImageResiduals(
-                strip=single.strip, rows=rows, photo=photo, residuals=observations.xy[rows] - computed, used=used[rows]
+                strip=single.strip, rows=rows, photo=photo, residuals=residuals, depth=depth, used=used[rows]
             )
         )
     return found
@@ -95,6 +100,20 @@ def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> Records:
         ends = np.searchsorted(image.photo, np.arange(len(photos) + 1)).tolist()
         found.append(grouped("residuals", {"strip": image.strip.id, "photo": photos}, columns, ends))
     return Records.joined(found)
+
+
+def ground_sample_distance(images: Sequence[ImageResiduals]) -> Document:
+    """Return what a pixel covers in the middle of the depths of each photo that has pixels, over these photos."""
+    found = []
+    for image in images:
+        camera = image.strip.camera
+        if camera.pixel_size is None:
+            continue
+        ends = np.searchsorted(image.photo, np.arange(1, len(image.strip.photos)))
+        for depth, used in zip(np.split(image.depth, ends), np.split(image.used, ends), strict=True):
+            if used.any():
+                found.append(float(np.median(depth[used])) * camera.pixel_size / camera.principal_distance)
+    return {"gsd": {"median": float(np.median(found)), "least": min(found), "largest": max(found)}} if found else {}
 
 
 def point_rms(result: Result, images: Sequence[ImageResiduals]) -> Floats:

@@ -45,6 +45,15 @@ def distances(points: Floats, centers: Floats, photo: Numbers) -> Floats:
     return found
 
 
+def depths(xyz: Floats, point: Numbers, centers: Floats, rotations: Floats, photo: Numbers) -> Floats:
+    """Depths (m,) of points before photos, along their viewing direction; point, photo: (m,), which of each."""
+    axes, found = rotations[:, :, 2], np.empty(len(photo))
+    for rows in pieces(len(photo)):  # all at once take 100 bytes an image point
+        some = photo[rows]
+        found[rows] = ((centers[some] - xyz[point[rows]]) * axes[some]).sum(axis=1)
+    return found
+
+
 def derivatives(points: Floats, photos: KnownPhotos, photo: Numbers) -> tuple[Floats, Floats]:
     """Differentiate the image coordinates of rows, each of a point on a photo.
 

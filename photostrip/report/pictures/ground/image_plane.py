@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from photostrip.notes import Document
 from photostrip.report.pictures.ground.plan_view import DrawnGrid, Pair
+from photostrip.report.sections.project import cameras_of
 
 
 class Residual(NamedTuple):
@@ -32,15 +33,6 @@ class Frame(NamedTuple):
     def corners(self) -> list[Pair]:
         (a, b), (c, d) = self.low, self.high
         return [(a, b), (c, b), (c, d), (a, d)]
-
-
-def cameras_of(document: Document) -> dict[str, Document]:
-    """Return the camera of each photo; of photos that are strips of their own where the result has one camera only."""
-    cameras = {row["id"]: row for row in document["cameras"]}
-    of_strip = {strip["id"]: cameras[strip["camera"]] for strip in document["strips"] if strip["camera"] in cameras}
-    only = next(iter(cameras.values())) if len(cameras) == 1 else None
-    found = {photo["id"]: of_strip.get(photo["strip"], only) for photo in document["photos"]}
-    return {photo: camera for photo, camera in found.items() if camera is not None}
 
 
 def frame_of(camera: Document) -> Frame | None:

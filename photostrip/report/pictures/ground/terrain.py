@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photostrip.notes import Document
-from photostrip.report.pictures.ground.image_plane import cameras_of, frame_of
+from photostrip.report.pictures.ground.image_plane import frame_of
 from photostrip.report.pictures.ground.plan_view import DrawnGrid, Pair, Plan
+from photostrip.report.sections.project import cameras_of
 
 Floats = NDArray[np.float64]
 

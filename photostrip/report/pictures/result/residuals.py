@@ -9,10 +9,11 @@ from typing import NamedTuple
 from photostrip.notes import Document, counted
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.chart import LEFT, WIDTH
-from photostrip.report.pictures.ground.image_plane import Frame, Residual, cameras_of, frame_of, residuals_of
+from photostrip.report.pictures.ground.image_plane import Frame, Residual, frame_of, residuals_of
 from photostrip.report.pictures.ground.plan_view import Pair, middle
 from photostrip.report.pictures.result.histogram import histogram_picture, rms
 from photostrip.report.pictures.svg import Picture
+from photostrip.report.sections.project import cameras_of
 
 COLUMNS, PHOTO_ROWS = 6, 4  # of photos on the picture
 TILE, BETWEEN = 142.0, 14.0  # a photo on the picture
