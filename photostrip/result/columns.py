@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 
 from photostrip.notes import Document
 from photostrip.result.description import Quantity, table_at
-from photostrip.result.numbers import RoundedColumn
+from photostrip.result.numbers import GROUND, RoundedColumn
 from photostrip.result.quantities import angle_decimals, coordinate_decimals
 from photostrip.result.records import Records
 
@@ -100,7 +100,9 @@ def _at(found: Any, path: Iterable[str | int]) -> Sequence[Any]:  # noqa: ANN401
 
 def in_frame(listed: Iterable[Column], frame: Document) -> list[Column]:
     """Give the coordinates among columns the decimals of their frame."""
-    decimals = dict(zip("xyz", coordinate_decimals(frame["kind"], frame["axes"]), strict=True))
+    decimals = dict(
+        zip("xyz", coordinate_decimals(frame["kind"], frame["axes"], frame.get("decimals", GROUND)), strict=True)
+    )
     return [
         each._replace(quantity=replace(each.quantity, kind="number", decimals=decimals[each.key]))
         if each.key in decimals

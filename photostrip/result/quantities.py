@@ -45,9 +45,9 @@ def _decimals(entry: Quantity, unit: str) -> int | None:
     return DECIMALS_BY_UNIT[unit] if entry.unit_key else entry.decimals
 
 
-def coordinate_decimals(kind: str, axes: Sequence[str]) -> list[int]:
-    """Return the decimals of x, y, z in a frame: angles have more than metres."""
-    return [GEOGRAPHIC if kind == "geographic" and axis != "up" else GROUND for axis in axes]
+def coordinate_decimals(kind: str, axes: Sequence[str], lengths: int = GROUND) -> list[int]:
+    """Return the decimals of x, y, z in a frame with those of its lengths: angles have more."""
+    return [GEOGRAPHIC if kind == "geographic" and axis != "up" else lengths for axis in axes]
 
 
 def angle_decimals(unit: str) -> int:

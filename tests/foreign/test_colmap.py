@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import struct
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -79,6 +80,30 @@ def test_without_control_it_is_a_free_network_in_the_frame_of_the_model(tmp_path
     expected = TO_MODEL.apply(SCALE * np.array([[each[name] for name in "xyz"] for each in truth])) + SHIFT
     at = {each["id"]: [each[name] for name in "xyz"] for each in found.document["photos"]}
     assert np.abs([at[name_of(each["id"])] for each in truth] - expected).max() < 0.02  # of a flight of 3.7 units
+
+
+def test_coordinates_in_the_frame_of_the_model_keep_a_thousandth_of_a_pixel(tmp_path: Path) -> None:
+    """A pixel there covers 0.001 units, four decimals would be a tenth of it."""
+    model = simulated(tmp_path / "native")
+    assert convert(model.write_text(tmp_path / "model"), tmp_path / "block", "-q") == 0
+    result = photostrip.run(tmp_path / "block" / "project.yaml")
+    result.write(tmp_path / "result")
+    rows = {
+        name: list(csv.DictReader((tmp_path / "result" / f"{name}.csv").read_text(encoding="utf-8").splitlines()))
+        for name in ("points", "photos", "refined", "residuals")
+    }
+    points = {row["point"]: np.array([float(row[axis]) for axis in "xyz"]) for row in rows["points"]}
+    photos = {row["photo"]: row for row in rows["photos"]}
+    measured = {
+        (row["photo"], row["point"]): np.array([float(row[f"{axis}_mm"]) for axis in "xy"]) for row in rows["refined"]
+    }
+    f = result.document["cameras"][0]["principal_distance_mm"]
+    for row in nonempty(rows["residuals"]):
+        photo = photos[row["photo"]]
+        axes = np.array([[float(photo[f"r{i}{j}"]) for j in (1, 2, 3)] for i in (1, 2, 3)])
+        u, v, w = (points[row["point"]] - [float(photo[axis]) for axis in "xyz"]) @ axes
+        left = 1000 * (measured[row["photo"], row["point"]] + f * np.array([u, v]) / w)  # a pixel is a micrometre
+        assert left == pytest.approx([float(row["vx_um"]), float(row["vy_um"])], abs=0.008)  # given to 0.01 px
 
 
 def test_text_and_binary_are_the_same_project(tmp_path: Path) -> None:

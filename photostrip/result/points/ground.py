@@ -2,27 +2,41 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from photostrip.arrays import Floats, Numbers
-from photostrip.geodesy.ground_frame import GroundFrame
 from photostrip.notes import Document
 from photostrip.pipeline.results import ROLES, Result
-from photostrip.result.numbers import RoundedColumn, natural_rank, to_decimals
+from photostrip.result.numbers import GROUND, RoundedColumn, natural_rank, to_decimals
 from photostrip.result.points.checked import CHECKED, checked_of
 from photostrip.result.points.given import size_columns
 from photostrip.result.points.precision import point_columns
 from photostrip.result.quantities import coordinate_decimals, records
 from photostrip.result.records import Named, Records
 
+KEPT = 1e-3  # of a pixel on the ground that the coordinates of a free network show
 
-def coordinates(frame: GroundFrame, enu: Floats) -> Document:
+
+def coordinates(result: Result, enu: Floats) -> Document:
     """Return the columns x, y, z of coordinates in the internal order, with the decimals of their frame."""
-    decimals = coordinate_decimals(frame.kind, frame.axes)
+    frame = result.output
+    decimals = coordinate_decimals(frame.kind, frame.axes, ground_decimals(result))
     columns = zip("xyz", frame.order, decimals, strict=True)
     return {axis: RoundedColumn(to_decimals(enu[:, k], count)) for axis, k, count in columns}
+
+
+def ground_decimals(result: Result) -> int:
+    """Return the decimals of lengths: of a free network, in which a metre may be anything, those that pixels need."""
+    bundle = result.bundle
+    if bundle is None or not bundle.screened.solution.free:
+        return GROUND
+    of_strips = [(strip.of_photos.strip.camera, strip.scale_number) for strip in result.photo_strips]
+    scales = of_strips + [(single.strip.camera, single.scale_number) for single in bundle.singles]
+    pixels = [scale * camera.pixel_size / 1000 for camera, scale in scales if camera.pixel_size is not None]
+    return max([GROUND, *(math.ceil(-math.log10(KEPT * pixel)) for pixel in pixels)])
 
 
 def frame_of(result: Result) -> Document:
@@ -42,6 +56,7 @@ def frame_of(result: Result) -> Document:
         "heights": spec.height,
         **({} if spec.geoid_undulation is None else {"geoid_undulation": spec.geoid_undulation}),
         **({"curvature": {"radius": spec.curvature_radius, "origin": list(frame.origin or ())}} if corrected else {}),
+        **({} if (decimals := ground_decimals(result)) == GROUND else {"decimals": decimals}),
         "description": frame.describe(),
     }
 
@@ -59,7 +74,7 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> Records:
     columns = {
         "id": Named(ids, points.number),
         "role": Named(ROLES, result.roles.astype(np.int8)),
-        **coordinates(result.output, points.ground),
+        **coordinates(result, points.ground),
         **point_columns(result),
         "rays": points.rays,
         "models": models[points.number],

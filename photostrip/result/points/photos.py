@@ -156,7 +156,7 @@ def _photos_of_strip(result: Result, number: int, strip: StripResult, image: Ima
         "resected": resection.solved,
     }
     sigmas = {"sigma": None} if known is None else photo_columns(result, axes, rotations, known.photos[number])
-    head = {"id": photos, "strip": strip.strip.id, **coordinates(result.output, ground)}
+    head = {"id": photos, "strip": strip.strip.id, **coordinates(result, ground)}
     return records("photos", head | _turned(result, rotations) | sigmas | columns)
 
 
@@ -178,7 +178,7 @@ def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Rec
         "points": [int(image.used.sum()) for image in images],
         "resected": True,
     }
-    head = {"id": photos, "strip": [single.strip.id for single in singles], **coordinates(result.output, ground)}
+    head = {"id": photos, "strip": [single.strip.id for single in singles], **coordinates(result, ground)}
     sigmas = photo_columns(result, axes, rotations, result.bundle.photo_covariances[rows])
     return [records("photos", head | _turned(result, rotations) | sigmas | columns)]
 
@@ -205,7 +205,7 @@ def _centres(result: Result, number: int, strip: StripResult) -> list[Document]:
     known = np.flatnonzero(np.isfinite(strip.centers).all(axis=1))
     centers = strip.intermediate.cartesian_from_intermediate(strip.centers[known])
     names = [f"at the center of photo {photos[row]}" for row in known.tolist()]
-    places = coordinates(result.output, result.output.ground_from_cartesian(centers, ids=names))
+    places = coordinates(result, result.output.ground_from_cartesian(centers, ids=names))
     covariances = None if result.precision is None else result.precision.photos[number][known]
     columns = {"id": [photos[row] for row in known], **places, **centre_columns(result, centers, covariances)}
     of_centre = {row["id"]: row for row in records("photos", columns)} if len(known) else {}
