@@ -67,7 +67,7 @@ def find_wrong_order(
         mirrored = frozenset(photos[number] for number in np.flatnonzero(plane.mirrored).tolist())
         size = {photos[number]: float(plane.size[number]) for number in _other_size(plane)}
     findings += _of_other_points(observations, odd, links, strip, photos)
-    twice = _twice(links, float(np.median(observations.sigma)))
+    twice = _twice(links, observations.sigma)
     findings += [_twin(links, pair, strip, photos) for pair in twice]
     left = [number for number in range(len(photos)) if number not in {other for _, other in twice}]
     against = partial(turned_back, links, closer=_by_number(closer, photos))
@@ -192,17 +192,17 @@ def _moved_by(observations: PhotoPoints, photo: str, rows: int) -> PhotoPoints:
     return replace(observations, point=point)
 
 
-def _twice(links: mosaic.PhotoLinks, sigma: float) -> list[tuple[int, int]]:
+def _twice(links: mosaic.PhotoLinks, sigma: Floats) -> list[tuple[int, int]]:
     """Photos taken from one place: the same photo under two names."""
     base = np.abs(links.bases[1])
-    if not len(base):
+    if not len(base):  # as in each of the single photos of a block: the median of a million takes its time
         return []
     usual = np.median(base)
     like = np.abs(np.log(np.maximum(np.abs(links.turn), mosaic.TINY))) < np.log(mosaic.SCALE_JUMP)
     same = (
         like
         & (base < SAME_PLACE_SHARE * usual)
-        & (links.misfit < SAME_PHOTO_SIGMAS * sigma)
+        & (links.misfit < SAME_PHOTO_SIGMAS * float(np.median(sigma)))
         & (links.count >= SURE_COUNT)
     )
     return [(int(a), int(b)) for a, b in links.photo[same]]
