@@ -61,17 +61,21 @@ def derivatives(points: Floats, photos: KnownPhotos, photo: Numbers) -> tuple[Fl
         (mm/rad).
     Returns by_point: (n, 2, 3), by the point (mm/m).
     """
-    arm = points - photos.centers[photo]
+    by_point = derivatives_by_point(points, photos, photo)
+    # a small rotation theta about the axes of the frame turns the arm by -theta, seen from the photo
+    by_turn = -np.cross((points - photos.centers[photo])[:, None, :], by_point)
+    return np.concatenate([-by_point, by_turn], axis=2), by_point
+
+
+def derivatives_by_point(points: Floats, photos: KnownPhotos, photo: Numbers) -> Floats:
+    """Differentiate the image coordinates of rows by the point of each, (n, 2, 3), mm/m."""
     turn = photos.rotations[photo].transpose(0, 2, 1)
-    sight = np.einsum("nij,nj->ni", turn, arm)
+    sight = np.einsum("nij,nj->ni", turn, points - photos.centers[photo])
     f, w = photos.focal[photo], sight[:, 2]
     by_sight = np.zeros((len(points), 2, 3))
     by_sight[:, 0, 0] = by_sight[:, 1, 1] = -f / w
     by_sight[:, :, 2] = f[:, None] * sight[:, :2] / w[:, None] ** 2
-    by_point = by_sight @ turn
-    # a small rotation theta about the axes of the frame turns the arm by -theta, seen from the photo
-    by_turn = -np.cross(arm[:, None, :], by_point)
-    return np.concatenate([-by_point, by_turn], axis=2), by_point
+    return np.asarray(by_sight @ turn)
 
 
 def partials(arm: Floats, rotations: Floats, focal: Floats, distance: Floats) -> PhotoPartials:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photostrip.arrays import Flags, Floats, Numbers
-from photostrip.strip.resection.collinearity import KnownPhotos, derivatives, project
+from photostrip.strip.resection.collinearity import KnownPhotos, derivatives_by_point, project
 from photostrip.strip.strip_formation.non_neighbours import meeting
 
 ITERATIONS = 12
@@ -51,8 +51,7 @@ def intersect_points(
     covariance = np.full((count, 3, 3), np.nan)
     for _ in range(ITERATIONS):
         with np.errstate(invalid="ignore", divide="ignore"):
-            _, slope = derivatives(xyz[point], photos, photo)
-            slope = slope / sigma[:, :, None]
+            slope = derivatives_by_point(xyz[point], photos, photo) / sigma[:, :, None]
             misfit = (xy - project(xyz[point], photos, photo)) / sigma
         bad = ~np.isfinite(slope).all(axis=(1, 2)) | ~np.isfinite(misfit).all(axis=1)
         slope[bad], misfit[bad] = 0.0, 0.0
