@@ -21,7 +21,8 @@ from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
 from photostrip.strip.resection.collinearity import KnownPhotos, project
 from photostrip.strip.resection.ray_intersection import Intersected, intersect_points, where_two_meet
 
-LEVEL = 0.01  # of one false name in a project
+LEVEL = 0.01  # of one ray of a project that is called wrong falsely
+NAMED = 1e-3  # of one false name in a project
 AT_A_TIME = 200_000  # rays
 
 
@@ -100,7 +101,7 @@ def find_shared_ids(
         for rows, two in _two_places(rays, asked):
             fewer = int(min(two.here.sum(), (~two.here).sum()))
             expected = float(comb(of_point, fewer).sum() * share**fewer * two.chance ** (2 * fewer - 3))
-            if expected > LEVEL:
+            if expected > NAMED:
                 continue
             name = point_ids[int(rays.point[rows[0]])]
             photos = rays.photo[rows]
