@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from heapq import nlargest
 from math import hypot
 
 from photostrip.notes import Document, counted
@@ -13,6 +14,7 @@ from photostrip.report.sections.project import cameras_of
 from photostrip.report.sections.strip import ALL_SHOWN, worst_first
 
 PIXELS, MICROMETRES = "px", "µm"
+MOST_LISTED = 100  # marks: a page of a large block can still be mailed
 DECIMALS = {PIXELS: 2, MICROMETRES: 1}
 
 
@@ -33,7 +35,10 @@ def marks_section(document: Document, *, everything: bool, most: int = ALL_SHOWN
 def _table(marks: Sequence[Document], unit: str, *, everything: bool, most: int) -> Table:
     """Return the table of marks in one unit."""
     where = ("marks", "marks", "residuals")
-    shown, note = worst_first(marks, lambda mark: float(mark["length"]), where, everything=everything, most=most)
+    shown, note = worst_first(marks, _length, where, everything=everything, most=most)
+    if len(shown) > MOST_LISTED:
+        shown = nlargest(MOST_LISTED, marks, key=_length)
+        note = f"the worst {MOST_LISTED} of {len(marks)}; `residuals` in result.json has all"
     tested = any(mark["test"] is not None for mark in shown)
     columns = (
         words("point", "point"),
@@ -46,6 +51,10 @@ def _table(marks: Sequence[Document], unit: str, *, everything: bool, most: int)
     )
     below = joined(note, "test: the larger of both over its standard deviation" if tested else "")
     return tabulated(shown, columns, note=below)
+
+
+def _length(mark: Document) -> float:
+    return float(mark["length"])
 
 
 def _marks(document: Document) -> Iterator[Document]:
@@ -85,7 +94,7 @@ def _summed(marks: Sequence[Document]) -> Iterator[tuple[str, str]]:
         if own:
             unit = own[0]["unit"]
             rms = (sum(mark["length"] ** 2 for mark in own) / (2 * len(own))) ** 0.5
-            worst = max(own, key=lambda mark: float(mark["length"]))
+            worst = max(own, key=_length)
             largest = f"{_sized(worst['length'], unit)} {unit} at {worst['point']} on {worst['photo']}"
             yield role, f"{counted(len(own), 'mark')}, rms {_sized(rms, unit)} {unit}; largest {largest}"
 
