@@ -24,6 +24,7 @@ FENCES = {
     "json": FILES,
     "laspy": ("foreign/historix_submission.py",),
     "matplotlib": ("report/*",),
+    "pydantic": ("project/*",),
     "pyproj": ("geodesy/crs.py", "geodesy/proj_operation.py"),
     "rich": ("report/page/console.py", "report/page/progress.py"),
     "typer": ("cli/*",),

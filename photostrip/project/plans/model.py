@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 from photostrip.errors import Fault, InputError
 from photostrip.planning.model.plan import LAYOUTS, NO_ERROR, ControlPoint, ModelSpec, NamedPoint, control_layout
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.schema.sections import After, Before, Rule, Section, key, wrong
+from photostrip.project.schema.sections import After, Before, Section, key, rule, wrong
 from photostrip.project.schema.values import Id, Number, Pair, Positive, Range, Triple, Whole, Words, bounded, one_of
 from photostrip.project.simulation import camera_of
 from photostrip.units import ARCSECONDS, MICROMETRES, MILLIMETRES
@@ -96,7 +96,7 @@ class ModelPlanFile(Flown):
     points: list[ModelPoint] = key("Further points, with names and heights", [])
     element_errors: ElementErrors = key("Given errors of the elements", ElementErrors())
 
-    @Rule
+    @rule
     def _errors_or_misclosures(self) -> None:
         measured = [point for point in self.control.points if point.misclosure is not None]
         if not measured:
@@ -106,11 +106,11 @@ class ModelPlanFile(Flown):
             raise wrong(message, code="missing-key", at="control", fix="give it for all control points, or for none")
         every: list[ModelPoint] = [*self.control.points, *self.points]
         made = [point for point in every if any(point.measured_error)]
-        if made or any(any(point.given_error) for point in measured) or any(self.element_errors.values().values()):
+        if made or any(any(point.given_error) for point in measured) or any(dict(self.element_errors).values()):
             message = "misclosures that were found, and errors that would make some, are both given"
             raise wrong(message, code="two-keys", at="control", fix="remove the one or the other")
 
-    @Rule
+    @rule
     def _points_are_seen(self) -> None:
         camera = camera_of(self.camera)
         flying_height = self.scale_of(camera) * camera.principal_distance / MILLIMETRES
@@ -121,7 +121,7 @@ class ModelPlanFile(Flown):
                 raise wrong(message, code="range", at=name, expected=f"at most {RELIEF * flying_height:.0f} m")
 
 
-ELEMENT_KEYS = tuple(f"element_errors.{name}" for name in ElementErrors.keys)
+ELEMENT_KEYS = tuple(f"element_errors.{name}" for name in ElementErrors.model_fields)
 
 
 def elements_option(text: str | None) -> dict[str, str]:

@@ -13,10 +13,11 @@ from photostrip.planning.strip.ideal_strip import LAYOUTS, LEAST_PHOTOS, USES, C
 from photostrip.planning.strip.methods import BUNDLE, METHODS
 from photostrip.planning.strip.placement import Demand, Placement
 from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.schema.sections import After, Before, Length, Rule, Section, key, read_section, wrong
+from photostrip.project.schema.sections import After, Before, Section, key, length, rule, wrong
 from photostrip.project.schema.values import Flag, Id, Positive, Range, Whole, Words, bounded, one_of
 from photostrip.project.simulation import camera_of
 from photostrip.project.yaml.reading import Reading
+from photostrip.project.yaml.validation import valid_section
 from photostrip.simulation import Points
 
 MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
@@ -90,9 +91,9 @@ class StripLayout(Section):
     )
     gnss_offset: Flag = key("Whether these have a constant offset to be determined", USUAL_LAYOUT.gnss_offset)
 
-    @Rule
+    @rule
     def _one_way_to_space_bands(self) -> None:
-        if self.every is not None and "bands" in self.given:
+        if self.every is not None and "bands" in self.model_fields_set:
             raise wrong("the number of bands and their distance are both given", at="every", fix="remove one")
 
 
@@ -125,16 +126,16 @@ class StripPlanFile(Flown):
         None,
         unit="m",
     )
-    layouts: Annotated[dict[Id, Annotated[StripLayout, Before(_layout)]], Length(1)] | None = key(
+    layouts: Annotated[dict[Id, Annotated[StripLayout, Before(_layout)]], length(1)] | None = key(
         f"Layouts by name; a word may stand for one. Default: {', '.join(DEFAULT_LAYOUTS)}", None
     )
-    methods: Annotated[list[Annotated[Words, After(one_of(*METHODS))]], Length(1)] = key(
+    methods: Annotated[list[Annotated[Words, After(one_of(*METHODS))]], length(1)] = key(
         f"Methods of adjustment: {', '.join(METHODS)}", list(METHODS)
     )
     required: StripRequired = key("Accuracy that every point must reach", StripRequired())
     place: StripPlacement | None = key("Further points to be placed as well as possible", None)
 
-    @Rule
+    @rule
     def _names_and_methods_fit(self) -> None:
         into = self.place.into if self.place is not None else None
         names = list(self.layouts or DEFAULT_LAYOUTS)
@@ -177,7 +178,7 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
         ),
         image_sigma=given.image_sigma_um / 1000.0,
     )
-    usual = {name: read_section(StripLayout, _layout(word), []) for name, word in DEFAULT_LAYOUTS.items()}
+    usual = {name: valid_section(StripLayout, _layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
     chosen = [(name, each) for name, each in (given.layouts or usual).items() if each is not None]
     layouts = tuple(_of_layout(str(name), each, given.control_sigma) for name, each in chosen)
     if given.gnss is not None:
