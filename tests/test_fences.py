@@ -13,7 +13,7 @@ from tests.source_tree import PACKAGE, ROOT, imports, modules
 if TYPE_CHECKING:
     from pathlib import Path
 
-FILES = ("formats/*", "project/*", "report/*", "cli/*")
+FILES = ("formats/*", "project/*", "report/*", "sheets/*", "cli/*")
 # Library: the files below photostrip/ that may import it.
 FENCES = {
     "csv": FILES,
@@ -24,6 +24,7 @@ FENCES = {
     "json": FILES,
     "laspy": ("foreign/historix_submission.py",),
     "matplotlib": ("report/*",),
+    "pydantic": ("project/*",),
     "pyproj": ("geodesy/crs.py", "geodesy/proj_operation.py"),
     "rich": ("report/page/console.py", "report/page/progress.py"),
     "typer": ("cli/*",),

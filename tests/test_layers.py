@@ -29,6 +29,7 @@ LAYERS = (
     {"project"},
     {"foreign"},
     {"report"},
+    {"sheets"},
     {"library"},
     {"batch"},
     {"cli"},
