@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import io
 import re
-from random import Random
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -15,7 +12,6 @@ import photostrip
 from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
 from tests.foreign.colmap_models import simulated
-from tests.foreign.test_damaged import DAMAGED, WORDS, damaged
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -209,25 +205,3 @@ def test_contradictions_have_their_line(tmp_path: Path, capsys: pytest.CaptureFi
     told = block.refused(capsys, path, *SIGMA)
     assert f"gcp_list.txt:{len(lines)}" in told
     assert "has other coordinates than in line" in told
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["csv", "txt"])
-def test_a_damaged_table_is_refused_or_written_whole(tmp_path: Path, kind: str) -> None:
-    block, random = Block(tmp_path), Random(kind)
-    block.marks = block.marks[:20]
-    path = block.table() if kind == "csv" else block.odm()
-    whole, written = path.read_bytes(), 0
-    for number in nonempty(range(DAMAGED)):
-        path.write_bytes(damaged(whole, random, WORDS))
-        target, said = tmp_path / f"block-{number}", io.StringIO()
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-            code = main(["convert", str(tmp_path / "model"), "-o", str(target), "--sigma", "0.5",
-                         "--control", str(path), *UTM, *SIGMA])  # fmt: skip
-        assert code in {0, 2}, (said.getvalue(), path.read_bytes())
-        assert target.exists() == (code == 0)
-        if code == 2:
-            assert f"{path.name}:" in said.getvalue()
-        elif (written := written + 1) % 10 == 0:
-            assert check_project(target / "project.yaml").faults == (), path.read_bytes()
-    assert written > 0.04 * DAMAGED
