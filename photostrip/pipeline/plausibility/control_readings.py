@@ -35,6 +35,7 @@ from photostrip.strip.absolute_orientation import MOST_OFF, WEAK_LIMIT
 from photostrip.strip.gross_errors.control.control_deletion import ROUNDING
 
 LEVEL = 1e-6  # of naming a reading where the control is read as it should be: a run fails because of it
+ROUNDING = 1e-6  # of the logarithm of a likelihood: of readings that are as likely the first is named
 SEARCH_LEVEL = 0.01  # of taking anything out of sound control
 AS_IT_IS = (0, 1, 2)
 HEIGHTS, ALL = "heights", "all"
@@ -174,7 +175,7 @@ def find_reading(
         if tried is None or not tried.fits:
             continue
         cost = _cost(tried, way, unknowns, number)
-        if cost < least:
+        if cost < least - ROUNDING:
             best, least = Better(reading=way, number=number, laid=tried), cost
     return best
 
