@@ -11,7 +11,6 @@ from photostrip.simulation.draws import Draws, Purpose
 from photostrip.terrestrial.accuracy import (
     EXAMPLES,
     as_printed,
-    grid,
     required,
     worked,
 )
@@ -70,19 +69,3 @@ def test_required_accuracy_is_that_of_simulated_measurements() -> None:
     spread = found.std(axis=0)
     assert spread[0] == pytest.approx(errors.angle, rel=0.04)
     assert spread[1] == pytest.approx(errors.vertical, rel=0.04)
-
-
-# ---------------------------------------------------------------------------------------------------- theodolite
-
-
-@pytest.mark.parametrize(
-    ("level", "x", "z"),
-    [
-        (True, [0, 30, 60, 80], [0, 30, 60]),
-        (False, [-80, -60, -30, 0, 30, 60, 80], [-60, -30, 0, 30, 60]),
-    ],
-)
-def test_the_grid_ends_at_the_edges(level: bool, x: list[float], z: list[float]) -> None:
-    found = grid((160.0, 120.0), 30.0, level=level)
-    assert found[0].tolist() == x
-    assert found[1].tolist() == z
